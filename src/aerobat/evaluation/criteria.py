@@ -111,6 +111,7 @@ def criterion(problem: Problem) -> str:
     tolerance = problem.tolerance
     passed = [
         *(["gates as asked"] if problem.gates else []),
+        *(["no obstacle touched"] if problem.surroundings.obstacles else []),
         *(["waypoints within their radius"] if any(stage.ball for stage in stages) else []),
     ]
     within = "the goal and the places of other stages" if passed else "the whole path"

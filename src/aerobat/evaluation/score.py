@@ -24,9 +24,11 @@ from aerobat.simulation.flight import Flight
 from aerobat.simulation.metrics import Criteria, metrics_of_log
 from aerobat.simulation.outcome import Outcome, counted, length
 from aerobat.simulation.passages import (
+    NearestObstacle,
     Passage,
     StageAttitude,
     WaypointPassage,
+    nearest_in_log,
     passages,
     stage_attitudes,
     waypoint_passages,
@@ -91,6 +93,7 @@ class Score:
     off_path_time: float  # [s] when the vehicle had left its path first, NaN if never
     contact: Contact  # what the vehicle came to touch first, where its plant felt that
     contact_time: float  # [s] when, NaN if never
+    nearest: NearestObstacle | None = None  # None where there are no obstacles, or the body is not known
     path_radius_m: float = inf  # by which the path may be left
     lap_begin_s: float = 0.0  # when the first lap begins; a closed course's before the flight
     observer: ObserverScore | None = None  # of a filter, where a logged flight had one
@@ -99,7 +102,8 @@ class Score:
         """Write-protect the arrays of a batch."""
         if not self.is_batch:
             return
-        judged = (*self.passages, *self.waypoints, *self.places, *self.attitudes)
+        judged: list[Any] = [*self.passages, *self.waypoints, *self.places, *self.attitudes]
+        judged += [] if self.nearest is None else [self.nearest]
         parts = (part for one in judged for part in vars(one).values())
         for value in (*vars(self).values(), *parts):
             if isinstance(value, np.ndarray):
@@ -173,7 +177,7 @@ class Score:
     def _end(self) -> tuple[Outcome, str]:
         """The first thing that went wrong, else through all gates, else flown to the end.
 
-        What gates, waypoints, the ground and the plant say comes before what is kept to a tolerance.
+        What gates, waypoints, obstacles, ground and plant say comes before what is kept to a tolerance.
         """
         if self.is_batch:
             raise SpecError("outcome is asked of one flight; of a batch, ask score[k].outcome or outcomes")
@@ -201,9 +205,19 @@ class Score:
             yield self.stop, Outcome.DIVERGED if self.is_finite else Outcome.STATE_NOT_FINITE, {}
         if isfinite(self.ground_time):
             yield self.ground_time, Outcome.HIT_GROUND, {}
+        if self.nearest is not None and self.nearest.failure is not None:
+            outcome, time, numbers = self.nearest.failure
+            yield time, outcome, numbers
         if isfinite(self.contact_time):
-            at_gate = self.contact == Contact.GATE
-            yield self.contact_time, Outcome.TOUCHED_GATE if at_gate else Outcome.TOUCHED_GROUND, {}
+            yield self.contact_time, *self._felt()
+
+    def _felt(self) -> tuple[Outcome, dict[str, object]]:
+        """What the plant felt."""
+        if self.contact == Contact.OBSTACLE:
+            return Outcome.HIT_OBSTACLE, {
+                "obstacle": self.nearest.obstacle if self.nearest else "an obstacle"
+            }
+        return Outcome.TOUCHED_GATE if self.contact == Contact.GATE else Outcome.TOUCHED_GROUND, {}
 
     def _departure(self) -> Iterator[Event]:
         """When a flight left its path, if it did."""
@@ -216,6 +230,8 @@ def _of_flight(value: Any, k: int) -> Any:
     """One flight's part of a field of many."""
     if isinstance(value, tuple):
         return tuple(each.of_flight(k) for each in value)
+    if isinstance(value, NearestObstacle):
+        return value.of_flight(k)
     return value[k].item() if isinstance(value, np.ndarray) else value
 
 
@@ -251,8 +267,15 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
     setpoint = flight.setpoint
     criteria = criteria_of(goal, SampledPath(flight.times, setpoint.flat.position, setpoint.q_world_body))
     contact, touched = flight.first_contact
+    states, pieces = flight.states, flight.environment.pieces
     batch = score_of(metrics_of_log(flight, criteria, body), criteria)
-    return replace(batch[0], contact=contact, contact_time=touched, observer=_observer(flight))
+    return replace(
+        batch[0],
+        contact=contact,
+        contact_time=touched,
+        nearest=nearest_in_log(pieces, flight.times, states.position, states.q_world_body, body),
+        observer=_observer(flight),
+    )
 
 
 def _observer(flight: Flight) -> ObserverScore | None:
@@ -272,8 +295,8 @@ def _observer(flight: Flight) -> ObserverScore | None:
     )
 
 
-def score_of(metrics: RunningMetrics, criteria: Criteria) -> Score:
-    """The score of flights from their last metrics, leaves (flights,)."""
+def score_of(metrics: RunningMetrics, criteria: Criteria, nearest: NearestObstacle | None = None) -> Score:
+    """The score of flights from their last metrics, leaves (flights,), and what of obstacles is nearest."""
     ticks = np.maximum(metrics.ticks, 1.0)
     stop = np.where(metrics.flying < 0.5, metrics.stop, np.nan)
     targets = (*criteria.waypoints, *criteria.places)
@@ -299,6 +322,7 @@ def score_of(metrics: RunningMetrics, criteria: Criteria) -> Score:
         attitudes=tuple(
             stage_attitudes(*pair, stop) for pair in zip(criteria.attitudes, metrics.attitudes, strict=True)
         ),
+        nearest=nearest,
         path_radius_m=criteria.path_radius,
         lap_begin_s=criteria.lap_begin,
     )

@@ -8,12 +8,12 @@ from functools import partial
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.declaration import validated
 from aerobat.engines import logged_ticks
-from aerobat.engines.pytree import tree_map, tree_stack
+from aerobat.engines.components import from_components
+from aerobat.engines.pytree import Tree, tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.evaluation.criteria import SampledPath, criteria_of
@@ -22,7 +22,9 @@ from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.config import FlightChanges, FlightConfig
-from aerobat.simulation.metrics import metrics_row, with_metrics
+from aerobat.simulation.loop import Log
+from aerobat.simulation.metrics import PoseRow, metrics_row, pose_row, with_metrics
+from aerobat.simulation.passages import FlownBodies, NearestObstacle, nearest_obstacles
 from aerobat.simulation.prepare import prepare
 from aerobat.simulation.reference_source import BLOCK
 from aerobat.simulation.setup import FlightSetup
@@ -65,16 +67,16 @@ class ErrorsOverTime:
     attitude: Array  # [rad], (flights, T)
 
     @classmethod
-    def of(cls, times: Array, metrics: RunningMetrics) -> ErrorsOverTime:
-        """The errors behind metrics as they stood at those times [s], leaves (flights, T)."""
-        ticks = np.diff(metrics.ticks, axis=1, prepend=0.0)
+    def of(cls, times: Array, sums: RunningMetrics | PoseRow) -> ErrorsOverTime:
+        """The errors behind their sums as they stood at those times [s], leaves (flights, T)."""
+        ticks = np.diff(sums.ticks, axis=1, prepend=0.0)
         latest = np.maximum.accumulate(np.where(ticks > 0.0, np.arange(len(times)), 0), axis=1)
 
-        def errors(sums: Array) -> Array:
-            mean_square = np.diff(sums, axis=1, prepend=0.0) / np.maximum(ticks, 1.0)
+        def errors(total: Array) -> Array:
+            mean_square = np.diff(total, axis=1, prepend=0.0) / np.maximum(ticks, 1.0)
             return np.asarray(np.sqrt(np.take_along_axis(np.maximum(mean_square, 0.0), latest, axis=1)))
 
-        return cls(times, errors(metrics.sum_square), errors(metrics.sum_square_angle))
+        return cls(times, errors(sums.sum_square), errors(sums.sum_square_angle))
 
 
 def score_over_time(
@@ -114,15 +116,34 @@ def score_over_time(
         np.concatenate([part.q_world_body for part in parts]),
     )
     criteria = criteria_of(goal, path)
-    rows, logged = _metrics_over_time(with_metrics(setup, criteria), stride or ticks)
-    scores = score_of(tree_map(lambda leaf: leaf[:, -1], rows), criteria)
-    return scores, ErrorsOverTime.of(setup.times[logged], rows)
+    flown = with_metrics(setup, criteria)
+    if len(environment.pieces):
+        metrics, sums, nearest = _past_obstacles(flown)
+    else:
+        sums, _ = _scanned(flown, metrics_row, stride or ticks)
+        metrics, nearest = tree_map(lambda leaf: leaf[:, -1], sums), None
+    logged = logged_ticks(ticks, stride or ticks)
+    if nearest is not None:
+        sums = tree_map(lambda leaf: leaf[:, logged], sums)
+    return score_of(metrics, criteria, nearest), ErrorsOverTime.of(setup.times[logged], sums)
 
 
-def _metrics_over_time(setup: FlightSetup, stride: int) -> tuple[RunningMetrics, NDArray[np.intp]]:
-    """Metrics as they stand at ticks, multiples of a stride and the last, leaves (vehicles, T), and those."""
+def _past_obstacles(setup: FlightSetup) -> tuple[RunningMetrics, PoseRow, NearestObstacle]:
+    """The last metrics of flights, leaves (vehicles,), every row, and what is nearest on the way.
+
+    Rows take 88 bytes a tick and vehicle.
+    """
+    rows, metrics = _scanned(setup, pose_row, 1)
+    position, q_world_body = map(from_components, (rows.position, rows.q_world_body))
+    bodies = setup.fleet.body_centres, setup.fleet.semi_axes
+    flown = FlownBodies(setup.times, position, q_world_body, *bodies, metrics.ticks)
+    return metrics, rows, nearest_obstacles(setup.environment.pieces, flown)
+
+
+def _scanned(setup: FlightSetup, log: Log, stride: int) -> tuple[Tree, RunningMetrics]:
+    """Rows at multiples of a stride and the last tick, leaves (vehicles, T), and the last metrics."""
     logged = logged_ticks(len(setup.times), stride)
-    loop = setup.compile(log=metrics_row)
+    loop = setup.compile(log=log)
     carry = loop.init(setup.first_tick)
     parts = []
     for begin, end in setup.chunks(stride):
@@ -130,5 +151,5 @@ def _metrics_over_time(setup: FlightSetup, stride: int) -> tuple[RunningMetrics,
         carry, rows = loop.scan(carry, setup.inputs(begin, end), chunk_stride)
         kept = np.isin(begin + logged_ticks(end - begin, chunk_stride), logged)
         parts.append(tree_map(partial(np.compress, kept, axis=1), rows))
-    metrics: RunningMetrics = tree_stack(parts, lambda leaves: np.concatenate(leaves, axis=-1))
-    return metrics, logged
+    metrics = next(state for state in carry if isinstance(state, RunningMetrics))
+    return tree_stack(parts, lambda leaves: np.concatenate(leaves, axis=-1)), metrics

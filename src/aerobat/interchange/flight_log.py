@@ -129,7 +129,7 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
         outcomes=(Outcome.COMPLETE,),
         sentences=("recorded by another system",),
         engine="log",
-        environment=plan.problem.environment,
+        environment=plan.problem.surroundings,
     )
 
 

@@ -15,7 +15,7 @@ from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan, planned_passages
 from aerobat.simulation.autopilot.loop import KEPT
 from aerobat.simulation.outcome import length
-from aerobat.simulation.passages import Passage, log_rows, passages_in_log
+from aerobat.simulation.passages import NearestObstacle, Passage, log_rows, nearest_in_log, passages_in_log
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,15 @@ class LinkReport:
     max_attitude_error_deg: float | None = None
     longest_silence_s: float | None = None  # between two observations
     passages: tuple[Passage, ...] = ()
+    nearest: NearestObstacle | None = None  # None where there are no obstacles
 
     @property
     def failures(self) -> tuple[str, ...]:
         """All that went wrong, in words."""
         missed = []
+        if self.nearest is not None and self.nearest.failure is not None:
+            outcome, time, numbers = self.nearest.failure
+            missed.append(outcome.sentence(time=time, **numbers))
         for passage in self.passages:
             if passage.failure is not None:
                 outcome, time, numbers = passage.failure
@@ -112,4 +116,5 @@ def link_report(
         max_attitude_error_deg=degrees(float(turned.max())),
         longest_silence_s=float(np.diff(times).max()),
         passages=tuple(passage.of_flight(0) for passage in flown),
+        nearest=nearest_in_log(plan.problem.surroundings.pieces, times, position - offset, q, body),
     )

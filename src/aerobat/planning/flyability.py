@@ -5,7 +5,7 @@ included, only a flight shows. What is flown is the plan's trajectory by its veh
 the default controller and nothing unknown; then once more with the reserve that the certificate leaves used
 up, all rotors giving less than commanded by the same fraction δ. As rotors that give (1 − δ) f move a body
 as f moves one of 1/(1 − δ) times the mass, inertia and drag, that is what flies then, told otherwise. The
-nominal flight is judged at the gates as scores judge flights, their frames included.
+nominal flight is judged at the gates, their frames included, and past obstacles as scores judge flights.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from aerobat.planning.passages import PlacedStage, planned_passages
 from aerobat.planning.task import Task
 from aerobat.simulation import Flight, FlightConfig, Outcome, fly
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, length
-from aerobat.simulation.passages import Passage, log_rows, passages_in_log
+from aerobat.simulation.passages import NearestObstacle, Passage, log_rows, nearest_in_log, passages_in_log
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -49,10 +49,11 @@ class OwnFlight:
 
     error: float  # [m] the largest position error, 5 m or more where it diverges
     passages: tuple[FlownPassage, ...] = ()  # the planned ones, in their order
+    nearest: NearestObstacle | None = None  # None where there are no obstacles
 
     @property
     def flies(self) -> bool:
-        """True if it stays within FLYABLE_ERROR of the path and passes the gates as they ask."""
+        """True if it keeps within FLYABLE_ERROR of the path, passes gates as they ask and hits nothing."""
         return not self.defects
 
     @property
@@ -74,6 +75,9 @@ class OwnFlight:
     def defects(self) -> tuple[str, ...]:
         """All that it does wrong, in words."""
         failed = tuple(passage.failure for passage in self.passages if passage.failure)
+        if self.nearest is not None and self.nearest.failure is not None:
+            outcome, time, numbers = self.nearest.failure
+            failed = (*failed, outcome.sentence(time=time, **numbers))
         if self.error <= FLYABLE_ERROR:
             return failed
         allowed = f"{100 * FLYABLE_ERROR:g} cm at most allowed"
@@ -126,7 +130,11 @@ def own_flight(task: Task, trajectory: Trajectory, stages: Sequence[PlacedStage]
     planned, body = planned_passages(stages, task.problem), task.vehicle.bounding_ellipsoid
     flown = passages_in_log(rows, planned, body, flight.diverged_at)
     return OwnFlight(
-        error=_largest_error(flight), passages=tuple(_flown(passage.of_flight(0)) for passage in flown)
+        error=_largest_error(flight),
+        passages=tuple(_flown(passage.of_flight(0)) for passage in flown),
+        nearest=nearest_in_log(
+            task.environment.pieces, flight.times, states.position, states.q_world_body, body
+        ),
     )
 
 
@@ -163,6 +171,7 @@ def own_flights(
     return Flyability(
         error=nominal.error,
         passages=nominal.passages,
+        nearest=nominal.nearest,
         disturbance=disturbance,
         disturbed_fraction=fraction,
         disturbed_error=_largest_error(disturbed),

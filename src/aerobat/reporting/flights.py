@@ -11,11 +11,11 @@ import numpy as np
 from aerobat.arrays import AXES
 from aerobat.evaluation.criteria import GOAL
 from aerobat.evaluation.score import ObserverScore, Score
-from aerobat.reporting.facts import REPORT, Columns, Fact, facts, fields_of, kept, picture, said
+from aerobat.reporting.facts import NONE, REPORT, Columns, Fact, facts, fields_of, kept, picture, said
 from aerobat.reporting.plans import rough_length
 from aerobat.simulation import Flight
 from aerobat.simulation.outcome import digits, length
-from aerobat.simulation.passages import Passage, WaypointPassage
+from aerobat.simulation.passages import NearestObstacle, Passage, WaypointPassage
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,9 +68,16 @@ def _(score: Score) -> Iterator[Fact]:
         )
         missed = "not reached" if isnan(waypoint.time) else met
         yield said(_of_lap(waypoint.waypoint, waypoint.lap, several), missed)
+    if score.nearest is not None:
+        yield said("nearest", _nearest(score.nearest))
     if score.places or score.attitudes:
         yield said("tolerance", _within_tolerance(score))
     yield said("saturated", f"{100 * score.saturated_fraction:.1f} % of the time")
+
+
+@facts.register
+def _(found: NearestObstacle) -> Iterator[Fact]:
+    yield from kept(obstacle=found.obstacle or None, clearance_m=found.clearance, time_s=found.time)
 
 
 @facts.register
@@ -101,6 +108,8 @@ def _report(score: Score) -> Iterator[Fact]:
         nearest = max(waypoint.miss for waypoint in score.waypoints)
         reached = f"{len(score.waypoints)} reached within {rough_length(nearest)}"
         yield said("waypoints", reached, level=REPORT)
+    if score.nearest is not None:
+        yield said("nearest", _nearest(score.nearest), level=REPORT)
     within = f"on its path within {rough_length(score.max_position_error_m)}"
     yield said("flight", within, level=REPORT)
 
@@ -166,6 +175,14 @@ def _clearance(passage: Passage) -> str:
     return f"{found} the {passage.closest_edge} edge at {passage.closest_time:.2f} s"
 
 
+def _nearest(found: NearestObstacle) -> str:
+    """The nearest obstacle in words, with the clearance and its instant."""
+    if not found.obstacle:
+        return NONE
+    apart = "touched" if found.clearance < 0.0 else length(found.clearance)
+    return f"'{found.obstacle}', {apart} at {found.time:.2f} s"
+
+
 def _pair(largest: float, rms: float, unit: str) -> str:
     return f"{digits(largest)} {unit} at most, {digits(rms)} {unit} RMS"
 
@@ -206,4 +223,6 @@ def _flights_of(scores: Score) -> dict[str, Any]:
     for waypoint in (*scores.waypoints, *scores.places):
         begin = f"{waypoint.waypoint}_lap_{waypoint.lap}"
         columns |= {f"{begin}_{name}": getattr(waypoint, name) for name in ("time", "miss", "speed")}
+    if scores.nearest is not None:
+        columns |= {f"nearest_{name}": value for name, value in vars(scores.nearest).items()}
     return columns

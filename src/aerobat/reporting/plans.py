@@ -111,6 +111,7 @@ def _(found: Flyability) -> Iterator[Fact]:
     yield Fact("disturbed_fraction", found.disturbed_fraction)
     yield Fact("disturbed_error_m", found.disturbed_error)
     yield Fact("passages", found.passages)
+    yield Fact("nearest", found.nearest)
     yield Fact("sentence", str(found), "flyability")
 
 

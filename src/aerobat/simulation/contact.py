@@ -6,8 +6,9 @@ from enum import IntEnum
 
 
 class Contact(IntEnum):
-    """The object that a vehicle touches; the gate where the vehicle touches both gate and ground."""
+    """The object that a vehicle touches: of several, an obstacle before a gate before the ground."""
 
     NOTHING = 0
     GROUND = 1
     GATE = 2
+    OBSTACLE = 3

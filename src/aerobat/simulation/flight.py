@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,9 +14,20 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
-from aerobat.declaration import PathName, by_value, in_notebooks, short, shown, validated
+from aerobat.declaration import (
+    PathName,
+    by_value,
+    from_table,
+    in_notebooks,
+    short,
+    shown,
+    to_table,
+    validated,
+)
 from aerobat.environment import Environment
+from aerobat.environment.obstacles import OBSTACLES, Obstacle
 from aerobat.errors import OutOfRange, SpecError
+from aerobat.problem.gate import Gate, GateWall
 from aerobat.simulation.contact import Contact
 from aerobat.simulation.outcome import Outcome, counted
 from aerobat.states import BodyState, FlatState, Setpoint, Wrench
@@ -214,13 +226,20 @@ class Flight:
         """Write the flight as a NumPy .npz file, whole or not at all.
 
         Its arrays: times; each of SERIES; the text vehicles, outcomes, sentences, engine; gravity, wind and
-        ground (NaN where there is none) of the environment; and format, "aerobat-flight-2". No pickles.
+        ground (NaN where there is none) of the environment, and where there are obstacles these as text, in
+        JSON, the walls of gates by their gates; and format, "aerobat-flight-2". No pickles.
         Raises SpecError when the file cannot be written.
         """
         text = {"vehicles": self.vehicles, "sentences": self.sentences, "engine": self.engine}
         outcomes = [outcome.name for outcome in self.outcomes]
         ground = np.nan if self.environment.ground is None else self.environment.ground
-        air = {"gravity": self.environment.gravity, "wind": self.environment.wind, "ground": ground}
+        air: dict[str, Any] = {
+            "gravity": self.environment.gravity,
+            "wind": self.environment.wind,
+            "ground": ground,
+        }
+        if self.environment.obstacles:
+            air["obstacles"] = json.dumps(list(map(_obstacle_table, self.environment.obstacles)))
         arrays: dict[str, Any] = {**self.series, **text, **air, "times": self.times, "outcomes": outcomes}
         with whole_file(path) as temporary, temporary.open("wb") as file:
             np.savez(file, format=_FORMAT, **arrays)
@@ -242,7 +261,10 @@ def load_flight(path: PathName) -> Flight:
             sentences=_texts(content["sentences"]),
             engine=str(content["engine"]),
             environment=Environment(
-                float(content["gravity"]), content["wind"], None if np.isnan(ground) else ground
+                gravity=float(content["gravity"]),
+                wind=content["wind"],
+                ground=None if np.isnan(ground) else ground,
+                obstacles=tuple(map(_obstacle, json.loads(str(content.get("obstacles", "[]"))))),
             ),
         )
     except KeyError as error:
@@ -251,6 +273,15 @@ def load_flight(path: PathName) -> Flight:
         raise SpecError(f"flight file {path}: {error}") from None
     except (TypeError, ValueError):  # arrays of other kinds and shapes
         raise SpecError(f"flight file {path}: it is damaged; save it again") from None
+
+
+def _obstacle_table(obstacle: Obstacle) -> dict[str, Any]:
+    """An obstacle as a table: as problem files have it; the wall of a gate by its gate."""
+    return {"gate": to_table(obstacle.gate)} if isinstance(obstacle, GateWall) else to_table(obstacle)
+
+
+def _obstacle(table: dict[str, Any]) -> Obstacle:
+    return GateWall(from_table(Gate, table["gate"])) if "gate" in table else OBSTACLES.read(table)
 
 
 def _outcome(name: str) -> Outcome:

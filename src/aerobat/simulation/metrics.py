@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import reduce
 from math import inf
+from operator import add as plus
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +15,12 @@ from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.engines.components import components
 from aerobat.engines.numpy import ArrayOps
-from aerobat.engines.pytree import Tree, tree_map
+from aerobat.engines.pytree import Tree, tree_leaves, tree_map
 from aerobat.environment import Environment
 from aerobat.kernels import running_metrics
 from aerobat.kernels.gates import approach, pointing, progress
 from aerobat.kernels.gates.section import BoundingEllipsoid
-from aerobat.kernels.ops import Ops
+from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector
 from aerobat.kernels.running_metrics import (
     Ground,
     MetricsInput,
@@ -97,6 +99,24 @@ class MetricsSource:
 def metrics_row(signals: Signals) -> RunningMetrics:
     """The metrics so far."""
     return signals.of(RunningMetrics)
+
+
+class PoseRow(NamedTuple):
+    """A tick where poses are kept: then the last metrics are those of the carry."""
+
+    ticks: Scalar  # as in RunningMetrics
+    sum_square: Scalar
+    sum_square_angle: Scalar
+    position: Vector
+    q_world_body: Quaternion
+    all_metrics: Scalar  # their sum, which says nothing: engines leave out of a carry what no row depends on
+
+
+def pose_row(signals: Signals) -> PoseRow:
+    """The pose, and the errors so far."""
+    metrics, body = signals.of(RunningMetrics), signals.plant.body
+    errors = metrics.ticks, metrics.sum_square, metrics.sum_square_angle
+    return PoseRow(*errors, body.position, body.q_world_body, reduce(plus, tree_leaves(metrics)))
 
 
 def with_metrics(setup: FlightSetup, criteria: Criteria = Criteria()) -> FlightSetup:  # noqa: B008 - frozen

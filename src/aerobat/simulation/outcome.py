@@ -64,6 +64,7 @@ class Outcome(Enum):
     )
     OFF_PATH = "left its path by more than {allowed} at {time:.2f} s, by {error} at most"
     MISSED_WAYPOINT = "missed {waypoint}, {miss:.3f} m from it at {time:.2f} s, {radius:g} m allowed"
+    HIT_OBSTACLE = "hit '{obstacle}' at {time:.2f} s"
     HIT_GROUND = "hit the ground at {time:.2f} s"
     DIVERGED = "diverged at {time:.2f} s: position error above {radius:g} m"
     STATE_NOT_FINITE = "diverged at {time:.2f} s: its state is no longer a number"

@@ -73,7 +73,7 @@ def flown(plan: Plan, settings: FlightSettings) -> Flown:
     given = settings.conditions, settings.plant, settings.autopilot
     is_nominal = given == (None, None, None) and controller == plan.vehicle.controller
     if is_nominal:  # the flight that the plan was judged by
-        flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.environment)
+        flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.surroundings)
     else:
         flight = simulate(
             plan,

@@ -5,15 +5,18 @@ it and a piece across planes with the normal n is φ(n) = n·c − |Lᵀ n| − 
 maximum over all n is the distance, where that is positive; where body and piece overlap it is how far they
 have to be moved apart, negative. The gap of any n is a lower bound of the distance, however n was found.
 
-It is found by Newton's method on the sphere. The hull's kinks are smoothed, max n·v → τ log Σ exp(n·v/τ),
-with τ falling to far less than a millimetre. Where the hull's own faces have a larger gap, they are taken.
+It is found by Newton's method on the sphere. The hull's kinks stay: across n, the gap is modelled as the
+least of some planes, one a point of the hull that nearly touches, less a paraboloid of both roundings. The
+best of such a model is where one, two or three of its planes meet. Where the normals of the hull's own faces
+have a larger gap, the search begins there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import combinations
 from math import inf
 
 import numpy as np
@@ -21,11 +24,15 @@ import numpy as np
 from aerobat.arrays import Array, Indices, Mask
 from aerobat.environment.obstacles.convex_piece import TINY, ConvexPiece
 
-SMOOTHINGS = 2.0 ** -np.arange(20)
-ROUNDEST = 0.1  # [m] τ at first: the last is a ten millionth of a metre
-STEPS = 3  # of Newton's method in a round
+STEPS = 40  # of Newton's method at most; most pairs take five
+ENOUGH = 1e-11  # [m] a step that gains less is the last
+LOWEST = 4  # points of a hull that a step looks at first: as many as touch a plane in a box's side
+ADDED = 3  # that the best of those leaves in the way, of hulls that have more
+SOFT = 1e-4  # [m] of a length whose slope jumps where it vanishes
 LONGEST_STEP = 0.5  # [rad]
-HALVINGS = 4  # of a step that leads to less
+PARTS = np.array([0.0, 1.0, 0.5, 0.25, 0.1, 0.02])  # of a step that are tried
+LEAST_BEND = 0.01  # [m] of a gap's bend on the sphere, also where bodies overlap
+VANISHING = 1e-30  # [m²]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +61,25 @@ class Pieces:
             reach: Of a body from its centre in whichever direction, at most [m].
             within: The distance [m] between body and piece from which on a pair is left out.
         """
-        lower, upper = self._boxes
-        points = centres[:, None]
-        beyond = np.maximum(np.maximum(lower - points, points - upper), 0.0)
-        away = np.linalg.norm(beyond, axis=-1)
-        bodies, pieces = np.nonzero(away < reach + within)
+        bodies, pieces = np.nonzero(self.apart(centres, centres) < reach + within)
         return bodies, pieces
+
+    def apart(self, lower: Array, upper: Array) -> Array:
+        """Return how far boxes are at least from all pieces [m]: from the boxes around these.
+
+        Args:
+            lower: Lower corners [m], (..., 3).
+            upper: Upper corners [m], (..., 3).
+
+        Returns:
+            Distances (..., P).
+        """
+        own_lower, own_upper = self._boxes
+        squares: Array = np.zeros((*lower.shape[:-1], len(self)))
+        for k in range(3):  # which is faster than a last axis of three
+            between = np.maximum(own_lower[:, k] - upper[..., None, k], lower[..., None, k] - own_upper[:, k])
+            squares += np.maximum(between, 0.0) ** 2
+        return np.sqrt(squares)
 
     def holding(self, point: Array) -> ConvexPiece | None:
         """Return a piece that a point [m] (3,) lies in; None where it lies in none."""
@@ -122,7 +142,7 @@ class _Pairs:
     roundings: Array  # L of the pieces [m], (m, 3, 3)
     shapes: Array  # L of the bodies [m], (m, 3, 3)
 
-    def __getitem__(self, rows: Mask) -> _Pairs:
+    def __getitem__(self, rows: Mask | Indices) -> _Pairs:
         return _Pairs(self.offsets[rows], self.roundings[rows], self.shapes[rows])
 
     def gaps(self, normals: Array) -> Array:
@@ -137,62 +157,119 @@ class _Pairs:
 
     def refined(self, normals: Array) -> Array:
         """The normals across which the gaps are largest, from some nearby, (m, 3)."""
-        best, most = normals, self.gaps(normals[:, None])[:, 0]
-        for smoothing in ROUNDEST * SMOOTHINGS:
-            for _ in range(STEPS):
-                normals = self._improved(normals, smoothing)
-            gaps = self.gaps(normals[:, None])[:, 0]
-            better = gaps > most
-            best, most = np.where(better[:, None], normals, best), np.where(better, gaps, most)
-        return best
-
-    def _improved(self, normals: Array, smoothing: float) -> Array:
-        """Normals one step of Newton's method later."""
-        value, gradient, curvature = self._smoothed(normals, smoothing)
-        tangent = np.eye(3) - normals[:, :, None] * normals[:, None]
-        along = np.sum(gradient * normals, axis=-1)
-        bend = -tangent @ curvature @ tangent
-        bend += np.maximum(along, 0.01)[:, None, None] * tangent + normals[:, :, None] * normals[:, None]
-        step = np.linalg.solve(bend, (tangent @ gradient[..., None]))[..., 0]
-        length = np.linalg.norm(step, axis=-1, keepdims=True)
-        step *= np.minimum(1.0, LONGEST_STEP / np.maximum(length, TINY))
-        better = normals
-        pending = np.ones(len(normals), dtype=bool)
-        for halving in range(HALVINGS):
-            tried = normals + 0.5**halving * step
-            tried /= np.linalg.norm(tried, axis=-1, keepdims=True)
-            gains = pending & (self._value(tried, smoothing) > value)
-            better = np.where(gains[:, None], tried, better)
-            pending &= ~gains
-            if not pending.any():
+        found, gaps = normals.copy(), self.gaps(normals[:, None])[:, 0]
+        rising = np.arange(len(normals))
+        for _ in range(STEPS):
+            better, most = self[rising]._improved(found[rising])
+            gains = most - gaps[rising]
+            found[rising], gaps[rising] = better, most
+            rising = rising[gains > ENOUGH]
+            if not len(rising):
                 break
-        return better
+        return found
 
-    def _value(self, normals: Array, smoothing: float) -> Array:
-        """The smoothed gaps [m], (m,)."""
-        exponents = -_times(self.offsets, normals) / smoothing
-        largest = exponents.max(axis=-1)
-        log_sum = largest + np.log(np.exp(exponents - largest[:, None]).sum(axis=-1))
-        rounded = np.linalg.norm(_times(np.swapaxes(self.roundings, 1, 2), normals), axis=-1)
-        return np.asarray(-smoothing * log_sum - rounded - self.extents(normals))
+    def _improved(self, normals: Array) -> tuple[Array, Array]:
+        """Normals one step later, (m, 3), and their gaps [m], (m,): the best along the way to the model's."""
+        across = _across(normals)
+        turns = self._nearby(normals, across).best_turns
+        lengths = np.linalg.norm(turns, axis=-1, keepdims=True)
+        turns *= np.minimum(1.0, LONGEST_STEP / np.maximum(lengths, TINY))
+        tried = normals[:, None] + PARTS[:, None] * (turns[:, None] @ across)
+        tried /= np.linalg.norm(tried, axis=-1, keepdims=True)
+        gaps = self.gaps(tried)
+        best = np.argmax(gaps, axis=1)[:, None]
+        return np.take_along_axis(tried, best[..., None], axis=1)[:, 0], np.take_along_axis(gaps, best, 1)[
+            :, 0
+        ]
 
-    def _smoothed(self, normals: Array, smoothing: float) -> tuple[Array, Array, Array]:
-        """The smoothed gaps, their slopes (m, 3) and second derivatives (m, 3, 3)."""
-        exponents = -_times(self.offsets, normals) / smoothing
-        weights = np.exp(exponents - exponents.max(axis=-1, keepdims=True))
-        weights /= weights.sum(axis=-1, keepdims=True)
-        mean = np.einsum("mv,mvi->mi", weights, self.offsets)
-        spread = self.offsets - mean[:, None]
-        gradient = mean
-        curvature = -np.swapaxes(weights[..., None] * spread, 1, 2) @ spread / smoothing
+    def _nearby(self, normals: Array, across: Array) -> _Model:
+        """The gaps near normals, of turns along two directions across each, (m, 2, 3)."""
+        values, slopes = _times(self.offsets, normals), self.offsets @ np.swapaxes(across, 1, 2)
+        bend = np.zeros((len(normals), 2, 2))
         for root in (self.roundings, self.shapes):
-            square = root @ np.swapaxes(root, 1, 2)
-            reach = np.linalg.norm(_times(np.swapaxes(root, 1, 2), normals), axis=-1) + TINY
-            touching = _times(square, normals) / reach[:, None]
-            gradient = gradient - touching
-            flat = square - touching[:, :, None] * touching[:, None]
-            curvature = curvature - flat / reach[:, None, None]
-        return self._value(normals, smoothing), gradient, curvature
+            reach = _times(np.swapaxes(root, 1, 2), normals)
+            length = np.hypot(np.linalg.norm(reach, axis=-1), SOFT)
+            along = across @ root
+            slope = _times(along, reach / length[:, None])
+            values, slopes = values - length[:, None], slopes - slope[:, None]
+            flat = along @ np.swapaxes(along, 1, 2) - slope[:, :, None] * slope[:, None]
+            bend += flat / length[:, None, None]
+        bend += np.maximum(values.min(axis=1), LEAST_BEND)[:, None, None] * np.eye(2)
+        return _Model(values, slopes, bend)
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """Gaps near normals: over turns t in two directions the least of all v + s·t, less t·B t / 2."""
+
+    values: Array  # v [m], (m, k)
+    slopes: Array  # s [m], (m, k, 2)
+    bend: Array  # B [m], (m, 2, 2), positive definite
+
+    @property
+    def best_turns(self) -> Array:
+        """The turns [rad] with the largest of these gaps, (m, 2)."""
+        chosen = np.argsort(self.values, axis=1, kind="stable")[:, :LOWEST]
+        turns = self._of(chosen)._best()
+        for _ in range(ADDED if self.values.shape[1] > LOWEST else 0):
+            least = np.argmin(self.values + _times(self.slopes, turns), axis=1)
+            chosen = np.concatenate([chosen, least[:, None]], axis=1)
+            turns = self._of(chosen)._best()
+        return turns
+
+    def _of(self, terms: Indices) -> _Model:
+        """The same of some terms, (m, k)."""
+        values = np.take_along_axis(self.values, terms, axis=1)
+        return _Model(values, np.take_along_axis(self.slopes, terms[..., None], axis=1), self.bend)
+
+    def _best(self) -> Array:
+        """The best turns by trying all candidates, (m, 2)."""
+        turns = self._candidates
+        planes = (self.values[:, None] + turns @ np.swapaxes(self.slopes, 1, 2)).min(axis=-1)
+        gaps = planes - 0.5 * np.sum(turns @ self.bend * turns, axis=-1)
+        best = np.argmax(gaps, axis=1)
+        return np.asarray(np.take_along_axis(turns, best[:, None, None], axis=1)[:, 0])
+
+    @property
+    def _candidates(self) -> Array:
+        """The best turns where one of the terms is the least, where two are, and three, (m, c, 2)."""
+        soft = np.linalg.inv(self.bend)
+        free = self.slopes @ soft
+        pairs, triples = _choices(self.values.shape[1])
+        value, slope = self._beyond(*pairs)
+        along = slope @ soft
+        needed = value + np.sum(slope * free[:, pairs[0]], axis=-1)
+        parts = needed / _away_from_zero(np.sum(slope * along, axis=-1))
+        (v, a), (w, b) = self._beyond(*triples[:2]), self._beyond(*triples[::2])
+        twice = _away_from_zero(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+        corners = np.stack([w * a[..., 1] - v * b[..., 1], v * b[..., 0] - w * a[..., 0]], axis=-1)
+        edges = free[:, pairs[0]] - parts[..., None] * along
+        return np.concatenate([free, edges, corners / twice[..., None]], axis=1)
+
+    def _beyond(self, first: Indices, second: Indices) -> tuple[Array, Array]:
+        """By how much some terms are above others: their values (m, n) and slopes (m, n, 2)."""
+        return self.values[:, first] - self.values[:, second], self.slopes[:, first] - self.slopes[:, second]
+
+
+@lru_cache
+def _choices(count: int) -> tuple[Indices, Indices]:
+    """All choices of two and of three of so many, (2, n) and (3, n)."""
+    numbers = range(count)
+    two, three = (np.array(list(combinations(numbers, k)), np.intp).reshape(-1, k).T for k in (2, 3))
+    return two, three
+
+
+def _across(normals: Array) -> Array:
+    """Two unit vectors across each normal, (m, 2, 3)."""
+    least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    first = np.cross(normals, least)
+    first /= np.linalg.norm(first, axis=-1, keepdims=True)
+    return np.stack([first, np.cross(normals, first)], axis=1)
+
+
+def _away_from_zero(values: Array) -> Array:
+    """Values to divide by, those near zero replaced by what makes a quotient nothing."""
+    return np.where(np.abs(values) > VANISHING, values, 1.0 / VANISHING)
 
 
 def _best_of(piece: ConvexPiece, centres: Array, shapes: Array) -> Array:

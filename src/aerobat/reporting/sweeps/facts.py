@@ -8,12 +8,15 @@ from itertools import starmap
 from math import isfinite
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from aerobat.evaluation.criteria import criterion
-from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture
+from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture, said
 from aerobat.reporting.sweeps.words import known_opening, outcome_name
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
 from aerobat.studies.sweep import Share, Sweep
+from aerobat.studies.sweep.flights import CLEARANCE, NEAREST
 from aerobat.studies.sweep.result import LEVELS
 
 if TYPE_CHECKING:
@@ -41,6 +44,8 @@ def _(sweep: Sweep) -> Iterator[Fact]:
     yield Fact("judged_by", criterion(problem), "judged by")
     yield Fact("outcomes", Facts(starmap(_outcome, sweep.outcomes.items())))
     yield Fact("errors", Facts(_quantiles(sweep, column, name) for column, name in ERRORS), "error")
+    if CLEARANCE in sweep.table:
+        yield Fact("nearest", Facts(_nearest(sweep)))
     passages = (Fact(name, Facts(_passage(sweep, name)), name) for name in sweep.passages)
     yield Fact("passages", Facts(passages))
 
@@ -76,6 +81,17 @@ def _passage(sweep: Sweep, name: str) -> Iterator[Fact]:
     opening = known_opening(sweep, name)
     sides = opening and [opening.width, opening.height]
     yield Fact("smallest_opening_m", sides, "99 % pass" if opening else "", str(opening) if opening else None)
+
+
+def _nearest(sweep: Sweep) -> Iterator[Fact]:
+    """The obstacle that flights come nearest to, and their clearance."""
+    clearance = sweep.table[CLEARANCE]
+    least = int(np.argmin(clearance))
+    obstacle = str(sweep.table[NEAREST][least])
+    low, middle = float(clearance[least]), float(np.median(clearance))
+    apart = "touched" if low < 0.0 else f"{length(low)} at least"
+    yield from kept(obstacle=obstacle, least_clearance_m=low, median_clearance_m=middle)
+    yield said("nearest", f"'{obstacle}', {apart}, {length(middle)} at the median")
 
 
 def _quantiles(sweep: Sweep, column: str, label: str) -> Fact:

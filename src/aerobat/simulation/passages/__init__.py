@@ -1,6 +1,12 @@
-"""Passages of flights: through gates, what the body leaves of their openings; by waypoints; in attitudes."""
+"""Passages of flights: through gates, as far as the body leaves them; by waypoints; past obstacles."""
 
 from aerobat.simulation.passages.log import log_rows, passages_in_log, scan_log
+from aerobat.simulation.passages.obstacles import (
+    FlownBodies,
+    NearestObstacle,
+    nearest_in_log,
+    nearest_obstacles,
+)
 from aerobat.simulation.passages.passage import (
     PASSAGE_DEPTH,
     PASSAGE_WINDOW,
@@ -20,6 +26,8 @@ from aerobat.simulation.passages.waypoint import WaypointPassage, waypoint_passa
 __all__ = [
     "PASSAGE_DEPTH",
     "PASSAGE_WINDOW",
+    "FlownBodies",
+    "NearestObstacle",
     "Passage",
     "PlannedAttitude",
     "StageAttitude",
@@ -28,6 +36,8 @@ __all__ = [
     "bounding_ellipsoid",
     "gate_places",
     "log_rows",
+    "nearest_in_log",
+    "nearest_obstacles",
     "passages",
     "passages_in_log",
     "scan_log",

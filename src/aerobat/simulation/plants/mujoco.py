@@ -2,7 +2,8 @@
 
 The vehicle is a free body with an ellipsoid as its hull. Each rotor is an actuator at a site in its centre of
 mass: thrust along +z and the moments of its column of the allocation, a first-order lag. Drag is a force of
-its own, held for a step. Gates are frames of four bars, the ground a plane.
+its own, held for a step. Gates are frames of bars, or walls where they have these; the ground is a plane.
+Obstacles are MuJoCo's own shapes where it has them, all others the meshes of their convex pieces.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from pydantic import Field
 
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.environment.obstacles import ConvexPiece, Obstacle
+from aerobat.environment.obstacles.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from aerobat.errors import BackendMissing
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.rigid_body import Body
@@ -29,8 +32,14 @@ if TYPE_CHECKING:
 
 FRAME_WIDTH = 0.05  # [m] of a gate's bars
 FRAME_DEPTH = 0.02  # [m] along the direction of passage
-_VEHICLE, _GROUND, _GATE = "vehicle", "ground", "gate"
-_KINDS = {_VEHICLE: Contact.NOTHING, _GROUND: Contact.GROUND, _GATE: Contact.GATE}
+_VEHICLE, _GROUND, _GATE, _OBSTACLE = "vehicle", "ground", "gate", "obstacle"
+_KINDS = {
+    _VEHICLE: Contact.NOTHING,
+    _GROUND: Contact.GROUND,
+    _GATE: Contact.GATE,
+    _OBSTACLE: Contact.OBSTACLE,
+}
+_AROUND = 24  # points around what is round in a mesh
 _AT_ONCE = 1e4  # [1/s] a rotor that is as fast has no lag here
 _ROUNDING = 1e-9  # of a step
 
@@ -38,7 +47,7 @@ _ROUNDING = 1e-9  # of a step
 class Mujoco(Plant):
     """MuJoCo's rigid bodies and contacts; needs the extra mujoco."""
 
-    contacts: bool = True  # with gates and ground; false: the vehicle passes through them
+    contacts: bool = True  # with gates, obstacles and ground; false: the vehicle passes through them
     max_step: Annotated[float, Field(gt=0, le=0.01)] = 0.001  # [s] of its Runge-Kutta steps
 
     def begin(self, scene: PlantScene, motion: VehicleState) -> MujocoRun:
@@ -109,14 +118,16 @@ class MujocoRun:
 
 
 def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
-    """The MuJoCo model (MJCF) of a vehicle, gates and ground.
+    """The MuJoCo model (MJCF) of a vehicle, gates, obstacles and ground.
 
     Args:
         scene: what there is.
-        contacts: with gates and ground.
+        contacts: with gates, obstacles and ground.
     """
     root = Element("mujoco", model="aerobat")
     SubElement(root, "option", integrator="RK4", gravity=f"0 0 {-scene.gravity!r}", density="0")
+    shapes = [shape for obstacle in scene.obstacles for shape in _shapes(obstacle)]
+    assets = SubElement(root, "asset")
     world = SubElement(root, "worldbody")
     SubElement(world, "light", pos="0 0 20", dir="0 0 -1", directional="true")
     meets = "1" if contacts else "0"
@@ -125,8 +136,16 @@ def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
             world, "geom", name=_GROUND, type="plane", size="50 50 1", pos=f"0 0 {scene.ground!r}",
             rgba="0.9 0.9 0.9 1", contype="0", conaffinity=meets,
         )  # fmt: skip
+    for number, shape in enumerate(shapes):
+        name = f"{_OBSTACLE} {number}"
+        if "vertex" in shape:
+            SubElement(assets, "mesh", name=name, vertex=shape.pop("vertex"))
+            shape["mesh"] = name
+        SubElement(world, "geom", shape, name=name, rgba="0.5 0.5 0.5 1", contype="0", conaffinity=meets)
     for number, gate in enumerate(scene.gates):
         for side, (centre, outward, half_size) in enumerate(_frame_bars(gate)):
+            if gate.wall is not None:
+                continue
             SubElement(
                 world, "geom", name=f"{_GATE} {number} {side}", type="box", pos=_text(centre),
                 size=_text(half_size), xyaxes=_text((*gate.normal, *outward)), rgba="0.85 0.4 0.1 1",
@@ -137,6 +156,39 @@ def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
     for actuator in _actuators(scene.airframe):
         SubElement(actuators, "general", actuator)
     return tostring(root, encoding="unicode")
+
+
+def _shapes(obstacle: Obstacle) -> Iterator[dict[str, str]]:
+    """The geoms of an obstacle; a convex hull by its vertices."""
+    match obstacle:
+        case Box():
+            length, width = obstacle.axes.T[:2]
+            half = _text(obstacle.size / 2.0)
+            yield {
+                "type": "box",
+                "pos": _text(obstacle.position),
+                "size": half,
+                "xyaxes": _text((*length, *width)),
+            }
+        case Sphere():
+            yield {"type": "sphere", "pos": _text(obstacle.position), "size": _text([obstacle.radius])}
+        case HalfSpace():
+            normal = _text(obstacle.normal)
+            yield {"type": "plane", "pos": _text(obstacle.position), "zaxis": normal, "size": "50 50 1"}
+        case Capsule() | Cylinder() if (obstacle.start != obstacle.end).any():
+            ends = _text((*obstacle.start, *obstacle.end))
+            yield {"type": obstacle.kind, "fromto": ends, "size": _text([obstacle.radius])}
+        case _:
+            yield from ({"type": "mesh", "vertex": _text(_hull(piece).ravel())} for piece in obstacle.pieces)
+
+
+def _hull(piece: ConvexPiece) -> Array:
+    """Points of a piece [m] whose hull it is; of what is round, points all around."""
+    if not piece.rounding.any():
+        return piece.points
+    around, down = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, _AROUND), np.linspace(0.0, np.pi, _AROUND // 2))
+    ball = np.stack([np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down)], axis=-1)
+    return np.asarray((piece.points[:, None] + ball.reshape(-1, 3) @ piece.rounding.T).reshape(-1, 3))
 
 
 def _frame_bars(gate: Gate) -> Iterator[tuple[Array, Array, tuple[float, float, float]]]:

@@ -247,4 +247,5 @@ def _scene(setup: FlightSetup, gates: tuple[Gate, ...]) -> PlantScene:
         ground=environment.ground,
         body=Ellipsoid(fleet.semi_axes[0], fleet.body_centres[0]),
         gates=gates,
+        obstacles=environment.obstacles,
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Protocol
 
 from aerobat.declaration import Registry
+from aerobat.environment.obstacles import Obstacle
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.ops import PerRotor, Vector
 from aerobat.problem.gate import Gate
@@ -23,6 +24,7 @@ class PlantScene:
     ground: float | None  # [m] its height; None for no ground
     body: Ellipsoid  # that encloses the vehicle
     gates: tuple[Gate, ...]
+    obstacles: tuple[Obstacle, ...] = ()  # the walls of gates among them
 
 
 class Actuation(NamedTuple):
@@ -42,7 +44,7 @@ class PlantRun(Protocol):
 
     @property
     def contact(self) -> Contact:
-        """The vehicle's contact since the last look; a gate's frame comes before the ground."""
+        """The vehicle's contact since the last look; of several the last one of Contact."""
 
     def advance(self, actuation: Actuation, duration: float) -> None:
         """Let some time [s] pass under what is held meanwhile."""

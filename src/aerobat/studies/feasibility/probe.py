@@ -94,5 +94,8 @@ def _planned(scenario: Scenario, task: ProbedTask) -> Probe:
     if not found.certified:
         return Probe(Feasibility.NOT_FLYABLE, found.certificate.why, limits_of(found.certificate.why), found)
     why = f"its own flight {' and '.join(found.flyability.defects)}"
-    gates = (f"gate '{passage.gate}'" for passage in found.flyability.passages if passage.failure)
-    return Probe(Feasibility.NOT_FLYABLE, why, tuple(gates), found)
+    at_fault = [f"gate '{passage.gate}'" for passage in found.flyability.passages if passage.failure]
+    nearest = found.flyability.nearest
+    if nearest is not None and nearest.failure is not None:
+        at_fault.append(f"'{nearest.obstacle}'")
+    return Probe(Feasibility.NOT_FLYABLE, why, tuple(at_fault), found)

@@ -19,6 +19,7 @@ from aerobat.studies.flights import CHUNK, FlightTask, cut
 SAMPLED = 4 * CHUNK  # flights, the first ones, whose errors are kept over time
 STRIDE = 10  # ticks from one instant of theirs to the next
 PASSED, NOT_REACHED = "passed", "not_reached"  # ends of a passage, beside the outcomes that are failures
+NEAREST, CLEARANCE = "nearest", "clearance_m"  # columns where there are obstacles
 AGAIN = "#"  # between a gate's name and the number of its passage, from the second on
 
 Columns = dict[str, NDArray[Any]]
@@ -99,6 +100,8 @@ def _scored(scores: Score) -> Columns:
     flights = list(scores)
     columns: Columns = {"outcome": np.array([flight.outcome.name.lower() for flight in flights])}
     columns |= {name: np.array(getattr(scores, name)) for name in _ERRORS}
+    if scores.nearest is not None:
+        columns |= {NEAREST: np.array(scores.nearest.obstacle), CLEARANCE: np.array(scores.nearest.clearance)}
     for number, name in enumerate(passage_names(scores.passages)):
         passage = scores.passages[number]
         columns |= {f"{name}_{column}": np.array(getattr(passage, field)) for field, column in _PASSAGE}

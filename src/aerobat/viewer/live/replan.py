@@ -88,7 +88,7 @@ def _key(setting: Setting) -> tuple[Any, ...]:
 def flown(plan: Plan, setting: Setting) -> Flight:
     """The flight of a plan as planned, or under conditions, several of them."""
     if setting.dispersion == 0.0:
-        return nominal_flight(plan.trajectory, vehicle_of(plan, None), plan.problem.environment)
+        return nominal_flight(plan.trajectory, vehicle_of(plan, None), plan.problem.surroundings)
     conditions = setting.conditions.scaled(setting.dispersion)
     return fly(plan, conditions=conditions, flights=FLIGHTS)
 
