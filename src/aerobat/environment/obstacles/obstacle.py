@@ -37,7 +37,8 @@ OBSTACLES: Registry[Obstacle] = Registry(
     dict.fromkeys(
         ("box", "capsule", "cylinder", "half-space", "polytope", "sphere"),
         "aerobat.environment.obstacles.shapes",
-    ),
+    )
+    | {name: f"aerobat.environment.obstacles.{name}" for name in ("mesh", "grid")},
 )
 
 
