@@ -146,7 +146,7 @@ class Grid(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its boxes."""
+        """The boxes."""
         lower, upper = self.boxes[:, None, :3], self.boxes[:, None, 3:]
         corners = self.origin + self.cell * (lower + UPPER * (upper - lower))
         return tuple(ConvexPiece(each, name=self.name) for each in corners)

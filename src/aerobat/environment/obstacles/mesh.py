@@ -72,6 +72,6 @@ class Mesh(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its parts."""
+        """The parts."""
         axes = axes_of(self.heading, self.elevation, self.tilt)
         return tuple(ConvexPiece(self.position + part @ axes.T, name=self.name) for part in self.parts)

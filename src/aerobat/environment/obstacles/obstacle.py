@@ -25,7 +25,7 @@ class Obstacle(ABC):
     @property
     @abstractmethod
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its convex pieces, in the world."""
+        """The convex pieces, in the world."""
 
 
 O = TypeVar("O", bound=Obstacle)  # noqa: E741 - an obstacle

@@ -72,7 +72,7 @@ class Box(Obstacle):
 
     @property
     def axes(self) -> Array:
-        """Its length, width and height in the world, unit vectors as columns, (3, 3)."""
+        """The directions of length, width and height in the world, unit vectors as columns, (3, 3)."""
         return axes_of(self.heading, self.elevation, self.tilt)
 
     @property
@@ -92,7 +92,7 @@ class Sphere(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its middle, rounded."""
+        """The middle, rounded."""
         return (ConvexPiece(self.position[None], self.radius * np.eye(3), self.name),)
 
 
@@ -127,7 +127,7 @@ class Cylinder(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its axis, rounded by a disc."""
+        """The axis, rounded by a disc."""
         along = (self.end - self.start) / np.linalg.norm(self.end - self.start)
         disc = self.radius * (np.eye(3) - np.outer(along, along))
         return (ConvexPiece(np.array([self.start, self.end]), disc, self.name),)
@@ -158,5 +158,5 @@ class Polytope(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Itself."""
+        """The hull as it is."""
         return (ConvexPiece(self.points, name=self.name),)
