@@ -20,7 +20,18 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 
 from aerobat.control import Controller
-from aerobat.environment import Battery, Dispersion, Environment, Gusts, HandOff, Imu, MotionCapture, Outage
+from aerobat.environment import (
+    Battery,
+    Dispersion,
+    Environment,
+    Gusts,
+    HandOff,
+    Imu,
+    MotionCapture,
+    Obstacle,
+    Outage,
+)
+from aerobat.environment.obstacles import OBSTACLES
 from aerobat.problem import (
     Attitude,
     Ball,
@@ -34,6 +45,7 @@ from aerobat.problem import (
     Problem,
     Stage,
     Tolerance,
+    Wall,
     Waypoint,
     registered_maneuvers,
 )
@@ -46,6 +58,7 @@ WRITTEN = "## The files of a run"  # from here on the page is written by hand
 PLACES = {  # where each class stands in a file
     EndState: "`[start]` and `[goal]`",
     Gate: "`[[gates]]`, or `[gate]` for a single one",
+    Wall: "`wall` of a gate, an obstacle around its opening; `wall = true` for one of the usual size",
     Limits: "`[limits]`, at the ends of intervals and, planned with a vehicle, between them",
     Environment: "`[environment]`",
     Tolerance: "`[tolerance]`: what a flight keeps to that went well, where no gate or radius says it",
@@ -89,6 +102,12 @@ conditions = [
 attitude = { up = [1.0, 0.0, 0.0], tolerance_deg = 3.0, min_thrust = 10.0 }
 at = [0.3, 0.6]
 ```
+"""
+OBSTACLE_KINDS = """### Obstacle
+
+`[[environment.obstacles]]`: what is solid and stands still. Each has a `kind`, and what that kind takes. A start, a goal
+or a gate whose middle lies in an obstacle is refused. [A world with walls](how-to/obstacles.md) has examples, and
+[kinds of one's own](generated/contributing.md#add-an-obstacle) are plugins.
 """
 WAYPOINTS = """
 With the times of all waypoints and `duration`, `--planner min-snap` searches as in the paper's Section V-D,
@@ -178,7 +197,8 @@ def page() -> str:
     by_hand = PAGE.read_text(encoding="utf-8").partition(WRITTEN)[2]
     parts = [INTRODUCTION, "## Problem (`aerobat fly problem.toml`)\n", preset("problem", "flip-roll")]
     parts += [table(Problem)]
-    parts += [section(cls) for cls in (EndState, Gate, Limits, Environment, Tolerance)]
+    parts += [section(cls) for cls in (EndState, Gate, Wall, Limits, Environment)]
+    parts += [OBSTACLE_KINDS, *(kind(name, OBSTACLES[name]) for name in OBSTACLES), section(Tolerance)]
     parts += ["### Maneuvers\n", "`[maneuver]` has a `kind`, and what that kind takes:\n"]
     parts += [kind(name, cls) for name, cls in registered_maneuvers().items() if of_package(cls)]
     parts += [section(Figure), section(GatePassage), section(Stage), section(Ball), section(Attitude)]
@@ -213,7 +233,7 @@ def section(cls: type) -> str:
 
 
 def kind(name: str, cls: type) -> str:
-    """A kind of maneuver."""
+    """A kind of maneuver, or of obstacle."""
     first = (cls.__doc__ or "").strip().partition("\n")[0]
     shared = next((base for base in cls.__mro__[1:] if base in PLACES), None)
     beside = "" if shared is None else f"Takes what a [{shared.__name__}](#{shared.__name__.lower()}) takes"
@@ -283,13 +303,16 @@ def type_of(hint: Any) -> str:
         return type_of(get_args(hint)[0])
     arguments = [argument for argument in get_args(hint) if argument not in (types.NoneType, ...)]
     if get_origin(hint) is tuple:
-        return f"list of tables, {type_of(arguments[0])}"
+        described = [getattr(each, "description", "") for each in getattr(arguments[0], "__metadata__", ())]
+        return f"list of {'' if any(described) else 'tables, '}{type_of(arguments[0])}"
     if get_origin(hint) is Literal:
         return ", ".join(f"`{choice!r}`" for choice in arguments)
     if arguments:
         return type_of(arguments[0])
     if issubclass(hint, Maneuver):
         return "[maneuver](#maneuvers)"
+    if issubclass(hint, Obstacle):
+        return "[obstacle](#obstacle)"
     if issubclass(hint, Enum):
         return ", ".join(f'`"{member.value}"`' for member in hint)
     plain = {float: "number", int: "whole number", bool: "`true`, `false`", str: "text"}

@@ -13,6 +13,17 @@ SCHEMA = Path(__file__).parent / "plan.schema.json"
 FILES = "as in its file, where what is usual may be left out: see files.md"
 NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
 
+PIECE = {
+    "type": "object",
+    "description": "a convex piece of an obstacle: the hull of points, each with all L y, |y| ≤ 1, L its rounding",
+    "properties": {
+        "name": {"type": "string"},
+        "points": {"type": "array", "items": NUMBERS, "minItems": 1},
+        "rounding": {"type": "array", "items": NUMBERS, "minItems": 3, "maxItems": 3},
+    },
+    "required": ["name", "points", "rounding"],
+}
+
 
 def schema() -> str:
     """The whole file."""
@@ -25,6 +36,7 @@ def schema() -> str:
             "gravity": {"type": "number"},
             "wind": NUMBERS,
             "ground": {"type": ["number", "null"]},
+            "obstacles": {"type": "array", "items": PIECE, "description": "since revision 5"},
         },
         "required": ["gravity", "wind", "ground"],
     }

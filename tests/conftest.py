@@ -15,6 +15,7 @@ from hypothesis import settings
 import budget
 from aerobat.control.law import CONTROL_LAWS
 from aerobat.declaration.registry import imported_plugins
+from aerobat.environment.obstacles import OBSTACLES
 from aerobat.planning.planners import PLANNERS
 from aerobat.problem.maneuvers.maneuver import MANEUVERS
 from aerobat.simulation.plants.plant import PLANTS
@@ -114,7 +115,7 @@ def signals_are_heeded() -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def registries_as_they_were() -> Iterator[None]:
     """What a test registers, and plugins that it imports, are its own: files share processes in any order."""
-    before = {registry: set(registry) for registry in (PLANNERS, MANEUVERS, CONTROL_LAWS, PLANTS)}
+    before = {registry: set(registry) for registry in (PLANNERS, MANEUVERS, OBSTACLES, CONTROL_LAWS, PLANTS)}
     plugins = set(imported_plugins())
     yield
     for registry, names in before.items():

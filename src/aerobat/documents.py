@@ -7,10 +7,11 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from aerobat.declaration import from_table, unknown_name
+from aerobat.declaration import FieldError, from_table, shown, unknown_name
 from aerobat.errors import SpecError
 from aerobat.storage import read_whole, write_whole
 
@@ -27,6 +28,7 @@ _UNREADABLE = {  # at which the parser of TOML takes gigabytes or minutes; no do
     "a number of a thousand digits": re.compile(r"(?<![0-9A-Fa-f_])[0-9A-Fa-f_]{1000}"),
     "a key of a hundred parts": re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){100}"),
 }
+_FOLDER: ContextVar[Path] = ContextVar("_FOLDER", default=Path())  # of the document that is read
 _NUMBERS = re.compile(r"\[\n((?:\s*[-+\w.]+,\n)+)\s*\]")  # a list of numbers, each on a line of its own
 
 
@@ -72,8 +74,42 @@ def read_document(path: str | Document, cls: type[T], kind: str, **defaults: Any
             read, is not TOML, or does not fit the declarations.
     """
     document = Path(path) if isinstance(path, str) else path
-    with in_document(document, kind):
-        return from_table(cls, defaults | _parse(read_text(document)))
+    folder = _FOLDER.set(document.parent if isinstance(document, Path) else Path())
+    try:
+        with in_document(document, kind):
+            return from_table(cls, defaults | _parse(read_text(document)))
+    finally:
+        _FOLDER.reset(folder)
+
+
+def file_name(value: Any) -> str:
+    """Return a value that is the name of a file. Raises FieldError for others."""
+    if not isinstance(value, str | os.PathLike) or not os.fspath(value):
+        raise FieldError("", f"must be the path of a file, got {shown(value)}")
+    return str(os.fspath(value))
+
+
+def beside_document(path: str | os.PathLike[str]) -> Path:
+    """Return a path that a document names, counted from the document's folder.
+
+    Where no document is being read, it is counted from the working folder.
+    """
+    return _FOLDER.get() / path
+
+
+def read_named_file(path: str | os.PathLike[str], max_size: int) -> bytes:
+    """Return the content of a file that a document names, of at most `max_size` bytes.
+
+    Raises FieldError, about the whole of a field, where it cannot be read.
+    """
+    try:
+        return read_whole(beside_document(path), max_size)
+    except FileNotFoundError:
+        raise FieldError("", f": there is no file {beside_document(path)}; check the path") from None
+    except SpecError as error:
+        raise FieldError("", f": {path}: {error}") from None
+    except (OSError, ValueError) as error:
+        raise FieldError("", f": {path} cannot be read: {_reason(error)}") from None
 
 
 def write_document(path: str | os.PathLike[str], table: Mapping[str, Any]) -> None:

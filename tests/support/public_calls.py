@@ -134,6 +134,7 @@ NOT_CALLED = (
     "Maneuver",
     "Planner",
     "ControlLaw",
+    "Obstacle",
 )
 ENUMS = ("ContinuityRule", "Outcome", "Quantity", "TimeScaling")
 
@@ -213,12 +214,15 @@ def _calls(folder: Path) -> dict[str, dict[str, Any]]:
         "load_vehicle": {"name_or_path": "agile-quad"},
         "controller": {"name": "x"},
         "maneuver": {"kind": "x"},
+        "mesh_parts": {"path": saved["mesh"], "scale": 0.5},
         "minimum_effort": {
             "fixed": np.zeros((2, 3, 3)),
             "durations": [1.0],
             "rule": ab.ContinuityRule.HIGHEST,
             "heading": 0.1,
         },
+        "obstacle": {"kind": "x"},
+        "occupied_boxes": {"values": np.ones((2, 2, 2)), "cell": 0.5, "origin": (0.0, 0.0, 1.0)},
         "option": {"default": 1, "help": "x", "off": "no-x", "command_default": 2},
         "plan": {"problem": plan().problem, "planner": NoPlan(), "vehicle": agile, "progress": ignored},
         "plan_to_pass": {**PASSING, "fresh": 2, "progress": ignored, "tried": ignored},
@@ -455,6 +459,8 @@ def _files(folder: Path) -> dict[str, Path]:
     row = {"x": 0.0, "y": 0.0, "z": 0.0, "qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
     row |= {f"f{k}": 2.0 for k in range(4)}
     ab.write_table({"t": [0.0, 0.1, 0.2], **{name: [value] * 3 for name, value in row.items()}}, files["log"])
+    files["mesh"] = folder / "mesh.obj"
+    files["mesh"].write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
     files["plugin"] = folder / "plugin.py"
     files["plugin"].write_text("")
     plan().save(files["plan"])
@@ -473,6 +479,8 @@ def instance(cls: type) -> Any:
         ab.Ball: lambda: ab.Ball((0.0, 0.0, 1.0), 0.3),
         ab.Battery: lambda: ab.load_dispersion("lab").battery,
         ab.BarrelRoll: lambda: ab.BarrelRoll((0.0, 0.0, 1.0)),
+        ab.Box: lambda: ab.Box((0.0, 0.0, 1.0), (1.0, 2.0, 3.0), tilt=0.1),
+        ab.Capsule: lambda: ab.Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.2),
         ab.BodyState: lambda: ab.BodyState(np.zeros(3), np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3)),
         ab.Cause: lambda: ab.Cause("jerk", {"planner.order": 3}),
         ab.Certificate: lambda: ab.certify(plan()),
@@ -481,6 +489,7 @@ def instance(cls: type) -> Any:
         ab.Corkscrew: lambda: ab.Corkscrew((0.0, 0.0, 1.0)),
         ab.Course: lambda: ab.Course((ab.PassWaypoint((0.0, 0.0, 1.0)),)),
         ab.CustomManeuver: lambda: ab.CustomManeuver((ab.Stage("a"),)),
+        ab.Cylinder: lambda: ab.Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.2),
         ab.Dispersion: lambda: ab.load_dispersion("lab"),
         ab.Ellipsoid: lambda: ab.Ellipsoid((0.2, 0.2, 0.05), (0.0, 0.0, 0.01)),
         ab.EndState: lambda: ab.at_rest((0.0, 0.0, 1.0)),
@@ -491,17 +500,21 @@ def instance(cls: type) -> Any:
         ab.FlatState: lambda: plan().trajectory.flat(0.1),
         ab.Flight: flight,
         ab.Gate: lambda: ab.tilted_gate((0.0, 0.0, 1.0)),
+        ab.Grid: lambda: ab.Grid(((0, 0, 0, 1, 2, 3),), 0.1),
+        ab.HalfSpace: lambda: ab.HalfSpace((0.0, 0.0, 3.0), (0.0, 0.0, -1.0)),
         ab.Hold: lambda: ab.Hold((0.0, 0.0, 1.0), 0.5),
         ab.Immelmann: lambda: ab.Immelmann((0.0, 0.0, 1.0)),
         ab.Inspection: lambda: ab.inspect_flight(**_inspected()),
         ab.InvertedPass: lambda: ab.InvertedPass((0.0, 0.0, 1.0)),
         ab.KnifeEdgePass: lambda: ab.KnifeEdgePass((0.0, 0.0, 1.0)),
         ab.MattyFlip: lambda: ab.MattyFlip((0.0, 0.0, 3.0)),
+        ab.Mesh: lambda: ab.Mesh((np.eye(4)[:, :3],), (0.0, 0.0, 1.0)),
         ab.Outage: lambda: ab.Outage(0.1, 0.5),
         ab.Opening: lambda: ab.smallest_opening(**_wide_enough()),
         ab.PassWaypoint: lambda: ab.PassWaypoint((0.0, 0.0, 1.0)),
         ab.Passing: lambda: ab.plan_to_pass(**PASSING),
         ab.Plan: plan,
+        ab.Polytope: lambda: ab.Polytope(np.eye(4)[:, :3]),
         ab.PowerLoop: lambda: ab.PowerLoop((0.0, 0.0, 1.0)),
         ab.Problem: lambda: ab.load_problem("half-flip"),
         ab.Remedy: lambda: ab.Remedy(("without reserve",), plan()),
@@ -509,6 +522,7 @@ def instance(cls: type) -> Any:
         ab.Rotor: lambda: ab.load_vehicle("agile-quad").rotors[0],
         ab.SensorLog: _log,
         ab.Setpoint: lambda: flight().setpoint,
+        ab.Sphere: lambda: ab.Sphere((0.0, 0.0, 1.0), 0.5),
         ab.SplitS: lambda: ab.SplitS((0.0, 0.0, 4.0)),
         ab.Stage: lambda: ab.Stage("a"),
         ab.Trajectory: lambda: plan().trajectory,

@@ -65,6 +65,16 @@ class FlightPackage:
             return False
         return all(finding["verdict"] == "holds" for finding in certificate["findings"])
 
+    @property
+    def obstacles(self) -> tuple[tuple[str, Array, Array], ...]:
+        """Name, points [m] (n, 3) and rounding L [m] (3, 3) of all that is solid, in convex pieces.
+
+        A piece is the convex hull of its points, each with all L y for |y| ≤ 1. None where the file is of a
+        revision before 5, or nothing stands in the way.
+        """
+        pieces = self.document.get("environment", {}).get("obstacles", ())
+        return tuple((each["name"], np.array(each["points"]), np.array(each["rounding"])) for each in pieces)
+
     def evaluate(self, times: ArrayLike, derivative: int = 0) -> Array:
         """d^k p/dt^k at times [s] (T,) in the plan, at a knot of the later segment, (T, 3)."""
         t = np.clip(np.atleast_1d(np.asarray(times, dtype=float)), 0.0, self.duration)

@@ -37,7 +37,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 FORMAT = "aerobat-plan-1"  # another number where something goes, or means something else
-REVISION = 4  # of it: one more wherever something is added
+REVISION = 5  # of it: one more wherever something is added
 WORKED_OUT = {"certificate", "flyability", "assessment"}  # from a plan's path whenever they are read
 ASKED_FOR = {"recoveries", "opinion", "tube"}  # results that take seconds
 MAX_EVIDENCE = 2**23  # bytes of a document: that of twenty gates has some hundred thousand
@@ -91,7 +91,7 @@ def write_plan_file(
         "revision": REVISION,
         "aerobat": version("aerobat"),
         "frames": FRAMES,
-        "environment": _in_full(problem.environment),
+        "environment": _in_full(problem.surroundings),
         "problem": to_table(problem),
         "vehicle": None if vehicle is None else to_table(vehicle),
         "evidence": facts_adapter().dump_python(facts, mode="json"),
@@ -142,9 +142,16 @@ def read_plan_file(path: PathName) -> tuple[Problem, Trajectory, Vehicle | None,
 
 
 def _in_full(environment: Environment) -> dict[str, Any]:
-    """Its table with what is left out of problems' files, where it is as usual."""
-    wind = environment.wind.tolist()
-    return {"gravity": environment.gravity, "wind": wind, "ground": environment.ground}
+    """Its table with what is left out of problems' files, where it is as usual, and obstacles as pieces."""
+    return {
+        "gravity": environment.gravity,
+        "wind": environment.wind.tolist(),
+        "ground": environment.ground,
+        "obstacles": [
+            {"name": piece.name, "points": piece.points.tolist(), "rounding": piece.rounding.tolist()}
+            for piece in environment.pieces.pieces
+        ],
+    }
 
 
 def facts_adapter() -> Any:

@@ -104,7 +104,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
         fact = f"{len(paths)} of {len(entries)} planners found a plan"
         figure = blank_page(rows + AXIS + MARGIN + height + TITLES, title, [fact])
         axes = panel(figure, COLUMNS[0], rows + AXIS + MARGIN, PAGE_WIDTH - COLUMNS[0] - MARGIN, height)
-        draw_overlay(axes, paths, comparison.problem.gates)
+        draw_overlay(axes, paths, comparison.problem.gates, comparison.problem.surroundings.pieces.pieces)
         heading(axes, "Paths")
         _draw_rows(figure, comparison, colours, rows)
     return figure

@@ -93,10 +93,12 @@ def draw(flight: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str
     if plan is not None:
         title = f"{plan.problem.name} · {title}"
     gates, stages = ((), ()) if plan is None else (plan.problem.gates, plan.stages)
+    pieces = (flight.environment if plan is None else plan.problem.surroundings).pieces.pieces
     with house_style():
         figure = blank_page(layout.height, title, [error_caption(flight)])
         path = panel(figure, *layout.path)
-        heading(path, "Path and attitude", draw_path(path, reference, actual, vehicle, gates, stages))
+        note = draw_path(path, reference, actual, vehicle, gates, stages, pieces=pieces)
+        heading(path, "Path and attitude", note)
         lines = [panel(figure, *place) for place in (layout.position, layout.attitude, layout.rotors)]
         timelines.draw_position_error(lines[0], flight)
         timelines.draw_attitude_error(lines[1], flight)
@@ -166,7 +168,8 @@ def _pictures(
         panel(figure, left, foot + bottom, width, height)
         for left, bottom, width, height in (layout.path, layout.stages)
     )
-    note = draw_path(path, reference, actual, vehicle, plan.problem.gates, plan.stages)
+    problem, pieces = plan.problem, plan.problem.surroundings.pieces.pieces
+    note = draw_path(path, reference, actual, vehicle, problem.gates, plan.stages, pieces=pieces)
     heading(path, "Path and attitude", note)
     heading(stages, "Stages" if plan.stages else "Attitudes", draw_stages(stages, plan, vehicle))
     return figure, [AXIS + PITCH * k for k in reversed(range(rows))]

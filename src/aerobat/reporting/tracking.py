@@ -134,8 +134,10 @@ def tracking_page(plan: Plan, vehicle: Vehicle, flight: Flight, title: str, fact
     with house_style():
         figure = blank_page(HEIGHT, title, facts)
         path = panel(figure, *PATH)
-        poses = reference_poses(asked), actual_poses(flight)
-        heading(path, "Path and attitude", draw_path(path, *poses, vehicle, plan.problem.gates, plan.stages))
+        problem, poses = plan.problem, (reference_poses(asked), actual_poses(flight))
+        pieces = problem.surroundings.pieces.pieces
+        note = draw_path(path, *poses, vehicle, problem.gates, plan.stages, pieces=pieces)
+        heading(path, "Path and attitude", note)
         page = TrackingPage(figure, plan, asked, flight)
         positions, velocities = motion_signals(asked, flight)
         thrust, *moments = effort_signals(asked, flight, vehicle)

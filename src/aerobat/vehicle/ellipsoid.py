@@ -56,7 +56,7 @@ class Ellipsoid:
 
     @property
     def revolved(self) -> Revolved:
-        """What encloses it however it is turned about its thrust axis."""
+        """The body that encloses the ellipsoid however that is turned about its thrust axis."""
         x, y, up = self.centre.tolist()
         return Revolved(float(self.semi_axes[:2].max()), float(self.semi_axes[2]), up, hypot(x, y))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from base64 import b64encode
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 from importlib.resources import files
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
+from aerobat.environment.obstacles.surface import Surface
 from aerobat.problem.gate import Gate
 from aerobat.viewer.scene import Scene, Track
 
@@ -111,6 +113,7 @@ def _header(scene: Scene, blob: Blob) -> dict[str, Any]:
             for rotor in vehicle.rotors
         ],
         "gates": [_gate(gate) for gate in scene.gates],
+        "obstacles": _obstacles(scene.surfaces, blob),
         "stages": [{"name": s.name, "time": s.time, "gate": s.gate} for s in scene.stages],
         "ghosts": [
             {"name": g.name, "position": _rounded(g.position), "attitude": _rounded(g.q_world_body)}
@@ -136,6 +139,16 @@ def _gate(gate: Gate) -> dict[str, Any]:
         "width": width,
         "height": height,
         "outline": [_rounded(point) for point in gate.opening.outline],
+    }
+
+
+def _obstacles(surfaces: Sequence[Surface], blob: Blob) -> dict[str, Any]:
+    """All obstacles as triangles, and the lines at which their faces meet."""
+    triangles = [surface.triangles for surface in surfaces]
+    edges = [surface.edges for surface in surfaces]
+    return {
+        "triangles": blob.add(np.concatenate([*triangles, np.zeros((0, 3, 3))]), "f4"),
+        "edges": blob.add(np.concatenate([*edges, np.zeros((0, 2, 3))]), "f4"),
     }
 
 

@@ -10,6 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
+from aerobat.environment import Environment
+from aerobat.environment.obstacles.shown import surfaces_around
+from aerobat.environment.obstacles.surface import Surface
 from aerobat.errors import SpecError
 from aerobat.evaluation.score import score
 from aerobat.flatness import reference
@@ -73,6 +76,7 @@ class Scene:
     gravity: float  # [m/s²]
     ground: float | None  # [m]
     gates: tuple[Gate, ...]
+    surfaces: tuple[Surface, ...]  # of obstacles, as far as they are shown
     stages: tuple[PlacedStage, ...]
     ghosts: tuple[Ghost, ...]
     times: Array  # [s], (T,)
@@ -148,6 +152,7 @@ def _plan_scene(plan: Plan, vehicle: Vehicle) -> Scene:
         gravity=plan.problem.environment.gravity,
         ground=plan.problem.environment.ground,
         gates=plan.problem.gates,
+        surfaces=_surfaces(plan.problem.surroundings, plan.problem.gates, track.position),
         stages=plan.stages,
         ghosts=_ghosts(plan.stages, asked.times, track.position, track.q_world_body),
         times=asked.times,
@@ -166,7 +171,8 @@ def _flight_scene(flight: Flight, plan: Plan | None, vehicle: Vehicle, poses: in
         _track(each, plan, vehicle, rows, k if flight.is_batch else None) for k, each in enumerate(flights)
     )
     setpoint = flight.setpoint
-    stages = () if plan is None else plan.stages
+    stages, gates = ((), ()) if plan is None else (plan.stages, plan.problem.gates)
+    surroundings = flight.environment if plan is None else plan.problem.surroundings
     name = "flight" if plan is None else plan.problem.name
     batch = f"{len(flights)} flights of " if flight.is_batch else ""
     return Scene(
@@ -176,7 +182,8 @@ def _flight_scene(flight: Flight, plan: Plan | None, vehicle: Vehicle, poses: in
         vehicle=vehicle,
         gravity=flight.environment.gravity,
         ground=flight.environment.ground,
-        gates=() if plan is None else plan.problem.gates,
+        gates=gates,
+        surfaces=_surfaces(surroundings, gates, setpoint.flat.position),
         stages=stages,
         ghosts=_ghosts(stages, flight.times, setpoint.flat.position, setpoint.q_world_body),
         times=flight.times[rows],
@@ -184,6 +191,12 @@ def _flight_scene(flight: Flight, plan: Plan | None, vehicle: Vehicle, poses: in
         tracks=tracks,
         curves=_errors(flight, len(flights), rows),
     )
+
+
+def _surfaces(environment: Environment, gates: Sequence[Gate], path: Array) -> tuple[Surface, ...]:
+    """The surfaces of obstacles around a path (T, 3) and gates."""
+    points = np.concatenate([path, *(gate.outline for gate in gates)])
+    return surfaces_around(environment.pieces.pieces, points)
 
 
 def shown_rows(rows: int, flights: int, poses: int = MAX_POSES) -> Rows:

@@ -25,7 +25,7 @@ class Obstacle(ABC):
     @property
     @abstractmethod
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its convex pieces, in the world."""
+        """The convex pieces, in the world."""
 
 
 O = TypeVar("O", bound=Obstacle)  # noqa: E741 - an obstacle
@@ -37,7 +37,8 @@ OBSTACLES: Registry[Obstacle] = Registry(
     dict.fromkeys(
         ("box", "capsule", "cylinder", "half-space", "polytope", "sphere"),
         "aerobat.environment.obstacles.shapes",
-    ),
+    )
+    | {name: f"aerobat.environment.obstacles.{name}" for name in ("mesh", "grid")},
 )
 
 

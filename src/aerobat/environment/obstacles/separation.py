@@ -1,4 +1,4 @@
-"""How far an ellipsoid is from convex pieces, by the plane that separates them best.
+"""The distance of an ellipsoid from convex pieces, by the plane that separates them best.
 
 A body with centre c that is all c + L y with |y| ≤ 1 reaches |Lᵀ n| against a unit vector n. The gap between
 it and a piece across planes with the normal n is φ(n) = n·c − |Lᵀ n| − h(n), with the piece's support h. Its
@@ -152,7 +152,7 @@ class _Pairs:
         return np.asarray(nearest - rounded - np.linalg.norm(normals @ self.shapes, axis=-1))
 
     def extents(self, normals: Array) -> Array:
-        """How far bodies reach [m] against normals, (m, 3) -> (m,)."""
+        """The lengths [m] to which bodies reach against normals, (m, 3) -> (m,)."""
         return np.asarray(np.linalg.norm(_times(np.swapaxes(self.shapes, 1, 2), normals), axis=-1))
 
     def refined(self, normals: Array) -> Array:

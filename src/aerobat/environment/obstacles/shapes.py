@@ -19,10 +19,9 @@ from aerobat.declaration import (
     UnitVector,
     Vector3,
     finite,
-    in_degrees,
-    in_radians,
     shown,
 )
+from aerobat.environment.obstacles.attitude import ATTITUDE, angles_in_degrees, angles_in_radians, axes_of
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.obstacle import Obstacle, obstacle
 
@@ -37,7 +36,8 @@ def _size(value: Any) -> Array:
     return size
 
 
-def _points(value: Any) -> Array:
+def corners_of_solid(value: Any) -> Array:
+    """Return points (n, 3) that span a solid. Raises FieldError for others."""
     points = finite(value, len(value) if hasattr(value, "__len__") else 0, 3)
     if len(points) < 4 or np.linalg.matrix_rank(points - points[0], 1e-9) < 3:
         raise FieldError("", "must be four points or more that do not lie in one plane")
@@ -45,12 +45,7 @@ def _points(value: Any) -> Array:
 
 
 Size = Annotated[Array, PlainValidator(_size), Field(description="three positive numbers")]
-Points = Annotated[Array, PlainValidator(_points), Field(description="points of three numbers each")]
-ATTITUDE = {
-    "heading_deg": "[deg] `heading` in degrees",
-    "elevation_deg": "[deg] `elevation` in degrees",
-    "tilt_deg": "[deg] `tilt` in degrees",
-}
+Points = Annotated[Array, PlainValidator(corners_of_solid), Field(description="points of three numbers each")]
 
 
 @obstacle("box")
@@ -69,22 +64,16 @@ class Box(Obstacle):
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
         """Replace the angles in degrees."""
-        for angle in ("heading", "elevation", "tilt"):
-            table = in_radians(table, angle)
-        return table
+        return angles_in_radians(table)
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
         """Write the angles in degrees where those say exactly the same."""
-        for angle in ("heading", "elevation", "tilt"):
-            table = in_degrees(table, angle)
-        return table
+        return angles_in_degrees(table)
 
     @property
     def axes(self) -> Array:
-        """Its length, width and height in the world, unit vectors as columns, (3, 3)."""
-        z, y, x = np.eye(3)[::-1]
-        climb = so3.multiply(so3.about_axis(y, -self.elevation), so3.about_axis(x, self.tilt))
-        return so3.axes(so3.multiply(so3.about_axis(z, self.heading), climb))
+        """The directions of length, width and height in the world, unit vectors as columns, (3, 3)."""
+        return axes_of(self.heading, self.elevation, self.tilt)
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
@@ -103,7 +92,7 @@ class Sphere(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its middle, rounded."""
+        """The middle, rounded."""
         return (ConvexPiece(self.position[None], self.radius * np.eye(3), self.name),)
 
 
@@ -138,7 +127,7 @@ class Cylinder(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its axis, rounded by a disc."""
+        """The axis, rounded by a disc."""
         along = (self.end - self.start) / np.linalg.norm(self.end - self.start)
         disc = self.radius * (np.eye(3) - np.outer(along, along))
         return (ConvexPiece(np.array([self.start, self.end]), disc, self.name),)
@@ -169,5 +158,5 @@ class Polytope(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Itself."""
+        """The hull as it is."""
         return (ConvexPiece(self.points, name=self.name),)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
+from aerobat.environment.obstacles import ConvexPiece
 from aerobat.errors import SpecError
 from aerobat.planning import PlacedStage, Plan
 from aerobat.problem.gate import Gate
@@ -29,6 +30,7 @@ from aerobat.reporting.scene.glyphs import (
     thrust_axis_shape,
     vehicle_shapes,
 )
+from aerobat.reporting.scene.obstacles import obstacle_shapes, surfaces_beside
 from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted, polyline
 from aerobat.reporting.style import BAND, BLUE, FAINT, HAIR, INK, MUTED, NORMAL, TITLE
 from aerobat.simulation import Flight
@@ -54,6 +56,7 @@ class Subject:
     title: str
     vehicle: Vehicle
     gates: tuple[Gate, ...]
+    pieces: tuple[ConvexPiece, ...]  # of obstacles
     stages: tuple[PlacedStage, ...]
     reference: PoseHistory
     actual: Sequence[PoseHistory]
@@ -92,10 +95,14 @@ def subject_of(shown: Flight | Plan, plan: Plan | None, vehicle: Vehicle | str |
             )
         own = as_vehicle(shown.vehicles[0] if vehicle is None else vehicle)
         poses, thrusts, actual = reference_poses(shown), shown.thrusts, actual_poses(shown)
+    surroundings = None if given is None else given.problem.surroundings
+    if isinstance(shown, Flight) and surroundings is None:
+        surroundings = shown.environment
     return Subject(
         title=f"{'flight' if given is None else given.problem.name} · {own.name}",
         vehicle=own,
         gates=() if given is None else given.problem.gates,
+        pieces=() if surroundings is None else surroundings.pieces.pieces,
         stages=() if given is None else given.stages,
         reference=poses,
         actual=actual,
@@ -162,7 +169,8 @@ class MovingPicture:
         subject = self.subject
         points = [poses.path for poses in (subject.reference, *subject.actual)]
         reach = self._scale * span(subject.vehicle)
-        box = box_around(np.concatenate([*points, gate_corners(subject.gates)]), 0.6 * reach)
+        self._surfaces, points_held = surfaces_beside(subject.pieces, [*points, gate_corners(subject.gates)])
+        box = box_around(points_held, 0.6 * reach)
         self._floor = float(box.lower[2])
         size = np.array(SCENE[2:])
         camera = best_view(subject.reference.path, subject.gates, box.corners, room_for_box(size))
@@ -192,10 +200,11 @@ class MovingPicture:
 
     @cached_property
     def _standing(self) -> list[Shape]:
-        """The shapes that stand still: gates, and the path that is to be flown."""
+        """The shapes that stand still: gates, obstacles, and the path that is to be flown."""
         path = self.subject.reference.path
         shapes = [Shape(shadow(path, self._floor), edge=HAIR, width=2.5, depth_bias=-1e3)]
         shapes += polyline(path, BAND, 3.2, depth_bias=-BELOW * self.subject.reference.extent)
+        shapes += obstacle_shapes(self._surfaces, self._camera)
         return shapes + [shape for gate in self.subject.gates for shape in gate_shapes(gate)]
 
     def _moving(self, time: float) -> list[Shape]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.environment.obstacles import ConvexPiece
 from aerobat.problem.gate import Gate
 from aerobat.reporting.page import size_of
 from aerobat.reporting.panels.keyframes import plane_of
@@ -16,6 +17,7 @@ from aerobat.reporting.panels.path import mark_ends
 from aerobat.reporting.scene.axes_box import box_around, draw_axes_box, room_for_box
 from aerobat.reporting.scene.camera import best_view
 from aerobat.reporting.scene.glyphs import gate_corners, gate_shapes
+from aerobat.reporting.scene.obstacles import obstacle_shapes, surfaces_beside
 from aerobat.reporting.scene.shapes import draw_depth_sorted
 
 if TYPE_CHECKING:
@@ -33,9 +35,18 @@ class NamedPath:
     position: Array  # [m], (T, 3), as many as of the others
 
 
-def draw_overlay(axes: Axes, paths: Sequence[NamedPath], gates: Sequence[Gate]) -> None:
-    """Draw paths from one start to one goal: in the vertical plane that holds them, or in space."""
-    points = np.concatenate([*(path.position for path in paths), gate_corners(gates)])
+def draw_overlay(
+    axes: Axes, paths: Sequence[NamedPath], gates: Sequence[Gate], pieces: Sequence[ConvexPiece] = ()
+) -> None:
+    """Draw paths from one start to one goal: in the vertical plane that holds them, or in space.
+
+    Args:
+        axes: Where to draw.
+        paths: In their colours.
+        gates: All gates of the problem.
+        pieces: Of obstacles, which are drawn where they are near.
+    """
+    surfaces, points = surfaces_beside(pieces, [*(path.position for path in paths), gate_corners(gates)])
     plane = plane_of(points)
     if plane is None:
         box = box_around(points, 0.02 * float(np.ptp(points, axis=0).max()))
@@ -45,8 +56,8 @@ def draw_overlay(axes: Axes, paths: Sequence[NamedPath], gates: Sequence[Gate]) 
         camera = plane.camera
         _fit_plane(axes, camera.project(points))
         axes.set(xlabel=plane.label, ylabel="z [m]")
-    if gates:
-        shapes = [shape for gate in gates for shape in gate_shapes(gate)]
+    shapes = obstacle_shapes(surfaces, camera) + [shape for gate in gates for shape in gate_shapes(gate)]
+    if shapes:
         draw_depth_sorted(axes, shapes, camera, zorder=1.5)
     pictures = [camera.project(path.position) for path in paths]
     for path, picture in zip(paths, pictures, strict=True):

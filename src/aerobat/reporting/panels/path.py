@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.environment.obstacles import ConvexPiece
 from aerobat.planning import PlacedStage
 from aerobat.problem.gate import Gate
 from aerobat.reporting.page import HEADING, legend, size_of
@@ -27,6 +28,7 @@ from aerobat.reporting.scene.glyphs import (
     thrust_axis_shape,
     vehicle_shapes,
 )
+from aerobat.reporting.scene.obstacles import obstacle_shapes, surfaces_beside
 from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted, polyline
 from aerobat.reporting.style import BAND, BLUE, HAIR, INK
 from aerobat.vehicle import Vehicle
@@ -52,8 +54,9 @@ def draw_path(
     gates: Sequence[Gate],
     stages: Sequence[PlacedStage] = (),
     size: float = SIZE,
+    pieces: Sequence[ConvexPiece] = (),
 ) -> str:
-    """Draw paths, the first vehicle along its path, the gates, other stages, start and end.
+    """Draw paths, the first vehicle along its path, the gates, obstacles, other stages, start and end.
 
     Args:
         axes: Where to draw.
@@ -63,6 +66,7 @@ def draw_path(
         gates: All gates of the problem; the picture holds each of them.
         stages: Of which those without a gate are marked by diamonds.
         size: Of the vehicle as drawn, relative to the path's extent.
+        pieces: Of obstacles, which are drawn where they are near.
 
     Returns:
         A note on how the vehicle is drawn.
@@ -70,13 +74,14 @@ def draw_path(
     scale = enlargement(vehicle, size * reference.extent)
     reach = scale * span(vehicle)
     paths = [poses.path for poses in (reference, *actual)]
-    box = box_around(np.concatenate([*paths, gate_corners(gates)]), 0.6 * reach)
+    surfaces, points = surfaces_beside(pieces, [*paths, gate_corners(gates)])
+    box = box_around(points, 0.6 * reach)
     camera = best_view(reference.path, gates, box.corners, room_for_box(size_of(axes)))
     draw_axes_box(axes, box, camera)
     floor = float(box.lower[2])
     poses = actual[0] if actual else reference
     rows, step = pose_samples(poses, reach, gates)
-    shapes = _path_shapes(reference, actual, floor)
+    shapes = _path_shapes(reference, actual, floor) + obstacle_shapes(surfaces, camera)
     for gate in gates:
         lowest = np.sort(gate.outline[:, 2])[:2].mean()  # the middle of the lower edge
         foot = gate.position + np.array([0.0, 0.0, lowest - gate.position[2]])

@@ -150,6 +150,20 @@ function gateModel(gate) {
   return model;
 }
 
+// Obstacles as glass, with lines where their faces meet.
+function obstacleModel({ triangles, edges }) {
+  const glass = new THREE.BufferGeometry();
+  glass.setAttribute("position", new THREE.Float32BufferAttribute(values(triangles), 3));
+  glass.computeVertexNormals();
+  const lines = new THREE.BufferGeometry();
+  lines.setAttribute("position", new THREE.Float32BufferAttribute(values(edges), 3));
+  const paint = { transparent: true, depthWrite: false };
+  const model = new THREE.Group();
+  model.add(new THREE.Mesh(glass, new THREE.MeshLambertMaterial({ ...paint, color: COLOUR.faint, opacity: 0.35 })));
+  model.add(new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ ...paint, color: COLOUR.muted, opacity: 0.6 })));
+  return model;
+}
+
 // The rows of a series that are drawn.
 function drawn(series) {
   return DRAWN_ROWS.flatMap((k) => [...series.subarray(3 * k, 3 * k + 3)]);

@@ -18,6 +18,7 @@ class World {
     this.scene.add(sun);
     this.addGround();
     this.placeGates(HEADER.gates);
+    if (HEADER.obstacles.triangles.length) this.scene.add(obstacleModel(HEADER.obstacles));
     this.addPlan();
     this.addTracks();
     this.choose(TRACKS.findIndex((track) => track.failed) > -1 && TRACKS.length > 1 ? TRACKS.findIndex((t) => t.failed) : 0);
@@ -217,6 +218,8 @@ function bounds() {
   for (const gate of HEADER.gates) {
     points.push(...outlineOf(gate, 1.24));
   }
+  const corners = values(HEADER.obstacles.triangles);
+  for (let k = 0; k < corners.length; k += 9) points.push(vector(corners.subarray(k, k + 3)));
   const [lower, upper] = [points[0].clone(), points[0].clone()];
   for (const point of points) (lower.min(point), upper.max(point));
   lower.subScalar(0.5 * SPAN);

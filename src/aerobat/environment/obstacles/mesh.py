@@ -1,0 +1,77 @@
+"""Obstacles from mesh files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from aerobat.declaration import Angle, FieldError, Label, Vector3, number, shown, within_field
+from aerobat.documents import file_name
+from aerobat.environment.obstacles.attitude import ATTITUDE, angles_in_degrees, angles_in_radians, axes_of
+from aerobat.environment.obstacles.convex_piece import ConvexPiece
+from aerobat.environment.obstacles.mesh_file import mesh_parts
+from aerobat.environment.obstacles.obstacle import Obstacle, obstacle
+from aerobat.environment.obstacles.shapes import Points
+
+
+def _scale(value: Any) -> float:
+    scale = number(value, "scale")
+    if scale <= 0.0:
+        raise FieldError("scale", f"must be positive, got {shown(value)}")
+    return scale
+
+
+@obstacle("mesh")
+class Mesh(Obstacle):
+    """A solid of convex parts, as a mesh file has them.
+
+    A problem's file names the mesh file. Plans and runs hold the parts themselves, so that they stay as they
+    were, whatever becomes of the mesh file.
+    """
+
+    parts: tuple[Points, ...]  # [m] the corners of each convex part, in the mesh's own axes
+    position: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m] where the mesh's origin stands
+    heading: Angle = 0.0  # [rad] of the mesh's x axis, from x toward y
+    elevation: Angle = 0.0  # [rad] climb of that axis
+    tilt: Angle = 0.0  # [rad] roll about that axis, right-handed
+    name: Label = "mesh"  # by which findings name it
+
+    SHORTHANDS: ClassVar[Mapping[str, str]] = {
+        "file": "an STL, OBJ, PLY, GLB or glTF file, from the problem's folder, instead of `parts`",
+        "scale": "[m] the length of the file's unit (1)",
+        **ATTITUDE,
+    }
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """Replace the angles in degrees, and the file by its parts."""
+        table = angles_in_radians(table)
+        if "file" in table:
+            if "parts" in table:
+                raise FieldError("file", "stands beside parts; give one or the other")
+            scale = _scale(table.pop("scale", 1.0))
+            with within_field("file"):
+                table["parts"] = mesh_parts(file_name(table.pop("file")), scale)
+        elif "scale" in table:
+            raise FieldError("scale", "is of a file; give file, or leave it out")
+        elif "parts" not in table:
+            raise FieldError("file", "is missing; add it, or parts")
+        return table
+
+    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write the angles in degrees where those say exactly the same."""
+        return angles_in_degrees(table)
+
+    def __post_init__(self) -> None:
+        """Check."""
+        if not self.parts:
+            raise FieldError("parts", "must be one part or more")
+
+    @property
+    def pieces(self) -> tuple[ConvexPiece, ...]:
+        """The parts."""
+        axes = axes_of(self.heading, self.elevation, self.tilt)
+        return tuple(ConvexPiece(self.position + part @ axes.T, name=self.name) for part in self.parts)

@@ -1,0 +1,196 @@
+"""The surface of a convex piece as flat faces, as pictures, exports and other engines take it.
+
+Corners and edges of the hull are exact. A rounding is sampled on its ellipsoid, so that faces lie inside what
+is round, by at most `flattening`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.environment.obstacles.convex_piece import ConvexPiece
+
+FACETS = 24  # around what is round: a turn of 15° from each to the next
+SHARP = np.cos(np.deg2rad(20.0))  # of the angle between two faces: those of what is round meet at less
+PLANES_ALIKE = 5  # decimals to which the planes of triangles of one face agree
+THIN = 1e-4  # [m] the half thickness that a flat piece is given
+TINY = 1e-9  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Flat convex faces in the world, and the lines at which they meet sharply."""
+
+    name: str  # of the obstacle
+    faces: tuple[Array, ...]  # corners of each [m], anticlockwise from outside, (k, 3)
+    edges: Array  # [m] the ends of the sharp edges, (n, 2, 3)
+
+    @property
+    def points(self) -> Array:
+        """The corners of all faces [m], (n, 3)."""
+        return np.concatenate([*self.faces, np.zeros((0, 3))])
+
+    @cached_property
+    def triangles(self) -> Array:
+        """The faces as triangles [m], (n, 3, 3)."""
+        fans = [
+            np.stack([np.broadcast_to(face[0], (len(face) - 2, 3)), face[1:-1], face[2:]], axis=1)
+            for face in self.faces
+        ]
+        return np.concatenate([*fans, np.zeros((0, 3, 3))])
+
+    def within(self, lower: Array, upper: Array) -> Surface:
+        """Return what of it lies in a box, open where the box cuts it.
+
+        Args:
+            lower: The box's lower corner [m], (3,).
+            upper: Its upper corner [m], (3,).
+        """
+        points = self.points
+        if len(points) and (points >= lower).all() and (points <= upper).all():
+            return self
+        faces = (clipped(face, lower, upper) for face in self.faces)
+        lines = [clipped(edge, lower, upper) for edge in self.edges]
+        edges = [line for line in lines if len(line) > 1]
+        kept = tuple(face for face in faces if len(face) > 2)
+        return Surface(self.name, kept, np.array(edges).reshape(-1, 2, 3))
+
+
+def surface_of(piece: ConvexPiece, facets: int = FACETS) -> Surface:
+    """Return the surface of a convex piece.
+
+    Args:
+        piece: In the world.
+        facets: How many there are around what is round, a multiple of four.
+    """
+    points = (piece.points[:, None] + _rounding(piece, facets)).reshape(-1, 3)
+    faces = _faces(points)
+    return Surface(piece.name, faces, _sharp_edges(faces))
+
+
+def flattening(piece: ConvexPiece, facets: int = FACETS) -> float:
+    """Return how far [m] the surface lies inside the piece at most, where it is round."""
+    _, sizes, rank = _axes(piece.rounding)
+    return float(sizes[0]) * (1.0 - _depth(rank, facets)) if rank else 0.0
+
+
+def _axes(rounding: Array) -> tuple[Array, Array, int]:
+    """The axes (3, 3) and semi-axes [m] (3,) of a rounding's ellipsoid, and how many are not zero."""
+    axes, sizes, _ = np.linalg.svd(rounding)
+    return axes, sizes, int(np.sum(sizes > TINY))
+
+
+def _rounding(piece: ConvexPiece, facets: int) -> Array:
+    """Points on the ellipsoid that rounds a piece [m], (n, 3)."""
+    axes, sizes, rank = _axes(piece.rounding)
+    directions = _directions(rank, facets)
+    if rank == 3:  # the equator is where a tube along the piece is widest
+        along = np.linalg.svd(piece.points - piece.points.mean(axis=0))[2][0]
+        pole = (axes.T @ along) / sizes
+        turn = so3.smallest_rotation(so3.UP, pole / np.linalg.norm(pole))
+        directions = so3.rotate(turn, directions)
+    return np.asarray((directions * sizes[:rank]) @ axes[:, :rank].T)
+
+
+@cache
+def _directions(dimensions: int, facets: int) -> Array:
+    """Unit vectors of a space of so many dimensions, evenly around, (n, dimensions)."""
+    turn = 2.0 * np.pi * np.arange(facets) / facets
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    if dimensions < 2:
+        return np.array([[1.0], [-1.0]]) if dimensions else np.zeros((1, 0))
+    if dimensions == 2:
+        return circle
+    rings = [np.column_stack([c * circle, np.full(facets, s)]) for c, s in _latitudes(facets)]
+    return np.concatenate([*rings, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
+
+
+def _latitudes(facets: int) -> Array:
+    """The cosines and sines of the latitudes of rings, poles left out, (facets / 2 - 1, 2)."""
+    latitude = np.pi * (np.arange(1, facets // 2) / (facets // 2) - 0.5)
+    return np.stack([np.cos(latitude), np.sin(latitude)], axis=-1)
+
+
+@cache
+def _depth(dimensions: int, facets: int) -> float:
+    """How far the hull of such unit vectors reaches everywhere."""
+    from scipy.spatial import ConvexHull
+
+    if dimensions < 2:
+        return 1.0
+    return float(-ConvexHull(_directions(dimensions, facets)).equations[:, -1].max())
+
+
+def _faces(points: Array) -> tuple[Array, ...]:
+    """The faces of the hull of points, those of one plane as one."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(points)
+    except QhullError:  # a plate: given a thickness
+        thick = THIN * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+        hull = ConvexHull((points[:, None] + thick).reshape(-1, 3))
+    scale = np.append(np.ones(3), 1.0 / max(float(np.ptp(hull.points, axis=0).max()), TINY))
+    planes = np.round(hull.equations * scale, PLANES_ALIKE) + 0.0
+    _, groups = np.unique(planes, axis=0, return_inverse=True)
+    order = np.argsort(groups.ravel(), kind="stable")
+    starts = np.flatnonzero(np.diff(groups.ravel()[order])) + 1
+    return tuple(
+        _around(hull.points[np.unique(hull.simplices[rows])], hull.equations[rows[0], :3])
+        for rows in np.split(order, starts)
+    )
+
+
+def _around(corners: Array, normal: Array) -> Array:
+    """The corners of a face, anticlockwise about its normal, (k, 3)."""
+    spokes = corners - corners.mean(axis=0)
+    first = spokes[0] / np.linalg.norm(spokes[0])
+    second = np.cross(normal, first)
+    return np.asarray(corners[np.argsort(np.arctan2(spokes @ second, spokes @ first), kind="stable")])
+
+
+def _sharp_edges(faces: Sequence[Array]) -> Array:
+    """The ends of the edges whose two faces are at a sharp angle, (n, 2, 3)."""
+    normals: dict[frozenset[tuple[float, ...]], list[Array]] = {}
+    ends: dict[frozenset[tuple[float, ...]], Array] = {}
+    for face in faces:
+        normal = np.cross(face[1] - face[0], face[2] - face[0])
+        normal /= max(float(np.linalg.norm(normal)), TINY**2)
+        for a, b in pairwise([*face, face[0]]):
+            key = frozenset([tuple(a.tolist()), tuple(b.tolist())])
+            normals.setdefault(key, []).append(normal)
+            ends[key] = np.array([a, b])
+    sharp = [ends[k] for k, (n, *others) in normals.items() if all(n @ other < SHARP for other in others)]
+    return np.array(sharp).reshape(-1, 2, 3)
+
+
+def clipped(corners: Array, lower: Array, upper: Array) -> Array:
+    """Return what of a convex polygon, or of a line, lies in a box, (k, 3): Sutherland and Hodgman's way."""
+    for axis in range(3):
+        for sign, level in ((1.0, lower[axis]), (-1.0, -upper[axis])):
+            if not len(corners):
+                return corners
+            corners = beyond(corners, sign * corners[:, axis] - level)
+    return corners
+
+
+def beyond(corners: Array, height: Array) -> Array:
+    """Return the part of a convex polygon, or of a line, where heights (k,) at its corners are from 0 on."""
+    if (height >= 0.0).all():
+        return corners
+    kept: list[Array] = []
+    for k, corner in enumerate(corners):
+        last = k - 1
+        is_side = k > 0 or len(corners) > 2  # a line has one
+        if is_side and (height[k] >= 0.0) != (height[last] >= 0.0):
+            kept.append(corners[last] + height[last] / (height[last] - height[k]) * (corner - corners[last]))
+        if height[k] >= 0.0:
+            kept.append(corner)
+    return np.array(kept).reshape(-1, 3)
