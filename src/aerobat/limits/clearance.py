@@ -9,7 +9,6 @@ nearer to the piece than that.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from math import inf
 from typing import NamedTuple
 
@@ -72,10 +71,24 @@ class Clearance:
         normals[rows, ranks], offsets[rows, ranks] = found.normals[order], found.offsets[order]
         return Planes(normals, offsets)
 
-    @cached_property
-    def reach(self) -> float:
-        """How far the body reaches, in whichever direction [m]."""
-        return self.body.revolved.reach
+    def least(self, positions: Array, thrusts: Array) -> tuple[list[float], list[str]]:
+        """Return the clearance [m] from the nearest piece at each place, infinite far away, and its name.
+
+        Args:
+            positions: Of the centre of mass [m], (m, 3).
+            thrusts: Along the thrust axis there, of any length, (m, 3).
+        """
+        axes = thrusts / np.linalg.norm(thrusts, axis=-1, keepdims=True)
+        revolved = self.body.revolved
+        offset, shapes = revolved.turned(axes)
+        centres = positions + offset
+        bodies, numbers = self.pieces.near(centres, revolved.reach, AWAY)
+        gaps = self.pieces.separated(numbers, centres[bodies], shapes[bodies]).gaps - revolved.aside
+        least, names = [inf] * len(positions), [""] * len(positions)
+        for body, number, gap in zip(bodies.tolist(), numbers.tolist(), gaps.tolist(), strict=True):
+            if gap < least[body]:
+                least[body], names[body] = gap, self.pieces.pieces[number].name
+        return least, names
 
 
 def left_between(

@@ -13,6 +13,8 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.errors import Reason, SpecError
+from aerobat.flatness import force_balance
+from aerobat.limits.clearance import Clearance
 from aerobat.problem.gate import Gate
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
@@ -76,6 +78,31 @@ def require_openings(problem: Problem, vehicle: Vehicle) -> None:
     for stage in problem.stages(vehicle.max_specific_thrust).stages:
         if stage.gate is not None:
             _require(problem.gate(stage.gate), stage, vehicle)
+
+
+def require_clear_ends(problem: Problem, vehicle: Vehicle | None) -> None:
+    """Refuse ends where the body is in an obstacle, and obstacles where no vehicle says how large it is.
+
+    Raises SpecError, which names the end and by how much it reaches in.
+    """
+    environment = problem.surroundings
+    if not environment.obstacles:
+        return
+    if vehicle is None:
+        raise SpecError(
+            f"'{problem.name}' has obstacles, which the body of a vehicle keeps clear of; give --vehicle"
+        )
+    ends = problem.ends
+    positions = np.array([state.position for state in ends.values()]).reshape(-1, 3)
+    balance = force_balance(environment, vehicle)
+    thrusts = [balance.specific_thrust(state.velocity, state.acceleration) for state in ends.values()]
+    clearance = Clearance(environment.pieces, vehicle.bounding_ellipsoid)
+    for end, left, name in zip(ends, *clearance.least(positions, np.array(thrusts)), strict=True):
+        if left < 0.0:
+            raise SpecError(
+                f"{end}.position: the body of {vehicle.name} reaches {length(-left)} into '{name}' there; "
+                "move one of them"
+            )
 
 
 def _require(gate: Gate, stage: Stage, vehicle: Vehicle) -> None:

@@ -21,7 +21,7 @@ from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.courses import is_course, on_open_courses
 from aerobat.planning.holds import between_holds
-from aerobat.planning.passages import require_openings
+from aerobat.planning.passages import require_clear_ends, require_openings
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import FLYING_RESERVE, Plan, flying_reserve
 from aerobat.problem import Problem, as_problem
@@ -89,6 +89,7 @@ def plan(
         vehicle.require_hover(problem.environment.gravity)
         require_openings(problem, vehicle)
         _require_consistency(problem, vehicle)
+    require_clear_ends(problem, vehicle)
     method = planner_for(problem, vehicle) if planner is None else as_planner(planner)
     found: Any = method.plan(problem, vehicle, progress)
     if not isinstance(found, Plan):

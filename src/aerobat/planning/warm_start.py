@@ -21,6 +21,11 @@ from aerobat.vehicle import Vehicle
 PLANARITY_TOLERANCE = 1e-6  # of its extent: how far a path may leave a plane and still be in it
 # of a limit's range, kept from either of its ends for the controller
 Reserve = Annotated[float, Field(ge=0, lt=0.5)]
+Clearance = Annotated[float, Field(ge=0)]  # [m] kept from obstacles for the controller
+CLEARANCE = (
+    "The distance in metres that the body keeps from obstacles for the controller, less where a passage is "
+    "narrow."
+)
 MIN_INTERVALS = 4  # of a phase of a motion that is collocated
 
 

@@ -35,16 +35,17 @@ class _Rough:
         return self.path.path.trajectory.duration
 
 
-def fastest_around(refinement: Refinement, segments: int) -> Around | None:
+def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -> Around | None:
     """Return the fastest certified path that is found along routes around obstacles; None where none is.
 
     Args:
         refinement: Of a task with obstacles.
         segments: Of a path, at least.
+        count: Of the routes that are tried at once.
     """
     rough: list[_Rough] = []
-    tried = _refined_roughly(refinement, segments)
-    while batch := list(islice(tried, ROUTES)):
+    tried = _refined_roughly(refinement, segments, count)
+    while batch := list(islice(tried, count)):
         rough += filter(None, batch)
         rough.sort(key=lambda each: each.duration)
         while rough and not out_of_time():
@@ -55,10 +56,10 @@ def fastest_around(refinement: Refinement, segments: int) -> Around | None:
     return None
 
 
-def _refined_roughly(refinement: Refinement, segments: int) -> Iterator[_Rough | None]:
+def _refined_roughly(refinement: Refinement, segments: int, routes: int) -> Iterator[_Rough | None]:
     """Yield the rough path of every guess, None where it is lost or far behind one before."""
     shortest = inf
-    for guess in guesses(refinement.task):
+    for guess in guesses(refinement.task, routes):
         own = replace(refinement, task=guess.task)
         count = min(max(segments, guess.path.trajectory.segments), MAX_SEGMENTS)
         path = own.rough(_begun(refinement, guess, count), count, shortest)

@@ -42,7 +42,7 @@ class Guess(NamedTuple):
     )  # that is refined first: without walls that the body passes on its side, but turned so
 
 
-def guesses(task: Task) -> Iterator[Guess]:
+def guesses(task: Task, count: int = ROUTES) -> Iterator[Guess]:
     """Yield paths through a task's stages around obstacles, on different sides of them, at several paces.
 
     None where some stage does not say where it is, or there is no way: then only refinement moves a path off
@@ -50,6 +50,7 @@ def guesses(task: Task) -> Iterator[Guess]:
 
     Args:
         task: With a vehicle and obstacles.
+        count: Of the routes, at most.
     """
     places = _places(task)
     if places is None or not task.problem.ends:
@@ -62,7 +63,7 @@ def guesses(task: Task) -> Iterator[Guess]:
     walls = [gate for gate in (_in_wall(task, stage) for stage in task.stages.stages) if gate is not None]
     narrowest = min([ends, *(gate.opening.inradius for gate in walls)])
     body = task.vehicle.bounding_ellipsoid.revolved
-    found = list(_different(routes(grid, legs, ROUTES)))
+    found = list(_different(routes(grid, legs, count)))
     for turned, pace in product(_turned(task), PACES):
         for route in found:
             room = min(narrowest, route.clearance) - min(body.wide, body.high)

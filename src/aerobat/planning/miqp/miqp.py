@@ -25,11 +25,11 @@ from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
-from aerobat.planning.result import FLYING_RESERVE, Plan
+from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
 from aerobat.planning.search import GridSearch, Search
 from aerobat.planning.task import Task
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.planning.warm_start import Reserve
+from aerobat.planning.warm_start import CLEARANCE, Clearance, Reserve
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
@@ -66,6 +66,7 @@ class Miqp(Planner):
         "up where no plan keeps it.",
         command_default=FLYING_RESERVE,
     )
+    clearance: Clearance = option(0.0, CLEARANCE, command_default=FLYING_CLEARANCE)  # [m]
     rescue: bool = option(
         True, "Give up where nothing is found, and try no other intervals, order or planner.", off="no-rescue"
     )
@@ -106,7 +107,9 @@ class Miqp(Planner):
 
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = default_order(problem, vehicle) if self.order is None else self.order
-        formulation = formulate(Task.of(problem, vehicle, self.reserve), order, self.intervals)
+        formulation = formulate(
+            Task.of(problem, vehicle, self.reserve, self.clearance), order, self.intervals
+        )
         attempts = Attempts(formulation, solver(self.backend), recorder)
         if vehicle is None or self.search is not None:
             found = (self.search or GridSearch()).smallest(partial(_attempt, attempts))

@@ -29,7 +29,7 @@ from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
 from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.planning.warm_start import Reserve, WarmStart, flown_task
+from aerobat.planning.warm_start import CLEARANCE, Clearance, Reserve, WarmStart, flown_task
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -46,7 +46,7 @@ class FreeKnots(Planner):
     their limits by their commands, their thrusts continuous. At the ends the body does not turn, but its
     thrust may be changing, so that there is jerk along it, unless `still_ends` asks for none. A `reserve`, a
     fraction of the range of rotors and body rate, is kept from either end for the controller, proven of
-    rotors.
+    rotors. Around obstacles they begin from routes on several sides, and keep a `clearance` from them.
     """
 
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(
@@ -62,12 +62,7 @@ class FreeKnots(Planner):
         "with 0 a plan of four segments or more leaves it next to nothing.",
         command_default=FLYING_RESERVE,
     )
-    clearance: NonNegative = option(  # [m]
-        0.0,
-        "The distance in metres that the body keeps from obstacles for the controller, less where a passage "
-        "is narrow.",
-        command_default=FLYING_CLEARANCE,
-    )
+    clearance: Clearance = option(0.0, CLEARANCE, command_default=FLYING_CLEARANCE)  # [m]
     time_limit: NonNegative | None = option(None, TIME_LIMIT)  # [s]
     COMPARED: ClassVar[tuple[dict[str, int], ...]] = ({"segments": 4}, {"segments": 8})
 
