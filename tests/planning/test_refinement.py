@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerobat.environment import Box, Cylinder, Environment
 from aerobat.planning import Miqp
 from aerobat.planning.gate_clearance import bodies_in_gates
 from aerobat.planning.polynomial.knots import start_along_normals
@@ -58,8 +59,20 @@ MOVING = replace(
     goal=replace(COURSE.goal, free_velocity=True),
 )
 
+WALLED = replace(
+    COURSE,
+    environment=Environment(
+        obstacles=(
+            Cylinder(
+                start=COURSE.gates[0].position + np.array([0.5, 0.8, -1.0]), end=(0.5, 0.8, 4), radius=0.2
+            ),
+            Box(position=COURSE.gates[-1].position + np.array([0.7, 0.0, 0.3]), size=(0.3, 0.4, 0.5)),
+        )
+    ),
+)
 
-@pytest.mark.parametrize("problem", [COURSE, MOVING], ids=["rest", "moving"])
+
+@pytest.mark.parametrize("problem", [COURSE, MOVING, WALLED], ids=["rest", "moving", "walled"])
 @pytest.mark.parametrize("lag", [0.0, 0.02])
 def test_slopes_and_second_derivatives_are_differences(problem: Problem, lag: float) -> None:
     dragged = replace(with_lags(QUAD, lag), drag_body=np.array([0.2, 0.2, 0.1]))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 from math import inf
 
 from aerobat.optimization.deadline import out_of_time
@@ -41,31 +40,30 @@ def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -
     Args:
         refinement: Of a task with obstacles.
         segments: Of a path, at least.
-        count: Of the routes that are tried at once.
+        count: Of the routes, at most.
     """
-    rough: list[_Rough] = []
-    tried = _refined_roughly(refinement, segments, count)
-    while batch := list(islice(tried, count)):
-        rough += filter(None, batch)
-        rough.sort(key=lambda each: each.duration)
-        while rough and not out_of_time():
-            best = rough.pop(0)
-            judged = best.refinement.finished(best.path)
+    for batch in guesses(refinement.task, count):
+        for found in sorted(_refined_roughly(refinement, segments, batch), key=lambda each: each.duration):
+            judged = found.refinement.finished(found.path)
             if judged.feasible:
-                return Around(best.refinement, judged)
+                return Around(found.refinement, judged)
+        if out_of_time():
+            break
     return None
 
 
-def _refined_roughly(refinement: Refinement, segments: int, routes: int) -> Iterator[_Rough | None]:
-    """Yield the rough path of every guess, None where it is lost or far behind one before."""
+def _refined_roughly(refinement: Refinement, segments: int, batch: Sequence[Guess]) -> Iterator[_Rough]:
+    """Yield the rough paths of guesses, without those that are lost or far behind one before."""
     shortest = inf
-    for guess in guesses(refinement.task, routes):
+    for guess in batch:
         own = replace(refinement, task=guess.task)
         count = min(max(segments, guess.path.trajectory.segments), MAX_SEGMENTS)
         path = own.rough(_begun(refinement, guess, count), count, shortest)
-        found = _Rough(own, path) if own.is_promising(path) else None
-        shortest = min(shortest, inf if found is None else found.duration)
-        yield found
+        if own.is_promising(path):
+            yield _Rough(own, path)
+            shortest = min(shortest, path.path.trajectory.duration)
+        if out_of_time():
+            return
 
 
 def _begun(refinement: Refinement, guess: Guess, segments: int) -> WarmStart:

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.around.grid import Grid
 from aerobat.planning.around.routes import Leg, Route, routes
 from aerobat.planning.polynomial.knots import start_along_normals
@@ -42,8 +41,10 @@ class Guess(NamedTuple):
     )  # that is refined first: without walls that the body passes on its side, but turned so
 
 
-def guesses(task: Task, count: int = ROUTES) -> Iterator[Guess]:
-    """Yield paths through a task's stages around obstacles, on different sides of them, at several paces.
+def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
+    """Yield paths through a task's stages around obstacles, those on different sides of them together.
+
+    First at the pace that leads on most often, then at others, turned one way in slits, then the other.
 
     None where some stage does not say where it is, or there is no way: then only refinement moves a path off
     obstacles.
@@ -64,15 +65,15 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[Guess]:
     narrowest = min([ends, *(gate.opening.inradius for gate in walls)])
     body = task.vehicle.bounding_ellipsoid.revolved
     found = list(_different(routes(grid, legs, count)))
-    for turned, pace in product(_turned(task), PACES):
+    for turned, pace in product(_turned(task) if found else (), PACES):
+        paths = []
         for route in found:
             room = min(narrowest, route.clearance) - min(body.wide, body.high)
             clearance = min(task.clearance, max(SHARE * room, LEAST_CLEARANCE))
             path = _along(turned or task, route.legs).time_scaled(pace)
             own = replace(task, clearance=clearance)
-            yield Guess(path, own, None if turned is None else replace(turned, clearance=clearance))
-            if out_of_time():
-                return
+            paths.append(Guess(path, own, None if turned is None else replace(turned, clearance=clearance)))
+        yield paths
 
 
 def _different(found: Iterable[Route]) -> Iterator[Route]:

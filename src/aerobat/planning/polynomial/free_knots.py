@@ -16,6 +16,7 @@ from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.errors import Infeasible, Reason, limits_of
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.around.fastest import fastest_around
+from aerobat.planning.around.guesses import guesses
 from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.certified_solve import Judged
@@ -86,9 +87,11 @@ class FreeKnots(Planner):
             if out_of_time():
                 raise too_short(problem, self.time_limit, recorder.attempts)
         last = recorder.attempts[-1].outcome if recorder.attempts else "no path to begin from was found"
+        is_closed = len(task.environment.pieces) and next(guesses(task), None) is None
+        where = "between obstacles no way was found, and " if is_closed else ""
         sentence = (
-            f"no polynomials are certified to fly '{problem.name}' with {task.vehicle.name}: at the last "
-            f"attempt {last}; widen what binds there, or give other --segments"
+            f"no polynomials are certified to fly '{problem.name}' with {task.vehicle.name}: "
+            f"{where}at the last attempt {last}; widen what binds there, or give other --segments"
         )
         raise Infeasible(Reason(sentence, limits_of(last)), recorder.attempts)
 
