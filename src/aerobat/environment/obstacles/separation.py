@@ -5,8 +5,9 @@ it and a piece across planes with the normal n is φ(n) = n·c − |Lᵀ n| − 
 maximum over all n is the distance, where that is positive; where body and piece overlap it is how far they
 have to be moved apart, negative. The gap of any n is a lower bound of the distance, however n was found.
 
-It is found by Newton's method on the sphere. The hull's kinks are smoothed, max n·v → τ log Σ exp(n·v/τ),
-with τ falling to far less than a millimetre. Where the hull's own faces have a larger gap, they are taken.
+It is found by Newton's method on the sphere. Kinks are smoothed: of the hull, max n·v → τ log Σ exp(n·v/τ),
+and of flat roundings, |Lᵀ n| → √(|Lᵀ n|² + τ²), with τ falling to far less than a millimetre. Where a normal
+that the method begins at has a larger gap, it is taken.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ SMOOTHINGS = 2.0 ** -np.arange(20)
 ROUNDEST = 0.1  # [m] τ at first: the last is a ten millionth of a metre
 STEPS = 3  # of Newton's method in a round
 LONGEST_STEP = 0.5  # [rad]
-HALVINGS = 4  # of a step that leads to less
+HALVINGS = 16  # of a step that leads to less: kinks that are hardly smoothed are missed by long ones
+LEAST_GAIN = 1e-10  # [m] that a step is worth taking for
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +56,14 @@ class Pieces:
             reach: Of a body from its centre in whichever direction, at most [m].
             within: The distance [m] between body and piece from which on a pair is left out.
         """
-        lower, upper = self._boxes
-        points = centres[:, None]
-        beyond = np.maximum(np.maximum(lower - points, points - upper), 0.0)
-        away = np.linalg.norm(beyond, axis=-1)
-        bodies, pieces = np.nonzero(away < reach + within)
+        bodies, pieces = np.nonzero(self.box_distances(centres) < reach + within)
         return bodies, pieces
+
+    def box_distances(self, points: Array) -> Array:
+        """Return the distances [m] of points (m, 3) from the boxes around all pieces, (m, P)."""
+        lower, upper = self._boxes
+        beyond = np.maximum(np.maximum(lower - points[:, None], points[:, None] - upper), 0.0)
+        return np.asarray(np.linalg.norm(beyond, axis=-1))
 
     def holding(self, point: Array) -> ConvexPiece | None:
         """Return a piece that a point [m] (3,) lies in; None where it lies in none."""
@@ -99,6 +103,11 @@ class Pieces:
         return np.asarray(np.min(found, axis=0)) if found else np.full(len(points), inf)
 
     @cached_property
+    def largest(self) -> float:
+        """The largest magnitude of any piece's coordinates [m], at most: what rounding is a part of."""
+        return float(np.abs(self._boxes).max(initial=0.0))
+
+    @cached_property
     def _points(self) -> Array:
         """The points of every piece, the first of them repeated where it has fewer than others, (P, V, 3)."""
         return _padded([piece.points for piece in self.pieces])
@@ -122,7 +131,7 @@ class _Pairs:
     roundings: Array  # L of the pieces [m], (m, 3, 3)
     shapes: Array  # L of the bodies [m], (m, 3, 3)
 
-    def __getitem__(self, rows: Mask) -> _Pairs:
+    def __getitem__(self, rows: Mask | Indices) -> _Pairs:
         return _Pairs(self.offsets[rows], self.roundings[rows], self.shapes[rows])
 
     def gaps(self, normals: Array) -> Array:
@@ -156,15 +165,14 @@ class _Pairs:
         step = np.linalg.solve(bend, (tangent @ gradient[..., None]))[..., 0]
         length = np.linalg.norm(step, axis=-1, keepdims=True)
         step *= np.minimum(1.0, LONGEST_STEP / np.maximum(length, TINY))
-        better = normals
-        pending = np.ones(len(normals), dtype=bool)
+        better, pending = normals.copy(), np.flatnonzero(np.sum(gradient * step, axis=-1) > LEAST_GAIN)
         for halving in range(HALVINGS):
-            tried = normals + 0.5**halving * step
+            tried = normals[pending] + 0.5**halving * step[pending]
             tried /= np.linalg.norm(tried, axis=-1, keepdims=True)
-            gains = pending & (self._value(tried, smoothing) > value)
-            better = np.where(gains[:, None], tried, better)
-            pending &= ~gains
-            if not pending.any():
+            gains = self[pending]._value(tried, smoothing) > value[pending]
+            better[pending[gains]] = tried[gains]
+            pending = pending[~gains]
+            if not len(pending):
                 break
         return better
 
@@ -173,8 +181,8 @@ class _Pairs:
         exponents = -_times(self.offsets, normals) / smoothing
         largest = exponents.max(axis=-1)
         log_sum = largest + np.log(np.exp(exponents - largest[:, None]).sum(axis=-1))
-        rounded = np.linalg.norm(_times(np.swapaxes(self.roundings, 1, 2), normals), axis=-1)
-        return np.asarray(-smoothing * log_sum - rounded - self.extents(normals))
+        extents = [_smoothed_extents(root, normals, smoothing) for root in (self.roundings, self.shapes)]
+        return np.asarray(-smoothing * log_sum - sum(extents))
 
     def _smoothed(self, normals: Array, smoothing: float) -> tuple[Array, Array, Array]:
         """The smoothed gaps, their slopes (m, 3) and second derivatives (m, 3, 3)."""
@@ -187,7 +195,7 @@ class _Pairs:
         curvature = -np.swapaxes(weights[..., None] * spread, 1, 2) @ spread / smoothing
         for root in (self.roundings, self.shapes):
             square = root @ np.swapaxes(root, 1, 2)
-            reach = np.linalg.norm(_times(np.swapaxes(root, 1, 2), normals), axis=-1) + TINY
+            reach = _smoothed_extents(root, normals, smoothing)
             touching = _times(square, normals) / reach[:, None]
             gradient = gradient - touching
             flat = square - touching[:, :, None] * touching[:, None]
@@ -203,6 +211,12 @@ def _best_of(piece: ConvexPiece, centres: Array, shapes: Array) -> Array:
     roundings = np.broadcast_to(piece.rounding, (len(centres), 3, 3))
     best = np.argmax(_Pairs(offsets, roundings, shapes).gaps(candidates), axis=1)
     return np.asarray(np.take_along_axis(candidates, best[:, None, None], axis=1)[:, 0])
+
+
+def _smoothed_extents(roots: Array, normals: Array, smoothing: float) -> Array:
+    """How far all L y with |y| ≤ 1 reach [m] along normals, without the kink that flat ones have, (m,)."""
+    reach = np.linalg.norm(_times(np.swapaxes(roots, 1, 2), normals), axis=-1)
+    return np.asarray(np.hypot(reach, smoothing))
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
