@@ -66,8 +66,8 @@ def certify(
     Quantities are those of `flatness.reference`: the thrust of every rotor and their
     sum, tilt, body rate, moment and speed, per axis what `envelope.limits` bounds, and what
     `envelope.conditions` do; of a rotor with lag the command too, and what `envelope.passages` ask at their
-    instants. Bounds are proven
-    over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's range (1e-5 after
+    instants; among obstacles the clearance of the whole body, in all angles about its thrust axis at once.
+    Bounds are proven over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's range (1e-5 after
     tens of seconds, and of a command) stays undecided. So does all that needs an attitude where thrust, and
     with it the attitude, is undetermined. Speed and what `envelope.limits` and `envelope.conditions` bound
     may meet their limits exactly (`path.kinematics.LIMIT_TOLERANCE`).
@@ -79,8 +79,8 @@ def certify(
             its problem asks beside is proven in `plan.certificate`.
         vehicle: What flies it, or its name, by default the plan's; its rotors' limits [N] and its body rate's
             [rad/s] are those that count.
-        environment: Gravity and wind, by default the plan's, else those of a calm day on Earth. Drag acts on
-            the velocity relative to the wind; speed and its limit are relative to the ground.
+        environment: Gravity, wind and obstacles, by default the plan's, else those of a calm day on Earth.
+            Drag acts on the velocity relative to the wind; speed and its limit are relative to the ground.
         envelope: What else it shall stay within, by default nothing.
     """
     envelope = Envelope() if envelope is None else envelope
