@@ -56,14 +56,14 @@ def test_a_path_with_one_number_far_too_large_takes_no_more_intervals_than_other
     times = np.arange(0.0, path.duration, 0.05)
     rows = np.stack([path.evaluate(times, derivative) for derivative in range(4)], axis=1)
     rows[30, 0, 0] *= 1e4
-    first, whole = [], extrema._parabola
+    first, whole = [], extrema.parabola_maximum
 
     def parabola(coefficients, flat):
         first.append(len(coefficients))
         assert len(coefficients) <= 2 * (MAX_OPEN + first[0])
         return whole(coefficients, flat)
 
-    monkeypatch.setattr(extrema, "_parabola", parabola)
+    monkeypatch.setattr(extrema, "parabola_maximum", parabola)
     mistyped = PathRows(rows, np.diff(times)).trajectory
     assert not certify(mistyped, load_vehicle("agile-quad")).certified
 

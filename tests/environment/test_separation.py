@@ -1,11 +1,122 @@
-"""Separation of bodies from convex pieces: the gap is the distance, as the nearest points themselves show."""
+"""Bodies are separated from pieces by the best of all planes: as far apart as another library says."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment.obstacles import ConvexPiece, Pieces
+from fcl_peer import EXACT, distance, solid
+from random_obstacles import KINDS, random_obstacle
+from suites import examples
+
+COUNT = 100
+FINE = 1e-6  # [m] what our distances are good for
+
+kinds = st.sampled_from(KINDS)
+seeds = st.integers(0, 10**6)
+
+
+def random_body(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A centre, axes as columns and semi-axes, some flat as a coin, some as long as a stick."""
+    q = rng.normal(size=4)
+    return 1.5 * rng.normal(size=3), so3.axes(q / np.linalg.norm(q)), 10 ** rng.uniform(-1.5, -0.3, 3)
+
+
+def gap(piece: ConvexPiece, centre: np.ndarray, shape: np.ndarray) -> float:
+    return float(Pieces((piece,)).separated(np.zeros(1, dtype=int), centre[None], shape[None]).gaps[0])
+
+
+def moved(piece: ConvexPiece, turn: np.ndarray, shift: np.ndarray) -> ConvexPiece:
+    return ConvexPiece(piece.points @ turn.T + shift, turn @ piece.rounding)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_gap_is_the_distance_that_another_library_finds(kind):
+    rng = np.random.default_rng(KINDS.index(kind))
+    apart = 0
+    for _ in range(COUNT):
+        obstacle, (centre, axes, semi_axes) = random_obstacle(rng, kind, np.zeros(3), 0.5), random_body(rng)
+        found, exact = (
+            gap(obstacle.pieces[0], centre, axes * semi_axes),
+            distance(solid(obstacle), centre, axes, semi_axes),
+        )
+        assert (found > 0.0) == (exact > 0.0)
+        if found > 0.0:
+            assert found == pytest.approx(exact, abs=EXACT)
+            apart += 1
+    assert apart > COUNT / 4
+
+
+@examples(60)
+@given(kind=kinds, seed=seeds)
+def test_moving_and_turning_body_and_piece_together_changes_nothing(kind, seed):
+    rng = np.random.default_rng(seed)
+    piece, (centre, axes, semi_axes) = random_obstacle(rng, kind, np.zeros(3)).pieces[0], random_body(rng)
+    (shift, turn, _), shape = random_body(rng), axes * semi_axes
+    found = gap(piece, centre, shape)
+    again = gap(moved(piece, turn, shift), turn @ centre + shift, turn @ shape)
+    if found > 0.0:
+        assert again == pytest.approx(found, abs=FINE)
+    else:  # of several ways out of a piece another may be taken, never out of it
+        assert again < FINE
+
+
+@examples(60)
+@given(kind=kinds, seed=seeds)
+def test_no_other_plane_separates_better_and_the_plane_touches_the_piece(kind, seed):
+    rng = np.random.default_rng(seed)
+    piece, (centre, axes, semi_axes) = random_obstacle(rng, kind, np.zeros(3)).pieces[0], random_body(rng)
+    shape = axes * semi_axes
+    found = Pieces((piece,)).separated(np.zeros(1, dtype=int), centre[None], shape[None])
+    around = found.normals + rng.choice([1e-3, 1e-1, 1.0], (500, 1)) * rng.normal(size=(500, 3))
+    normals = np.concatenate([found.normals, around / np.linalg.norm(around, axis=1, keepdims=True)])
+    gaps = normals @ centre - np.linalg.norm(normals @ shape, axis=1) - piece.support(normals)
+    assert found.offsets[0] == pytest.approx(piece.support(found.normals)[0], abs=1e-9)
+    assert found.gaps[0] == pytest.approx(gaps[0], abs=1e-9)
+    if found.gaps[0] > 0.0:
+        assert gaps.max() <= found.gaps[0] + FINE
+
+
+@examples(60)
+@given(kind=kinds, seed=seeds)
+def test_a_body_about_a_point_of_the_piece_overlaps(kind, seed):
+    rng = np.random.default_rng(seed)
+    piece, (_, axes, semi_axes) = random_obstacle(rng, kind, np.zeros(3)).pieces[0], random_body(rng)
+    share = rng.dirichlet(np.ones(len(piece.points)))
+    inside, shape = share @ piece.points, axes * semi_axes
+    assert gap(piece, inside, shape) < 0.0
+    assert gap(piece, inside + shape @ so3.UP, shape) < FINE  # it touches with its tip
+
+
+@examples(30)
+@given(kind=kinds, seed=seeds)
+def test_pairs_do_not_know_one_another(kind, seed):
+    rng = np.random.default_rng(seed)
+    obstacles = [random_obstacle(rng, each, rng.normal(size=3)) for each in (kind, *KINDS)]
+    pieces = Pieces(tuple(piece for obstacle in obstacles for piece in obstacle.pieces))
+    bodies = [random_body(rng) for _ in pieces.pieces]
+    centres = np.array([body[0] for body in bodies])
+    shapes = np.array([axes * semi_axes for _, axes, semi_axes in bodies])
+    found = pieces.separated(np.arange(len(pieces)), centres, shapes)
+    alone = [gap(*each) for each in zip(pieces.pieces, centres, shapes, strict=True)]
+    apart = found.gaps > 0.0
+    assert found.gaps[apart] == pytest.approx(np.array(alone)[apart], abs=FINE)
+
+
+@given(seed=seeds)
+def test_boxes_around_pieces_are_no_farther_than_the_pieces(seed):
+    rng = np.random.default_rng(seed)
+    pieces = Pieces(tuple(random_obstacle(rng, kind, rng.normal(size=3)).pieces[0] for kind in KINDS))
+    points = 3.0 * rng.normal(size=(20, 3))
+    bodies, numbers = np.divmod(np.arange(20 * len(pieces)), len(pieces))
+    exact = pieces.separated(numbers, points[bodies], np.zeros((len(bodies), 3, 3))).gaps
+    assert (pieces.apart(points, points).ravel() <= np.maximum(exact, 0.0) + FINE).all()
+    near = set(zip(*map(np.ndarray.tolist, pieces.near(points, 0.0, 0.5)), strict=True))
+    assert {(int(b), int(n)) for b, n, far in zip(bodies, numbers, exact, strict=True) if far < 0.49} <= near
+
 
 ALONG = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 RING = np.column_stack([np.cos(ALONG), np.sin(ALONG), 0.0 * ALONG])

@@ -51,11 +51,13 @@ class Finding:
     field: str = ""  # of the vehicle or the problem, that the limit comes from: "max_thrust", "limits.jerk"
     size: float | None = None  # of the range between its limits, of which reserves are fractions
     end: Literal["start", "goal"] | None = None  # of the path, at that time
+    obstacle: str | None = None  # nearest to the body at that time
 
     @property
     def name(self) -> str:
-        """The quantity in words, with its rotor."""
-        return quantity_name(self.quantity, self.rotor)
+        """The quantity in words, with its rotor or its obstacle."""
+        name = quantity_name(self.quantity, self.rotor)
+        return name if self.obstacle is None else f"{name} from '{self.obstacle}'"
 
     @property
     def place(self) -> str | None:

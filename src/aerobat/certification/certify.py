@@ -16,7 +16,9 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification import quantities
 from aerobat.certification.attitude import ThrustDirectionRates
+from aerobat.certification.body_path import BodyPath
 from aerobat.certification.certificate import Certificate, Finding, Side
+from aerobat.certification.clearance import clearance_finding
 from aerobat.certification.continuity import discontinuities, seam
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.interpolation_error import accuracy
@@ -46,6 +48,7 @@ from aerobat.problem import Condition, Quantity
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle
+from aerobat.vehicle.ellipsoid import Revolved
 
 INTERPOLATION_DEGREE = 20  # of interpolation
 TIGHTNESS = 1e-7  # of a rotor's range: how near the proven bounds are to what is reached
@@ -63,8 +66,8 @@ def certify(
     Quantities are those of `flatness.reference`: the thrust of every rotor and their
     sum, tilt, body rate, moment and speed, per axis what `envelope.limits` bounds, and what
     `envelope.conditions` do; of a rotor with lag the command too, and what `envelope.passages` ask at their
-    instants. Bounds are proven
-    over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's range (1e-5 after
+    instants; among obstacles the clearance of the whole body, in all angles about its thrust axis at once.
+    Bounds are proven over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's range (1e-5 after
     tens of seconds, and of a command) stays undecided. So does all that needs an attitude where thrust, and
     with it the attitude, is undetermined. Speed and what `envelope.limits` and `envelope.conditions` bound
     may meet their limits exactly (`path.kinematics.LIMIT_TOLERANCE`).
@@ -76,12 +79,13 @@ def certify(
             its problem asks beside is proven in `plan.certificate`.
         vehicle: What flies it, or its name, by default the plan's; its rotors' limits [N] and its body rate's
             [rad/s] are those that count.
-        environment: Gravity and wind, by default the plan's, else those of a calm day on Earth. Drag acts on
-            the velocity relative to the wind; speed and its limit are relative to the ground.
+        environment: Gravity, wind and obstacles, by default the plan's, else those of a calm day on Earth.
+            Drag acts on the velocity relative to the wind; speed and its limit are relative to the ground.
         envelope: What else it shall stay within, by default nothing.
     """
     envelope = Envelope() if envelope is None else envelope
-    vehicle = vehicle_of(trajectory, vehicle).without_dead_rotors()
+    whole = vehicle_of(trajectory, vehicle)
+    vehicle = whole.without_dead_rotors()
     environment = environment_of(trajectory, environment)
     trajectory = as_trajectory(trajectory)
     limits = limits_along(vehicle, environment, envelope.limits, envelope.conditions)
@@ -93,13 +97,17 @@ def certify(
     findings: list[Finding] = []
     unequal = has_unequal_drag(vehicle)
     on_thrust = [limit for limit in on_path if unequal and _is_of_thrust(limit, envelope.conditions)]
-    series, lost = _series(curve, found, [x for x in on_measures if not _is_stated(x)], on_thrust)
+    derived = [limit for limit in on_measures if not _is_stated(limit)]
+    has_obstacles = len(environment.pieces) > 0
+    series, lost = _series(curve, found, derived, on_thrust, has_obstacles)
     if series is not None:
         queries = _queries(vehicle, envelope, on_measures)
-        first = series.series.shape[-1] - len(on_thrust)
+        first = len(quantities.scales(vehicle)) + len(derived)
         queries += [query for i, limit in enumerate(on_thrust, first) for query in within(limit, i)]
         findings += series.answers(queries)
     findings += kinematic_findings(trajectory, envelope.speed, [x for x in on_path if x not in on_thrust])
+    if has_obstacles:
+        findings += [_clearance(curve, series, whole.bounding_ellipsoid.revolved)]
     findings += end_findings(trajectory, envelope.start, envelope.goal)
     findings += passage_findings(trajectory, envelope.passages, vehicle, environment)
     findings += waypoint_findings(trajectory, envelope.waypoints)
@@ -111,15 +119,40 @@ def certify(
 
 
 def _series(
-    curve: ThrustCurve, found: Subdivision, derived: Sequence[Limit], on_thrust: Sequence[Limit]
+    curve: ThrustCurve,
+    found: Subdivision,
+    derived: Sequence[Limit],
+    on_thrust: Sequence[Limit],
+    with_axis: bool,
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
-    """All quantities along the pieces, if there are any, and where unequal drag leaves the attitude open."""
+    """All quantities along the pieces, if there are any, and where unequal drag leaves the attitude open.
+
+    Where it is asked for, with the components of the thrust axis behind all others.
+    """
     whole = not found.vanishing
     if not len(found.pieces):
         return None, ()
     if has_unequal_drag(curve.vehicle):
-        return interpolated_with_unequal_drag(curve, found.pieces, whole, TIGHTNESS, derived, on_thrust)
-    return interpolated(curve, found.pieces, whole, derived), ()
+        return interpolated_with_unequal_drag(
+            curve, found.pieces, whole, TIGHTNESS, derived, on_thrust, with_axis
+        )
+    series = interpolated(curve, found.pieces, whole, derived)
+    return (_with_axis(curve, series) if with_axis else series), ()
+
+
+def _clearance(curve: ThrustCurve, series: ChebyshevSeries | None, body: Revolved) -> Finding:
+    """The finding about the body's least gap from obstacles: as a ball, where no attitude is known.
+
+    Args:
+        curve: What is flown, among obstacles.
+        series: With the components of the thrust axis as its last columns, if an attitude is ever known.
+        body: The vehicle's.
+    """
+    trajectory = curve.trajectory
+    known = Subintervals.whole(0) if series is None else series.pieces
+    attitude = None if series is None else BodyPath.in_attitude(series, body)
+    ball = BodyPath.in_every_attitude(trajectory, known.rest(trajectory.segments), body)
+    return clearance_finding(attitude, ball, curve.environment.pieces)
 
 
 def _is_of_thrust(limit: Limit, conditions: Sequence[Condition]) -> bool:
@@ -197,6 +230,19 @@ def interpolated(
     rate_error = bound.rate_remainder + (angle_error - own_error) * bound.rate_per_radian
     rate_error += 2 / seconds[:, None] * basis.steepening * noise
     return _with_derived(found, rate_error, vehicle, basis, derived)
+
+
+def _with_axis(curve: ThrustCurve, found: ChebyshevSeries) -> ChebyshevSeries:
+    """The series with the components of the thrust axis b3 behind them, each as exact as that along z."""
+    thrust = curve.on(found.pieces)[:, :, 1]
+    axis = curve.basis.analysis @ (thrust / np.linalg.norm(thrust, axis=-1, keepdims=True))
+    upright = len(curve.vehicle.rotors) + 1
+    return replace(
+        found,
+        series=np.concatenate([found.series, axis], axis=-1),
+        error=np.concatenate([found.error, np.tile(found.error[:, upright, None], 3)], axis=-1),
+        scale=np.concatenate([found.scale, np.tile(found.scale[upright], 3)]),
+    )
 
 
 def _with_derived(

@@ -47,6 +47,7 @@ def interpolated_with_unequal_drag(
     tightness: float,
     derived: Sequence[Limit],
     on_thrust: Sequence[Limit],
+    with_axis: bool = False,
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
     """Return the series of `certify.interpolated`, and where no attitude is determined.
 
@@ -57,6 +58,7 @@ def interpolated_with_unequal_drag(
         tightness: Of enclosures.
         derived: Limits on measures, behind what a certificate states anyway.
         on_thrust: Conditions on the specific thrust, behind those.
+        with_axis: Whether the components of the thrust axis are wanted, behind all others.
     """
     pieces = pieces.halves()
     for _ in range(HALVINGS):
@@ -64,6 +66,7 @@ def interpolated_with_unequal_drag(
         motion = _Motion.of(curve, pieces)
         with np.errstate(invalid="ignore", over="ignore"):
             columns = motion.columns(derived, on_thrust)
+            columns += [motion.axis(each) for each in np.eye(3)] if with_axis else []
         rough = _is_rough(columns, motion, derived) & (pieces.seconds(curve.trajectory) > MIN_DURATION)
         if not rough.any():
             break
@@ -77,6 +80,7 @@ def interpolated_with_unequal_drag(
     if count == 0:
         return None, lost
     scale = [*quantities.scales(curve.vehicle), *(limit.size for limit in (*derived, *on_thrust))]
+    scale += [scale[len(curve.vehicle.rotors) + 1]] * (3 if with_axis else 0)
     found = ChebyshevSeries(
         curve.trajectory,
         motion.pieces[:count],

@@ -45,6 +45,17 @@ class Subintervals:
         starts = (self.start, self.start + half)
         return Subintervals.joined([Subintervals(self.interval, start, half) for start in starts])
 
+    def rest(self, count: int) -> Subintervals:
+        """What is left of `count` intervals beside these parts, which do not overlap."""
+        whole = Subintervals.whole(count)
+        segment = np.concatenate([whole.interval, self.interval])
+        start = np.concatenate([whole.start, self.start + self.length])
+        end = np.concatenate([self.start, whole.length])
+        start = start[np.lexsort((start, segment))]
+        by_end = np.lexsort((end, np.concatenate([self.interval, whole.interval])))
+        length = end[by_end] - start
+        return Subintervals(np.sort(segment), start, length)[length > 0.0]
+
     def order(self) -> NDArray[np.intp]:
         """The rows in the order of intervals and starts, (n,)."""
         return np.lexsort((self.start, self.interval))

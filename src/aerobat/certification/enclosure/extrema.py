@@ -55,7 +55,7 @@ def enclose_maximum(batch: SeriesBatch) -> Enclosure:
     pending, coefficients = Subintervals.whole(len(batch.group)), batch.coefficients
     for halving in range(MAX_HALVINGS):
         group, error = batch.group[pending.interval], batch.error[pending.interval]
-        peak, tail, vertex = _parabola(coefficients, slack[group])
+        peak, tail, vertex = parabola_maximum(coefficients, slack[group])
         upper = peak + tail + error
         value = chebyshev.evaluate(coefficients, vertex) - error
         _improve(found, pending, group, vertex, value, slack)
@@ -72,10 +72,10 @@ def enclose_maximum(batch: SeriesBatch) -> Enclosure:
     return found
 
 
-def _parabola(coefficients: Array, flat: Array) -> tuple[Array, Array, Array]:
-    """The maximum of c0 T0 + c1 T1 + c2 T2 on [-1, 1], the magnitudes of all other terms, and where it is.
+def parabola_maximum(coefficients: Array, flat: Array | float = 0.0) -> tuple[Array, Array, Array]:
+    """Return the maximum of c0 T0 + c1 T1 + c2 T2 on [-1, 1], the magnitudes of all other terms, and where.
 
-    That is said to be at -1 where these terms change by less than `flat` (n,).
+    The maximum is said to be at -1 where these terms change by less than `flat` (n,).
     """
     padded = coefficients if coefficients.shape[1] > 2 else np.pad(coefficients, ((0, 0), (0, 2)))
     c0, c1, c2 = padded[:, :3].T

@@ -119,6 +119,11 @@ class Pieces:
         return np.asarray(np.min(found, axis=0)) if found else np.full(len(points), inf)
 
     @cached_property
+    def largest(self) -> float:
+        """The largest magnitude of any piece's coordinates [m], at most: what rounding is a part of."""
+        return float(np.abs(self._boxes).max(initial=0.0))
+
+    @cached_property
     def _points(self) -> Array:
         """The points of every piece, the first of them repeated where it has fewer than others, (P, V, 3)."""
         return _padded([piece.points for piece in self.pieces])

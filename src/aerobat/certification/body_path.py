@@ -1,0 +1,69 @@
+"""A vehicle's body along a trajectory: its centre of mass and its thrust axis as Chebyshev series.
+
+The body is the ellipsoid of revolution about the thrust axis that encloses it however it is turned about that
+axis. Where no attitude is determined it is the ball that encloses it in every attitude.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.certification.enclosure import chebyshev
+from aerobat.certification.enclosure.queries import ChebyshevSeries
+from aerobat.so3 import UP
+from aerobat.trajectory import Trajectory, polynomial
+from aerobat.trajectory.subintervals import Subintervals
+from aerobat.vehicle.ellipsoid import Revolved
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPath:
+    """A body on pieces of a trajectory."""
+
+    trajectory: Trajectory
+    body: Revolved
+    pieces: Subintervals
+    series: Array  # centre of mass [m] and thrust axis, world, (P, K + 1, 6)
+    error: Array  # between both and their series, at most [m], [-], (P, 2)
+
+    @property
+    def balls(self) -> tuple[Array, Array]:
+        """Balls that hold the body all along each piece: their centres [m], (P, 3), and radii [m], (P,)."""
+        moved = np.linalg.norm(self.series[:, 1:, :3], axis=-1).sum(axis=1)
+        return self.series[:, 0, :3], moved + self.error[:, 0] + self.body.reach
+
+    @classmethod
+    def in_attitude(cls, found: ChebyshevSeries, body: Revolved) -> BodyPath:
+        """The body in the attitude that thrust gives it.
+
+        Args:
+            found: Series whose last three columns are the components of the thrust axis.
+            body: The vehicle's.
+        """
+        centre, off = _centre(found.trajectory, found.pieces, found.series.shape[1] - 1)
+        series = np.concatenate([centre, found.series[..., -3:]], axis=-1)
+        error = np.stack([off, np.linalg.norm(found.error[:, -3:], axis=1)], axis=1)
+        return cls(found.trajectory, body, found.pieces, series, error)
+
+    @classmethod
+    def in_every_attitude(cls, trajectory: Trajectory, pieces: Subintervals, body: Revolved) -> BodyPath:
+        """The ball around the body, for all attitudes."""
+        centre, off = _centre(trajectory, pieces, max(trajectory.degree, 1))
+        axis = np.zeros_like(centre)
+        axis[:, 0] = UP
+        series, error = np.concatenate([centre, axis], axis=-1), np.stack([off, np.zeros_like(off)], axis=1)
+        return cls(trajectory, Revolved(body.reach, body.reach, 0.0, 0.0), pieces, series, error)
+
+
+def _centre(trajectory: Trajectory, pieces: Subintervals, degree: int) -> tuple[Array, Array]:
+    """The series of the position [m], (P, K + 1, 3), and what rounding leaves open of it, (P,)."""
+    basis = chebyshev.basis(degree)
+    s = pieces.start[:, None] + pieces.length[:, None] * (1 + basis.nodes) / 2
+    coefficients = trajectory.coefficients[pieces.interval]
+    summed = np.linalg.norm(np.abs(coefficients).sum(axis=1), axis=-1)
+    series = basis.analysis @ polynomial.evaluate(coefficients[:, None], s)
+    series[:, trajectory.coefficients.shape[1] :] = 0.0  # polynomials of this degree have no further terms
+    return series, basis.lebesgue * chebyshev.EVALUATION_ROUNDING * summed

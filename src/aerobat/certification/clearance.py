@@ -1,0 +1,229 @@
+"""How far a body is from all obstacles over continuous time: the least gap, enclosed.
+
+For a unit vector n from an obstacle's piece to the body, u = n·b3 and s(u) = √(wide² − (wide² − high²) u²),
+
+    φ(n) = n·p + up u − s(u) − aside − h(n)
+
+is a lower bound of the distance, whichever n is taken. s is concave where wide ≥ high: its tangent is above
+it, and with that in its place φ is linear in position p and thrust axis b3, whose Chebyshev series are known.
+Branch and bound over parts of the path, each beside one piece, takes n at the middle of a part, bounds φ
+along the part, and cuts into shorter parts what may yet be nearer than the nearest that was found.
+DERIVATION.md, section 9, has the details.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf
+
+import numpy as np
+
+from aerobat.arrays import Array, Indices, Mask
+from aerobat.certification.body_path import BodyPath
+from aerobat.certification.certificate import Finding, Side, Verdict
+from aerobat.certification.enclosure import chebyshev
+from aerobat.certification.enclosure.extrema import parabola_maximum
+from aerobat.certification.enclosure.queries import SUMMATION_ROUNDING
+from aerobat.environment.obstacles import Pieces
+from aerobat.trajectory.subintervals import Subintervals
+
+CLEARANCE_TIGHTNESS = 3e-4  # [m] how near the proven bound is to what is reached
+NEAR_TIGHTNESS = 0.5  # of a smaller gap, how near it is there
+OVERLAP_TIGHTNESS = 0.02  # of an overlap's depth, how near it is there
+FINEST_TIGHTNESS = 1e-6  # [m]
+FIRST = 64  # obstacles that are looked at before others: any small gap spares many
+HALVINGS = 3  # of a part at a time: separating costs little more for a hundred pairs than for one
+ROUNDS = 14
+MAX_OPEN = 20_000  # pairs at a time beside those at first; no path is known to need a tenth of it
+
+
+@dataclass(frozen=True)
+class LeastGap:
+    """The least gap between a body and obstacles, enclosed."""
+
+    value: float = inf  # [m] reached at `time`
+    bound: float = inf  # [m] proven: nowhere less
+    time: float = 0.0  # [s]
+    obstacle: str | None = None  # the nearest at that time
+
+    @property
+    def enough(self) -> float:
+        """The bound [m] from which on nothing is looked at more closely."""
+        if self.value < 0.0:
+            return self.value - max(-OVERLAP_TIGHTNESS * self.value, CLEARANCE_TIGHTNESS)
+        return self.value - min(max(NEAR_TIGHTNESS * self.value, FINEST_TIGHTNESS), CLEARANCE_TIGHTNESS)
+
+
+def clearance_finding(attitude: BodyPath | None, ball: BodyPath, pieces: Pieces) -> Finding:
+    """Return the finding about the least gap between a body and obstacles.
+
+    Args:
+        attitude: The body where its attitude is determined, if it is anywhere.
+        ball: The ball around the body, on the rest of the path.
+        pieces: Of the obstacles, one at least.
+    """
+    known = LeastGap() if attitude is None else least_gap(attitude, pieces)
+    around = least_gap(ball, pieces)
+    bound = min(known.bound, around.bound)
+    verdict = Verdict.HOLDS if bound >= 0.0 else Verdict.UNDECIDED
+    nearest = min(known, around, key=lambda gap: gap.value)
+    if known.value < 0.0:  # whereas a ball that overlaps says nothing of the body in it
+        verdict, nearest = Verdict.VIOLATED, known
+    value = max(nearest.value, bound)  # where bodies overlap, another plane may separate them better
+    found = Finding("clearance", "m", Side.MIN, value, bound, nearest.time, 0.0, verdict)
+    return replace(found, obstacle=nearest.obstacle, field="environment.obstacles")
+
+
+def least_gap(path: BodyPath, pieces: Pieces) -> LeastGap:
+    """Enclose the least gap between a body on its path and any of the pieces; infinite for no path."""
+    if not len(path.pieces):
+        return LeastGap()
+    centres, radii = path.balls
+    lower = pieces.apart(centres, centres) - radii[:, None]
+    first = np.argsort(lower.min(axis=0))[:FIRST]
+    pairs = _Pairs.of(path, pieces, lower[:, first].argmin(axis=0), first).separated()
+    found = pairs.nearest(LeastGap())
+    near = lower < found.enough
+    found = replace(found, bound=float(lower[~near].min(initial=inf)))
+    pairs = _Pairs.of(path, pieces, *np.nonzero(near))
+    most = MAX_OPEN + len(pairs)
+    for _ in range(ROUNDS):
+        pairs = pairs.separated()
+        found, pairs = pairs.left_open(pairs.nearest(found))
+        for _ in range(HALVINGS):
+            pairs = pairs.halves()
+        found, pairs = pairs.left_open(found)
+        if not 0 < len(pairs) <= most:
+            break
+    # bounds of what is open hold, if not tightly
+    return replace(found, bound=float((pairs.lower - pairs.error).min(initial=found.bound)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Pairs:
+    """Parts of a path, each beside a piece of an obstacle, with a plane that touches that piece."""
+
+    path: BodyPath
+    pieces: Pieces
+    parts: Subintervals  # of the path's pieces, (m,)
+    series: Array  # of centre of mass [m] and thrust axis, (m, K + 1, 6)
+    obstacles: Indices  # (m,)
+    normals: Array  # unit vectors from the piece to the body, (m, 3)
+    offsets: Array  # h [m], (m,)
+
+    @classmethod
+    def of(cls, path: BodyPath, pieces: Pieces, rows: Indices, obstacles: Indices) -> _Pairs:
+        """Whole pieces of a path, before planes are known."""
+        parts, count = Subintervals.whole(len(path.pieces))[rows], len(rows)
+        return cls(path, pieces, parts, path.series[rows], obstacles, np.zeros((count, 3)), np.zeros(count))
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    def __getitem__(self, rows: Mask | Indices) -> _Pairs:
+        return _Pairs(
+            self.path,
+            self.pieces,
+            self.parts[rows],
+            self.series[rows],
+            self.obstacles[rows],
+            self.normals[rows],
+            self.offsets[rows],
+        )
+
+    def halves(self) -> _Pairs:
+        """Both halves of every part, beside the same planes."""
+        halves = chebyshev.basis(self.series.shape[1] - 1).halves
+        series = np.concatenate([half @ self.series for half in halves])
+        twice = np.tile(np.arange(len(self)), 2)
+        return replace(self[twice], parts=self.parts.halves(), series=series)
+
+    def separated(self) -> _Pairs:
+        """The same pairs with the planes that separate best in the middle of the parts."""
+        centres, axes = np.split(_in_the_middle(self.series), 2, axis=-1)
+        arms, shapes = self.path.body.turned(axes / np.linalg.norm(axes, axis=-1, keepdims=True))
+        planes = self.pieces.separated(self.obstacles, centres + arms, shapes)
+        found = replace(self, normals=planes.normals, offsets=planes.offsets)
+        worse = self.normals.any(axis=-1) & (found.middle < self.middle)  # of bodies that overlap
+        normals = np.where(worse[:, None], self.normals, planes.normals)
+        return replace(self, normals=normals, offsets=np.where(worse, self.offsets, planes.offsets))
+
+    def nearest(self, known: LeastGap) -> LeastGap:
+        """The least gap in the middle of a part where that is less than the one known, which else stays."""
+        gaps = self.middle + self.error
+        row = int(np.argmin(gaps)) if len(gaps) else 0
+        if not len(gaps) or gaps[row] >= known.value:
+            return known
+        part = self.parts[row : row + 1]
+        pieces, position = self.path.pieces[part.interval], 2 * part.start + part.length - 1
+        time = float(pieces.times(self.path.trajectory, position)[0])
+        name = self.pieces.pieces[self.obstacles[row]].name
+        return replace(known, value=float(gaps[row]), time=time, obstacle=name)
+
+    def left_open(self, found: LeastGap) -> tuple[LeastGap, _Pairs]:
+        """What is found with the bound of all pairs that are far enough, and the other pairs."""
+        near = self.lower < found.enough
+        bound = (self.lower - self.error)[~near].min(initial=found.bound)
+        return replace(found, bound=float(bound)), self[near]
+
+    @cached_property
+    def middle(self) -> Array:
+        """The gaps across the planes in the middle of the parts, but for errors [m], (m,)."""
+        return _in_the_middle(self._linear)
+
+    @cached_property
+    def lower(self) -> Array:
+        """Bounds of the gaps along the parts, but for errors [m], (m,)."""
+        peak, tail, _ = parabola_maximum(-self._linear)
+        return np.asarray(-peak - tail - self._bend)
+
+    @cached_property
+    def error(self) -> Array:
+        """Of bounds and gaps, at most [m], (m,)."""
+        position, axis = self.path.error[self.parts.interval].T
+        summed = np.abs(self._linear).sum(axis=1) + np.abs(self.offsets) + self.pieces.largest
+        return np.asarray(position + np.abs(self._lever) * axis + SUMMATION_ROUNDING * summed)
+
+    @cached_property
+    def _along(self) -> tuple[Array, Array]:
+        """The series of n·p [m] and of u = n·b3, (m, K + 1) each."""
+        places = self.series.reshape(*self.series.shape[:2], 2, 3)
+        along = (places @ self.normals[:, None, :, None])[..., 0]
+        return along[..., 0], along[..., 1]
+
+    @cached_property
+    def _tangents(self) -> tuple[Array, Array, Array]:
+        """u in the middle, and s [m] and its slope [m] there, (m,) each."""
+        body = self.path.body
+        cosine = np.clip(_in_the_middle(self._along[1]), -1.0, 1.0)
+        difference = body.wide**2 - body.high**2
+        reached = np.sqrt(body.wide**2 - difference * cosine**2)
+        return cosine, reached, -difference * cosine / reached
+
+    @cached_property
+    def _linear(self) -> Array:
+        """The series of φ [m] with the tangent of s in its place, (m, K + 1)."""
+        (position, turning), (cosine, reached, slope) = self._along, self._tangents
+        series = position + self._lever[:, None] * turning
+        series[:, 0] += slope * cosine - reached - self.path.body.aside - self.offsets
+        return np.asarray(series)
+
+    @property
+    def _lever(self) -> Array:
+        """What a change of u does to φ [m], (m,)."""
+        return np.asarray(self.path.body.up - self._tangents[2])
+
+    @property
+    def _bend(self) -> Array:
+        """By how much s is above its tangent along the parts, at most [m], (m,): 0 where wide ≥ high."""
+        body, turning = self.path.body, self._along[1]
+        beyond = np.abs(turning[:, 0] - self._tangents[0]) + np.abs(turning[:, 1:]).sum(axis=1)
+        beyond += self.path.error[self.parts.interval, 1]
+        return np.asarray(max(body.high**2 - body.wide**2, 0.0) / (2.0 * body.wide) * beyond**2)
+
+
+def _in_the_middle(series: Array) -> Array:
+    """What series (m, K + 1, ...) are in the middle of their intervals, (m, ...)."""
+    signs = np.cos(np.pi / 2 * np.arange(series.shape[1])).round()
+    return np.asarray(np.tensordot(signs, series, (0, 1)))
