@@ -37,7 +37,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 FORMAT = "aerobat-plan-1"  # another number where something goes, or means something else
-REVISION = 4  # of it: one more wherever something is added
+REVISION = 5  # of it: one more wherever something is added
 WORKED_OUT = {"certificate", "flyability", "assessment"}  # from a plan's path whenever they are read
 ASKED_FOR = {"recoveries", "opinion", "tube"}  # results that take seconds
 MAX_EVIDENCE = 2**23  # bytes of a document: that of twenty gates has some hundred thousand
