@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import aerobat as ab
+from aerobat.environment.obstacles import OBSTACLES
 from aerobat.interchange.flat_outputs import FlatOutputs
 from aerobat.simulation.contact import Contact
 from aerobat.simulation.outcome import Outcome
@@ -216,3 +217,33 @@ def test_a_flight_that_felt_contact_is_saved_and_loaded_whole(tmp_path) -> None:
     flight.save(tmp_path / "flight.npz")
     assert ab.load_flight(tmp_path / "flight.npz") == flight
     assert flight.engine == "mujoco"
+
+
+@pytest.mark.parametrize("kind", ["box", "sphere", "cylinder", "capsule", "polytope", "half-space"])
+@pytest.mark.parametrize("clearance", [0.01, -0.01])
+def test_mujoco_feels_an_obstacle_when_our_judge_sees_the_contact(kind: str, clearance: float) -> None:
+    """Level, past solids of every kind: nothing is felt a centimetre beside them."""
+    path = ab.Trajectory([0.3], [[[0.0, 0.0, 1.0], [0.9, 0.0, 0.0]]])
+    vehicle = ab.load_vehicle("agile-quad")
+    side = float(vehicle.bounding_ellipsoid.semi_axes[1] + clearance)
+    x = 1.2 if kind == "half-space" else 0.5
+    solids: dict[str, dict[str, Any]] = {
+        "box": {"position": [x, side + 0.2, 1.0], "size": [0.1, 0.4, 1.0]},
+        "sphere": {"position": [x, side + 0.2, 1.0], "radius": 0.2},
+        "cylinder": {"start": [x, side + 0.2, 0.0], "end": [x, side + 0.2, 2.0], "radius": 0.2},
+        "capsule": {"start": [x, side + 0.2, 0.0], "end": [x, side + 0.2, 2.0], "radius": 0.2},
+        "polytope": {"points": [[x, side, z] for z in (0.5, 1.5)] + [[x + d, 1.0, 1.0] for d in (-0.1, 0.1)]},
+        "half-space": {"position": [0.9, side, 1.0], "normal": [-0.1, -1.0, 0.0]},
+    }
+    world = ab.Environment(obstacles=(OBSTACLES[kind](**solids[kind]),))
+    own, other = (ab.fly(path, vehicle, environment=world, plant=plant) for plant in (None, "mujoco"))
+    problem = ab.Problem("past", ab.at_rest((0.0, 0.0, 1.0)), ab.at_rest((0.9, 0.0, 1.0)))
+    ours, felt = (ab.score(flight, problem, vehicle) for flight in (own, other))
+    assert ours.nearest is not None
+    if clearance > 0.0:
+        assert (felt.contact, ours.nearest.failure) == (Contact.NOTHING, None)
+        assert ours.nearest.clearance == pytest.approx(clearance, abs=5e-3)
+    else:
+        assert felt.outcome is ours.outcome is Outcome.HIT_OBSTACLE
+        assert felt.contact == Contact.OBSTACLE
+        assert felt.contact_time == pytest.approx(ours.nearest.time, abs=0.005)
