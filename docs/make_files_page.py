@@ -105,9 +105,9 @@ at = [0.3, 0.6]
 """
 OBSTACLE_KINDS = """### Obstacle
 
-`[[environment.obstacles]]`: what is solid and stands still. Each has a `kind`, and what that kind takes. A start, a goal
-or a gate whose middle lies in an obstacle is refused. [A world with walls](how-to/obstacles.md) has examples, and
-[kinds of one's own](generated/contributing.md#add-an-obstacle) are plugins.
+`[[environment.obstacles]]`: what is solid and stands still. Each has a `kind`, and what that kind takes. A
+start, a goal or a gate whose middle lies in an obstacle is refused. [A world with walls](how-to/obstacles.md)
+has examples, and [kinds of one's own](../CONTRIBUTING.md#add-an-obstacle) are plugins.
 """
 WAYPOINTS = """
 With the times of all waypoints and `duration`, `--planner min-snap` searches as in the paper's Section V-D,

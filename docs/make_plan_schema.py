@@ -15,7 +15,7 @@ NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItem
 
 PIECE = {
     "type": "object",
-    "description": "a convex piece of an obstacle: the hull of points, each with all L y, |y| ≤ 1, L its rounding",
+    "description": "a convex piece of an obstacle: hull of points, each with L y, |y| ≤ 1, L the rounding",
     "properties": {
         "name": {"type": "string"},
         "points": {"type": "array", "items": NUMBERS, "minItems": 1},

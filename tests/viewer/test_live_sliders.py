@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.viewer.live.sliders import Setting, Slider, moved, sliders_of
+from obstacle_cases import walled_cruise
 from shared_plans import shared_plan
 
 NAMES = ("flip-roll", "half-flip", "line", "flip-roll-translation")
@@ -139,3 +140,39 @@ def numbers(value: Any) -> list[float]:
     if isinstance(value, np.ndarray):
         return [float(x) for x in value.ravel()]
     return [x for field in fields(value) for x in numbers(getattr(value, field.name))]
+
+
+PLACED = (
+    ab.Box((1.0, 2.0, 1.0), (0.5, 0.5, 0.5), tilt=0.3),
+    ab.Cylinder((1.0, -2.0, 0.0), (1.0, -2.0, 2.0), 0.3),
+    ab.Polytope(np.eye(4)[:, :3] + [0.5, 2.0, 1.0]),
+    ab.Grid(((0, 0, 0, 1, 1, 1),), 0.5, (1.0, 3.0, 0.0)),
+    ab.Mesh((np.eye(4)[:, :3],), (0.5, -3.0, 1.0)),
+    ab.Sphere((1.0, 4.0, 1.0), 0.5),
+    ab.Sphere((2.0, 4.0, 1.0), 0.5),
+)
+
+
+@pytest.mark.parametrize("k", range(len(PLACED)))
+def test_an_obstacle_is_moved_as_a_whole_by_its_sliders_and_no_other_is(k: int) -> None:
+    plan = walled_cruise(PLACED)
+    assert plan.vehicle is not None
+    begun = Setting(plan.problem, ab.Miqp(), plan.vehicle, ab.load_dispersion("lab"))
+    known = sliders_of(begun, plan)
+    shift = {
+        f"environment.obstacles[{k}].{axis}": by for axis, by in zip("xyz", (0.2, -0.1, 0.3), strict=True)
+    }
+    stands = {slider.key: slider.value for slider in known}
+    after = moved(begun, known, {key: stands[key] + by for key, by in shift.items()}).problem.environment
+    for j, (obstacle, was) in enumerate(zip(after.obstacles, PLACED, strict=True)):
+        moves = list(shift.values()) if j == k else np.zeros(3)
+        for piece, before in zip(obstacle.pieces, was.pieces, strict=True):
+            np.testing.assert_allclose(piece.points, before.points + moves, atol=1e-12)
+
+
+def test_obstacles_of_one_name_have_groups_of_their_own() -> None:
+    plan = walled_cruise(PLACED)
+    assert plan.vehicle is not None
+    known = sliders_of(Setting(plan.problem, ab.Miqp(), plan.vehicle, ab.load_dispersion("lab")), plan)
+    groups = {slider.group for slider in known if slider.key.startswith("environment")}
+    assert groups == {"box", "cylinder", "polytope", "grid", "mesh", "sphere 5", "sphere 6"}

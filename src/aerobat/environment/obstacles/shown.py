@@ -1,4 +1,4 @@
-"""The parts of obstacles that are seen around a path: the surfaces of their pieces, without what lies in other pieces.
+"""The parts of obstacles that are seen around a path: surfaces of pieces, without what lies in others.
 
 Pieces of one obstacle touch and lie over one another, as those of a wall do. Drawn as glass, what two of them
 share would be seen twice.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from aerobat.flatness import reference
 from aerobat.interchange.exports.loss import Content, ExportRows
 from aerobat.interchange.exports.stored_types import StoredTypes
 from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, Stamped
+from aerobat.interchange.solids import flattened
 from aerobat.planning import Plan
 
 NAME = "plan"
@@ -34,7 +36,7 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
     found = reference(plan, times=times)
     made = PlanMessages(Messages(StoredTypes(store)), plan).all(found)
     messages = sorted(made, key=lambda each: each.stamp)
-    loss = ExportRows.of(found).loss(plan)
+    loss = replace(ExportRows.of(found).loss(plan), obstacles=flattened(plan))
     with tempfile.TemporaryDirectory() as scratch:  # the writers want a place of their own
         write = _write_ros1 if container == "ros1" else partial(_write_ros2, container)
         return Content(write(store, messages, Path(scratch) / NAME), loss)

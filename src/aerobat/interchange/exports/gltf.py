@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import reference
 from aerobat.interchange.exports.loss import Content, ExportRows
+from aerobat.interchange.solids import flattened, solid_surfaces
 from aerobat.planning import Plan
 from aerobat.problem.gate import Gate
 from aerobat.vehicle import Vehicle
@@ -29,11 +30,12 @@ MAGIC, VERSION, JSON_CHUNK, BINARY_CHUNK = b"glTF", 2, b"JSON", b"BIN\0"
 FLOAT, UNSIGNED_INT, LINES, LINE_STRIP, TRIANGLES = 5126, 5125, 1, 3, 4  # as the format numbers them
 BEAM = 0.05  # [m] of a gate's frame
 CORNERS = 24  # of a rotor's disc
-COLORS: Mapping[str, Sequence[float]] = {  # red, green, blue, opaque
+COLORS: Mapping[str, Sequence[float]] = {  # red, green, blue, opacity
     "rotor": (0.05, 0.2, 0.6, 1.0),
     "arm": (0.1, 0.1, 0.1, 1.0),
     "gate": (0.85, 0.35, 0.05, 1.0),
     "path": (0.4, 0.4, 0.4, 1.0),
+    "obstacle": (0.4, 0.47, 0.54, 0.35),
 }
 
 
@@ -53,10 +55,14 @@ def blender_scene(plan: Plan, rate: float) -> Content:
     scene.node("path", scene.mesh("path", [scene.primitive(position, LINE_STRIP, "path")]))
     for gate in plan.problem.gates:
         scene.node(gate.name, scene.mesh(gate.name, [scene.primitive(_frame(gate), TRIANGLES, "gate")]))
+    for solid in solid_surfaces(plan):
+        corners = solid.triangles.reshape(-1, 3)
+        scene.node(solid.name, scene.mesh(solid.name, [scene.primitive(corners, TRIANGLES, "obstacle")]))
     rotation = np.concatenate([_y_up(q[:, 1:]), q[:, :1]], axis=1)
     scene.animate(vehicle, times, {"translation": _y_up(position), "rotation": rotation})
     rows = ExportRows(found.times, position.astype(float), None, so3.normalize(q))
-    return Content({f"{plan.problem.name}.glb": scene.binary(plan.problem.name)}, rows.loss(plan))
+    loss = replace(rows.loss(plan), obstacles=flattened(plan))
+    return Content({f"{plan.problem.name}.glb": scene.binary(plan.problem.name)}, loss)
 
 
 @dataclass
@@ -147,7 +153,8 @@ def _chunk(kind: bytes, content: bytes, padding: bytes) -> bytes:
 
 def _material(color: str) -> dict[str, Any]:
     surface = {"baseColorFactor": COLORS[color], "metallicFactor": 0.0}
-    return {"name": color, "doubleSided": True, "pbrMetallicRoughness": surface}
+    glass = {"alphaMode": "BLEND"} if COLORS[color][3] < 1.0 else {}
+    return {"name": color, "doubleSided": True, "pbrMetallicRoughness": surface} | glass
 
 
 def _vehicle(scene: _Scene, vehicle: Vehicle) -> Sequence[dict[str, Any]]:

@@ -37,13 +37,15 @@ class Loss:
     attitude: float  # [rad] the angle between attitudes, heading and all
     thrust_axis: float  # [rad] the angle between thrust axes, heading aside
     reading: str  # how the file is read
+    obstacles: float = 0.0  # [m] by which triangles of round obstacles lie inside these
 
     def __str__(self) -> str:
         """One line for people."""
+        flat = f"; round obstacles drawn up to {length(self.obstacles)} inside" if self.obstacles else ""
         return (
             f"lost at most {length(self.position)} of position, {self.velocity:.2g} m/s of velocity, "
             f"{degrees(self.attitude):.2g}° of attitude and {degrees(self.thrust_axis):.2g}° of the thrust's "
-            f"direction ({self.reading})"
+            f"direction ({self.reading}){flat}"
         )
 
     def record(self) -> dict[str, object]:
@@ -54,6 +56,7 @@ class Loss:
             "attitude_deg": degrees(self.attitude),
             "thrust_axis_deg": degrees(self.thrust_axis),
             "reading": self.reading,
+            "obstacles_m": self.obstacles,
         }
 
 

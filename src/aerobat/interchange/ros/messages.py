@@ -17,7 +17,8 @@ from aerobat.states import BodyState
 
 WORLD, BODY = "world", "base_link"
 NANOSECONDS = 10**9
-LINE_STRIP, LINE_LIST, CYLINDER = 4, 5, 3  # kinds of markers
+LINE_STRIP, LINE_LIST, CYLINDER, TRIANGLE_LIST = 4, 5, 3, 11  # kinds of markers
+GLASS = 0.4  # opacity of what is solid
 DISC_HEIGHT = 0.01  # [m]
 BLACK = (0.1, 0.1, 0.1)
 
@@ -186,11 +187,34 @@ class Messages:
             color=self._color(color),
         )
 
+    def solid(
+        self, stamp: int, name: str, number: int, *, corners: Array, color: tuple[float, float, float]
+    ) -> Any:
+        """A marker of a surface, translucent.
+
+        Args:
+            stamp: when [ns].
+            name: what it belongs to.
+            number: of it there.
+            corners: of its triangles, three each [m], (3 triangles, 3).
+            color: red, green and blue, 0 to 1.
+        """
+        return self._marker(
+            stamp,
+            name,
+            number,
+            type=TRIANGLE_LIST,
+            pose=self.pose(np.zeros(3), so3.IDENTITY),
+            scale=self.vector("Vector3", np.ones(3)),
+            color=self._color(color, GLASS),
+            points=[self.vector("Point", corner) for corner in corners],
+        )
+
     def _marker(self, stamp: int, name: str, number: int, **given: Any) -> Any:
         return self.make(
             "visualization_msgs/msg/Marker", header=self.header(stamp), ns=name, id=number, **given
         )
 
-    def _color(self, color: Sequence[float]) -> Any:
+    def _color(self, color: Sequence[float], opacity: float = 1.0) -> Any:
         red, green, blue = color
-        return self.make("std_msgs/msg/ColorRGBA", r=red, g=green, b=blue, a=1.0)
+        return self.make("std_msgs/msg/ColorRGBA", r=red, g=green, b=blue, a=opacity)

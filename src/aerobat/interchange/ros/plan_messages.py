@@ -12,6 +12,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import Reference, reference
 from aerobat.interchange.ros.messages import BODY, NANOSECONDS, JointMotion, Messages
+from aerobat.interchange.solids import solid_surfaces
 from aerobat.planning import Plan
 from aerobat.states import BodyState
 
@@ -71,12 +72,15 @@ class PlanMessages:
             yield self._array(self._stamp(time), discs)
 
     def lines(self, found: Reference) -> Sequence[Any]:
-        """Markers of the path, sampled as `found`, and of the gates."""
+        """Markers of the path, sampled as `found`, of the gates and of obstacles."""
         stamp, path = self._stamp(0.0), found.setpoint.flat.position + self.origin
         lines = [self.messages.line(stamp, "path", path, width=PATH_WIDTH, color=GREY)]
         for gate in self.plan.problem.gates:
             frame = np.concatenate([gate.outline, gate.outline[:1]]) + self.origin
             lines.append(self.messages.line(stamp, gate.name, frame, width=FRAME_WIDTH, color=ORANGE))
+        for number, solid in enumerate(solid_surfaces(self.plan), 1):
+            corners = solid.triangles.reshape(-1, 3) + self.origin
+            lines.append(self.messages.solid(stamp, solid.name, number, corners=corners, color=GREY))
         return lines
 
     def snapshots(self, every: float = np.inf) -> Iterator[tuple[float, Sequence[Any]]]:

@@ -26,6 +26,8 @@ STEPS = 40  # of a slider's range, or more: its step is round
 THRUST_FRACTION = 0.2  # of what the vehicle has: the least thrusts of maneuvers that name none
 ORDERS = range(3, 6)  # jerk, snap, crackle
 THRUST_TO_WEIGHT = (1.2, 8.0)  # from what hardly climbs to racing quadrotors
+MAX_OBSTACLES = 12  # that have sliders: more are a page that nobody reads
+PLACES = ("position", "start", "end", "origin", "points")  # fields of obstacles that say where they stand
 MAX_DISPERSION = 3.0  # times the conditions: most maneuvers fail well before
 
 
@@ -67,8 +69,10 @@ class Slider:
 def sliders_of(setting: Setting, plan: Plan) -> tuple[Slider, ...]:
     """The sliders of a setting, as they stand for its plan."""
     gates = range(len(setting.problem.gates))
+    obstacles = range(min(len(setting.problem.environment.obstacles), MAX_OBSTACLES))
     return (
         *chain.from_iterable(_gate_sliders(setting.problem, k) for k in gates),
+        *chain.from_iterable(_obstacle_sliders(setting.problem, k) for k in obstacles),
         *_thrust_sliders(setting),
         *_order_slider(setting, plan),
         _vehicle_slider(setting),
@@ -93,9 +97,7 @@ def moved(setting: Setting, sliders: Sequence[Slider], values: Mapping[str, floa
 def _gate_sliders(problem: Problem, k: int) -> Iterator[Slider]:
     """Position and tilt of a gate."""
     gate, (lower, upper) = problem.gates[k], problem.path_limits.of(0)
-    reach = _reach(problem)
-    step = _round_step(2 * reach / STEPS)
-    reach = step * round(reach / step)
+    reach, step = _range(problem)
     for i, axis in enumerate("xyz"):
         value = float(gate.position[i])
         low, high = max(value - reach, float(lower[i])), min(value + reach, float(upper[i]))
@@ -132,6 +134,50 @@ def _with_turned(k: int, axis: Array, stands: float, setting: Setting, tilt: flo
     normal, up = (so3.rotate(turn, side) for side in (gates[k].normal, gates[k].up))
     gates[k] = replace(gates[k], normal=normal, up=up)
     return replace(setting, problem=replace(setting.problem, gates=tuple(gates)))
+
+
+def _obstacle_sliders(problem: Problem, k: int) -> Iterator[Slider]:
+    """The place of an obstacle, by its first field that says one; none of one that has no such field."""
+    obstacles = problem.environment.obstacles
+    fields_of_place = [name for name in PLACES if hasattr(obstacles[k], name)]
+    if not fields_of_place:
+        return
+    name = getattr(obstacles[k], "name", obstacles[k].kind)
+    is_one_of_many = sum(getattr(each, "name", each.kind) == name for each in obstacles) > 1
+    reach, step = _range(problem)
+    stands = np.atleast_2d(getattr(obstacles[k], fields_of_place[0]))[0]
+    for i, axis in enumerate("xyz"):
+        value = float(stands[i])
+        key, shift = f"environment.obstacles[{k}].{axis}", partial(_with_shifted, k, i, value)
+        group = f"{name} {k}" if is_one_of_many else name
+        yield Slider(key, group, axis, "m", value - reach, value + reach, step, value, turn=shift)
+
+
+def _with_shifted(k: int, axis: int, stands: float, setting: Setting, place: float) -> Setting:
+    """The setting with obstacle k shifted along an axis.
+
+    Args:
+        k: Which obstacle.
+        axis: 0, 1 or 2.
+        stands: The coordinate that it has [m].
+        setting: As it was.
+        place: The coordinate that it shall have [m].
+    """
+    environment = setting.problem.environment
+    obstacles = list(environment.obstacles)
+    changed: Any = obstacles[k]
+    shift = (place - stands) * np.eye(3)[axis]
+    moved_fields = {name: getattr(changed, name) + shift for name in PLACES if hasattr(changed, name)}
+    obstacles[k] = replace(changed, **moved_fields)
+    world = replace(environment, obstacles=tuple(obstacles))
+    return replace(setting, problem=replace(setting.problem, environment=world))
+
+
+def _range(problem: Problem) -> tuple[float, float]:
+    """How far something can be moved to either side [m], and by which steps [m]."""
+    reach = _reach(problem)
+    step = _round_step(2 * reach / STEPS)
+    return step * round(reach / step), step
 
 
 def _reach(problem: Problem) -> float:

@@ -75,9 +75,9 @@ def view_live(
 ) -> LiveView:
     """Serve a page on which a maneuver is planned and flown anew whenever one of its sliders is moved.
 
-    The scene is that of `view`. Sliders move and tilt gates, say the maneuver's least thrusts, the planner's
-    order, the vehicle's thrust-to-weight and how much flights are dispersed; the verdict is in words. It is
-    served to this machine alone until it is closed. Raises Infeasible or SpecError where there is no plan to
+    The scene is that of `view`. Sliders move and tilt gates, move obstacles, say the maneuver's least
+    thrusts, the planner's order, the vehicle's thrust-to-weight and how much flights are dispersed; the
+    verdict is in words. It is served to this machine alone until it is closed. Raises Infeasible or SpecError where there is no plan to
     begin with, and SpecError for a port that is taken.
 
     Args:

@@ -16,13 +16,13 @@ class Live {
     this.tell(verdict);
   }
 
-  // A slider in its group; of several gates, those after the first are folded.
+  // A slider in its group; of several gates, those after the first are folded, and all obstacles.
   add({ key, group, name, unit, low, high, step, value }) {
     let fold = document.querySelector(`#sliders [data-group="${CSS.escape(group)}"]`);
     if (!fold) {
       fold = document.createElement("details");
       fold.dataset.group = group;
-      fold.open = !/^gates\[[1-9]/.test(key);
+      fold.open = !/^gates\[[1-9]|^environment/.test(key);
       fold.append(Object.assign(document.createElement("summary"), { textContent: group }));
       element("sliders").append(fold);
     }

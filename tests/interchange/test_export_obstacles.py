@@ -1,0 +1,86 @@
+"""Obstacles in exports: what other programs show of them is where they are, and the loss says how nearly."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from pygltflib import GLTF2
+
+import aerobat as ab
+from aerobat.environment.obstacles import ConvexPiece
+from aerobat.interchange.flight_package import read_flight_package
+from export_readers import bag_messages
+from obstacle_cases import open_cruise, walled_cruise
+from places import ROOT
+
+NAMES = {"trunk", "sphere", "box", "the wall of gate"}
+
+
+def directions() -> np.ndarray:
+    made = np.random.default_rng(0).normal(size=(500, 3))
+    return made / np.linalg.norm(made, axis=1, keepdims=True)
+
+
+def pieces_of(name: str) -> list[ConvexPiece]:
+    return [piece for piece in walled_cruise().problem.surroundings.pieces.pieces if piece.name == name]
+
+
+def lack(name: str, corners: np.ndarray) -> np.ndarray:
+    """How far the hull of an obstacle reaches beyond that of corners, in many directions [m]."""
+    whole = np.max([piece.support(directions()) for piece in pieces_of(name)], axis=0)
+    return whole - (directions() @ corners.T).max(axis=1)
+
+
+def test_a_scene_has_each_obstacle_within_the_loss_that_is_said(tmp_path: Path) -> None:
+    made = ab.export(walled_cruise(), tmp_path / "walled.glb", "blender")
+    scene = GLTF2().load(str(tmp_path / "walled.glb"))
+    blob, found = scene.binary_blob(), {}
+    for node in scene.nodes:
+        primitive = scene.meshes[node.mesh].primitives[0]
+        place = scene.bufferViews[scene.accessors[primitive.attributes.POSITION].bufferView]
+        corners = np.frombuffer(blob, "<f4", place.byteLength // 4, place.byteOffset).reshape(-1, 3)
+        found.setdefault(node.name, []).append(corners[:, [0, 2, 1]] * [1.0, -1.0, 1.0])
+        glass = scene.materials[primitive.material].alphaMode == "BLEND"
+        assert glass == (node.name in NAMES)
+    assert set(found) >= NAMES
+    lacks = np.array([lack(name, np.concatenate(found[name])) for name in NAMES])
+    assert lacks.min() > -1e-6
+    assert lacks.max() <= made.loss.obstacles + 1e-6
+    assert 0.001 < made.loss.obstacles < 0.01
+    assert "round obstacles drawn up to" in str(made)
+
+
+@pytest.mark.parametrize(("to", "name"), [("ros1-bag", "walled.bag"), ("mcap", "walled.mcap")])
+def test_bags_mark_each_obstacle(to: str, name: str, tmp_path: Path) -> None:
+    made = ab.export(walled_cruise(), tmp_path / name, to, rate=20.0)
+    markers = next(m for topic, _, m in bag_messages(tmp_path / name) if topic == "/aerobat/markers").markers
+    found: dict[str, list[np.ndarray]] = {}
+    for marker in (each for each in markers if each.type == 11):
+        assert 0.0 < marker.color.a < 1.0
+        found.setdefault(marker.ns, []).append(np.array([[p.x, p.y, p.z] for p in marker.points]))
+    assert set(found) == NAMES
+    assert len({(marker.ns, marker.id) for marker in markers}) == len(markers), "none takes another's place"
+    assert max(lack(each, np.concatenate(found[each])).max() for each in NAMES) <= made.loss.obstacles + 1e-9
+
+
+def test_the_flight_package_holds_obstacles_exactly_and_by_its_schema(tmp_path: Path) -> None:
+    walled_cruise().save(tmp_path / "walled.plan")
+    package = read_flight_package(tmp_path / "walled.plan")
+    for (name, points, rounding), piece in zip(
+        package.obstacles, walled_cruise().problem.surroundings.pieces.pieces, strict=True
+    ):
+        assert name == piece.name
+        np.testing.assert_array_equal(points, piece.points)
+        np.testing.assert_array_equal(rounding, piece.rounding)
+    schema = json.loads((ROOT / "docs" / "plan.schema.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(schema).validate(package.document)
+
+
+def test_exports_without_obstacles_lose_none(tmp_path: Path) -> None:
+    made = ab.export(open_cruise(), tmp_path / "open.glb", "blender")
+    assert made.loss.obstacles == 0.0
+    assert "obstacles" not in str(made)
