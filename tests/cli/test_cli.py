@@ -105,7 +105,9 @@ def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> No
     assert "half-flip · agile-quad: certified, and it flies" in out
     for name in ("duration", "limited by", "margin", "space", "gate", "flight"):
         assert re.search(rf"^ +{name} ", out, re.MULTILINE)
-    assert out.endswith("`aerobat sweep out/half-flip-none` counts more flights\nwritten to out/half-flip-none/\n")
+    assert out.endswith(
+        "`aerobat sweep out/half-flip-none` counts more flights\nwritten to out/half-flip-none/\n"
+    )
 
 
 def test_a_plan_that_few_flights_survive_is_not_well_unless_nothing_shall_vary(capsys, unpictured) -> None:

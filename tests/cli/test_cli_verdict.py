@@ -51,6 +51,14 @@ def test_a_verdict_is_well_where_enough_are_proven_to_succeed(capsys) -> None:
     assert "--pass" not in shown
 
 
+def test_a_plan_that_leaves_little_to_the_controller_is_told_what_leaves_enough(capsys) -> None:
+    """A reserve of 0.1, which is less than plans keep by default, was advised."""
+    print_table(table(Report(shared_plan("line", "agile-quad", ab.Miqp())), most=REPORT))
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "for a real flight; try --pass 0.95" in shown
+    assert "--reserve 0.1" not in shown
+
+
 def test_flights_that_proved_a_plan_count_for_its_verdict() -> None:
     """Those of --pass are fresh and enough: others that leave it open are not flown."""
     plan = shared_plan("line")
