@@ -7,8 +7,8 @@ them passed anywhere in their opening, some with the thrust along their upright,
 rest to rest with `agile-quad`. With `--written`, courses are as a person writes them: start and goal on the
 ground, 3 to 8 gates of any kind along a tour, for a random vehicle of one's own; case k is written as files,
 which `--folder` keeps. Every course is planned as the command line does it, with a reserve for the
-controller, certified or refused in words. A plan is flown once as planned, a hundred times under `lab` for
-the verdict of `aerobat fly`, and 200 times more. Times are of the processor, on one core.
+controller, certified or refused in words. A plan is flown once as planned, under `lab` as often as the
+verdict of `aerobat fly` takes, and 200 times more. Times are of the processor, on one core.
 """
 
 import argparse
@@ -22,15 +22,19 @@ import numpy as np
 
 import aerobat as ab
 from aerobat.arrays import Array
+from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
 from aerobat.planning import Plan
 from aerobat.planning.planners import command_settings, planner_class
 from aerobat.problem import Gate, Line, PassGate
+from aerobat.reporting.report import Report
+from aerobat.studies.flights import FlightTask
+from aerobat.studies.trials import Trials, fly_trials
 from aerobat.vehicle import Vehicle
 from random_problems import Case, random_vehicle, write_case
 
-TRIALS, FRESH = 100, 200  # flights under `lab`: of the verdict, and others
-ENOUGH = 0.95  # of them
+LAB = load_dispersion("lab")
+FRESH = 200  # flights beside those of the verdict
 ROOM = 20.0  # [m] its sides
 WALL = 2.0  # [m] from the walls to places, at least
 APART = 3.0  # [m] from one place to another, at least
@@ -146,9 +150,9 @@ def main() -> None:
     parser.add_argument("--cases", type=int, nargs="+", help="these alone")
     parser.add_argument("--planner", help="by this one, say free-knots")
     parser.add_argument("--written", action="store_true", help="as a person writes them, from the ground")
-    parser.add_argument("--folder", type=Path, help="where files of the cases are kept")
+    parser.add_argument("--folder", type=Path, help="where files of the cases and plans are kept")
     options = parser.parse_args()
-    spent, errors, shares = [], [], []
+    spent, errors, shares, told = [], [], [], []
     for k in options.cases or range(options.count):
         if options.written:
             case = written_course(options.seed, k)
@@ -167,6 +171,8 @@ def main() -> None:
             print(*facts, f"refused in {spent[-1]:.1f} s: {refusal}", sep="; ", flush=True)
             continue
         spent.append(time.process_time() - began)
+        if options.folder is not None:
+            plan.save(options.folder / f"{problem.name}.plan")
         facts += [plan.planner, f"{plan.duration:.3f} s in {spent[-1]:.1f} s"]
         facts.append("certified" if plan.certified else f"NOT CERTIFIED: {plan.certificate.why}")
         flight = ab.fly(plan)
@@ -174,23 +180,29 @@ def main() -> None:
         errors.append(float(flight.position_error.max()))
         passed = sum(passage.failure is None for passage in score.passages)
         facts += [f"flown within {100 * errors[-1]:.2f} cm", f"{passed} of {len(problem.gates)} passed"]
-        trials = ab.sweep(plan, "lab", runs=TRIALS, workers=1)
-        is_well = plan.certified and plan.flies and score.outcome.is_success
-        is_well = is_well and trials.success.fraction >= ENOUGH
-        fresh = ab.sweep(plan, "lab", runs=FRESH, seed=1, workers=1)
-        shares.append((is_well, fresh.success.fraction))
+        began = time.process_time()
+        trials = fly_trials(FlightTask(plan, vehicle, LAB, 0, vehicle.controller))
+        told.append(time.process_time() - began)
+        report = Report(plan, score, trials=trials)
+        fresh = ab.sweep(plan, LAB, runs=FRESH, seed=1, workers=1)
+        shares.append((report.is_well, fresh.success.fraction))
         counts = (
             f"{share.count} {end.name.lower().replace('_', ' ')}" for end, share in fresh.outcomes.items()
         )
-        facts += [f"exit {0 if is_well else 1}", f"under lab {', '.join(counts)}"]
+        facts += [
+            f"exit {0 if report.is_well else 1}",
+            f"{trials.share} of {trials.share.of} in {told[-1]:.1f} s",
+        ]
+        facts += [f"fresh {', '.join(counts)}"]
         print(*facts, score.sentence, sep="; ", flush=True)
     well = [share for is_well, share in shares if is_well]
     print(
         f"{len(errors)} of {len(spent)} planned; "
         f"median {np.median(spent):.1f} s, longest {max(spent):.1f} s; "
         f"largest error {100 * max(errors, default=np.nan):.2f} cm; {len(well)} end with 0, of which "
-        f"{sum(share >= ENOUGH for share in well)} pass {100 * ENOUGH:g} % of {FRESH} fresh flights under "
-        f"lab, the least {100 * min(well, default=np.nan):.1f} %"
+        f"{sum(share >= Trials.NEEDED for share in well)} pass {100 * Trials.NEEDED:g} % of {FRESH} fresh "
+        f"flights under lab, the least {100 * min(well, default=np.nan):.1f} %; "
+        f"a verdict takes {np.median(told):.1f} s, the longest {max(told, default=np.nan):.1f} s"
     )
 
 

@@ -60,6 +60,12 @@ def test_all_keys_that_are_missing_are_told_at_once(capsys) -> None:
     Path("mine.toml").write_text("mass = 1.0\n")
     _, _, err = run(capsys, "show", "mine.toml")
     assert err == "aerobat: vehicle file mine.toml: inertia and rotors are missing; add them\n"
+    Path("mine.toml").write_text('description = "of mine"\nmax_body_rate = 20.0\n')
+    _, _, err = run(capsys, "show", "mine.toml")
+    assert err == "aerobat: vehicle file mine.toml: mass, inertia and rotors are missing; add them\n"
+    Path("mine.toml").write_text('description = "of mine"\n[limits]\nvelocity = 2.0\n')
+    _, _, err = run(capsys, "show", "mine.toml")
+    assert err.startswith("aerobat: problem file mine.toml: ")
 
 
 def test_rotors_that_all_spin_alike_are_refused_as_a_pilot_would_say_it(capsys) -> None:

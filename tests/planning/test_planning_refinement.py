@@ -158,3 +158,10 @@ def test_a_hop_straight_up_is_planned_without_a_word_of_arithmetic() -> None:
     """Trials of it point their thrust straight down, against the frame that they are seen in."""
     hop = replace(load_problem("line"), start=at_rest((0.0, 0.0, 0.0)), goal=at_rest((0.0, 0.0, 1.0)))
     assert Miqp(order=4).plan(hop, load_vehicle("agile-quad")).certified
+
+
+def test_pieces_of_one_length_are_intervals_and_others_segments() -> None:
+    refined, gridded = shared_plan("line"), shared_plan("line", None, Miqp(intervals=7))
+    assert (refined.dt, refined.pieces) == (None, f"{refined.intervals} segments")
+    assert f" in {refined.pieces}, locally optimal" in str(refined)
+    assert f" in 7 intervals of {gridded.dt:.4f} s, " in str(gridded)

@@ -217,7 +217,7 @@ class ConditionsOptions:
 
     conditions: Annotated[str | None, Parameter(group=flying)] = None
     """The variation, the disturbances and the sensors: none, lab, field, or a TOML file. Default: one flight
-    as planned, from a state that is known, and a hundred under lab, which are counted."""
+    as planned, from a state that is known, and a hundred or more under lab, which are counted."""
 
     seed: Seed = 0
     """The seed of the conditions: the same seed, the same flight."""

@@ -164,6 +164,12 @@ class Plan:
         return self.trajectory.segments
 
     @property
+    def pieces(self) -> str:
+        """The trajectory's segments in words: those of one length are intervals."""
+        one = "segment" if self.dt is None else "interval"
+        return f"1 {one}" if self.intervals == 1 else f"{self.intervals} {one}s"
+
+    @property
     def nodes(self) -> int:
         """QPs solved, or iterations, over all attempts."""
         return sum(attempt.nodes for attempt in self.attempts)
@@ -197,7 +203,7 @@ class Plan:
         dt = "" if self.dt is None else f" of {self.dt:.4f} s"
         backend = f" ({self.backend})" if self.backend else ""
         return (
-            f"{self.problem.name}: {self.duration:.3f} s in {self.intervals} intervals{dt}, {self.status} by "
+            f"{self.problem.name}: {self.duration:.3f} s in {self.pieces}{dt}, {self.status} by "
             f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{given_up}{assessed}{rescue}{tube}"
         )
 

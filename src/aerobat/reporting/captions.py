@@ -12,11 +12,11 @@ from aerobat.simulation.outcome import length
 
 def plan_caption(plan: Plan) -> str:
     """Origin of a plan in a few words."""
-    grid = "segments" if plan.dt is None else f"intervals of {plan.dt:.4f} s"
+    dt = "" if plan.dt is None else f" of {plan.dt:.4f} s"
     order = "" if plan.order is None else f", order {plan.order}"
     cost = "" if plan.cost in (None, plan.duration) else f", cost {plan.cost:.6g}"
     solver = f"{plan.backend}, {plan.nodes} nodes, {1000 * plan.solve_time:.0f} ms".removeprefix(", ")
-    return f"{plan.planner}: {plan.duration:.3f} s in {plan.intervals} {grid}{order}{cost} ({solver})"
+    return f"{plan.planner}: {plan.duration:.3f} s in {plan.pieces}{dt}{order}{cost} ({solver})"
 
 
 def plan_captions(plan: Plan) -> list[str]:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 SMALL = 1e-4  # [m]: smaller errors mean nothing in a simulation that knows the vehicle
 ENOUGH_MARGIN = 0.05  # of a rotor's thrust: with less, few real flights succeed
+MORE_MARGIN = "--pass 0.95, which keeps as much as flights need"
 SEVERAL_TIMES = 2.0  # times the shortest possible: no percentage beyond
 
 
@@ -36,8 +37,7 @@ def _(plan: Plan) -> Iterator[Fact]:
     yield said("", plan.problem.name + ("" if plan.vehicle is None else f" · {plan.vehicle.name}"))
     order = "" if plan.order is None else f", order {plan.order}"
     backend = f", {plan.backend}" if plan.backend else ""
-    pieces = "1 interval" if plan.intervals == 1 else f"{plan.intervals} intervals"
-    yield Fact("planner", plan.planner, "planner", f"{plan.planner}{order}, {pieces}{backend}")
+    yield Fact("planner", plan.planner, "planner", f"{plan.planner}{order}, {plan.pieces}{backend}")
     yield from kept(order=plan.order, intervals=plan.intervals, dt_s=plan.dt)
     beside = "" if found is None or found.poor else _beside_least(found)
     yield Fact("duration_s", plan.duration, "duration", f"{plan.duration:.2f} s{beside}", level=REPORT)
@@ -226,8 +226,8 @@ def _margin(found: Flyability) -> str:
     """How much thrust a plan leaves to the controller."""
     kept_fraction = found.disturbed_fraction
     if not found.disturbance:
-        return "no thrust is left to the controller: too little for a real flight; try --reserve 0.1"
-    little = "" if kept_fraction >= ENOUGH_MARGIN else ": little for a real flight; try --reserve 0.1"
+        return f"no thrust is left to the controller: too little for a real flight; try {MORE_MARGIN}"
+    little = "" if kept_fraction >= ENOUGH_MARGIN else f": little for a real flight; try {MORE_MARGIN}"
     moved = f"a loss as large moves the vehicle {rough_length(found.disturbed_error)} off its path"
     return f"{100.0 * kept_fraction:.2g} % of a rotor's thrust{little}; {moved}"
 

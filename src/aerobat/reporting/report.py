@@ -12,7 +12,7 @@ from aerobat.reporting.facts import REPORT, Fact, Facts, facts, kept, said
 from aerobat.vehicle import implausibilities
 
 if TYPE_CHECKING:  # which takes long to import
-    from aerobat.studies.sweep import Sweep
+    from aerobat.studies.trials import Trials
 
 PAGES = {  # that explain the lines of a report, by their labels
     "docs/theory.md": (
@@ -35,7 +35,6 @@ PAGES = {  # that explain the lines of a report, by their labels
     "docs/how-to/controllers.md": ("controller",),
     "docs/how-to/plants.md": ("plant",),
 }
-ENOUGH = 0.95  # of flights under random conditions: with fewer that succeed, the verdict is that it fails
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +45,12 @@ class Report:
     score: Score | None = None  # of its flight, where it was flown
     controller: str | None = None  # the name of what flew it
     plant: str | None = None  # the name of the other simulator whose physics it flew in, if it was one
-    trials: Sweep | None = None  # flights under random conditions, where they were flown
+    trials: Trials | None = None  # flights under random conditions, where they were flown
 
     @property
     def is_reliable(self) -> bool:
-        """False if too few of the flights under random conditions succeed."""
-        return self.trials is None or self.trials.success.fraction >= ENOUGH
+        """False unless it is proven that enough flights under random conditions succeed, if any are flown."""
+        return self.trials is None or self.trials.proven
 
     @property
     def is_well(self) -> bool:
@@ -73,22 +72,29 @@ def _(report: Report) -> Iterator[Fact]:
         known = (Fact(key, value, key) for key, value in flown_by.items() if value is not None)
         yield Fact("flight", Facts((*facts(report.score), *known)), "flight")
     if trials is not None:
-        low, high = trials.success.interval
-        values = kept(
-            conditions=trials.conditions.name,
-            seed=trials.seed,
-            flights=len(trials),
-            succeeded=trials.success.count,
-            success_interval=[low, high],
-        )
-        of_all = f"{100.0 * low:.0f} to {100.0 * high:.0f} % of all, at 95 % confidence"
-        remedy = "" if report.is_reliable else f"; plan for more with --pass {ENOUGH:g}"
-        counted = f"{trials.success.count} of {len(trials)} flights succeed"
-        succeed = f"{trials.conditions.name}: {counted}, so {of_all}{remedy}"
-        style = "" if report.is_reliable else "red"
-        yield Fact("trials", Facts(values), "conditions", succeed, level=REPORT, style=style)
+        yield _of_trials(trials)
     for page, labels in PAGES.items():
         yield said("", f"{page}: {', '.join(labels)}")
+
+
+def _of_trials(trials: Trials) -> Fact:
+    """The flights under random conditions, and what is to be done where too few succeed."""
+    name, share = trials.conditions.name, trials.share
+    low, high = share.interval
+    values = kept(
+        conditions=name,
+        seed=trials.seed,
+        flights=share.of,
+        succeeded=share.count,
+        success_interval=[low, high],
+        needed=trials.NEEDED,
+        proven=trials.proven,
+    )
+    of_all = f"{share.range} of all, at 95 % confidence"
+    remedy = "" if trials.proven else f"; plan for more with --pass {trials.NEEDED:g}"
+    sentence = f"{name}: {share.count} of {share.of} flights succeed, so {of_all}{remedy}"
+    style = "" if trials.proven else "red"
+    return Fact("trials", Facts(values), "conditions", sentence, level=REPORT, style=style)
 
 
 def _verdict(report: Report) -> str:
@@ -100,5 +106,8 @@ def _verdict(report: Report) -> str:
     if report.score is not None and not report.score.outcome.is_success:
         return "certified, but this flight fails"
     if report.trials is not None and not report.is_reliable:
-        return f"certified, but too few flights succeed under '{report.trials.conditions.name}' conditions"
+        conditions = f"under '{report.trials.conditions.name}' conditions"
+        if report.trials.refuted:
+            return f"certified, but too few flights succeed {conditions}"
+        return f"certified, but not proven to succeed often enough {conditions}"
     return "certified, and it flies"

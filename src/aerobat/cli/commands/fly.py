@@ -33,8 +33,8 @@ def fly(
     output folder, as one: PROBLEM.plan (the whole plan), plan.csv (position, velocity, acceleration and jerk
     at 100 Hz), flight.npz (everything that was simulated), report.png, report.json, and run.toml, from which
     `aerobat repeat` does all of it again. With --autopilot, autopilot.txt has the settings of a real board
-    for it. Exits with 0 only if the plan is certified, the flight went well, and at least 95 of 100 flights
-    under the conditions succeed; --conditions none leaves these out.
+    for it. Exits with 0 only if the plan is certified, the flight went well, and others prove that 95 % of
+    all flights under the conditions succeed; --conditions none leaves these out.
 
     Parameters
     ----------

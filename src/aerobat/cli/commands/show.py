@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated
 
@@ -16,13 +17,15 @@ from aerobat.declaration import unknown_name
 from aerobat.documents import in_document
 from aerobat.errors import SpecError
 from aerobat.interchange.robots import SUFFIXES, import_vehicle, read_robot_description
-from aerobat.problem import load_problem, problem_names, problem_text
+from aerobat.problem import Problem, load_problem, problem_names, problem_text
 from aerobat.reporting.facts import Fact, Facts
 from aerobat.reporting.tables import print_table, table
 from aerobat.reporting.vehicles import vehicle_row
-from aerobat.vehicle import load_vehicle, vehicle_names, vehicle_text
+from aerobat.vehicle import Vehicle, load_vehicle, vehicle_names, vehicle_text
 
-OF_VEHICLES = {"mass", "inertia", "rotors"}  # keys of their files
+OF_VEHICLES, OF_PROBLEMS = (
+    {*(field.name for field in fields(cls)), *cls.SHORTHANDS} for cls in (Vehicle, Problem)
+)  # keys of their files
 
 
 def show(name: str | None = None, /, *, out: Annotated[Path | None, Parameter(group=output)] = None) -> None:
@@ -67,7 +70,7 @@ def _is_vehicle(name: str) -> bool:
         if not isinstance(error, FileNotFoundError) or name in problem_names() or name.endswith(".toml"):
             return False  # and load_problem says what is wrong, if anything is
         raise unknown_name("problem or vehicle", name, [*problem_names(), *vehicle_names()]) from None
-    return bool(OF_VEHICLES & table.keys())
+    return len(OF_VEHICLES & table.keys()) > len(OF_PROBLEMS & table.keys())
 
 
 def _show_vehicle(name: str) -> None:

@@ -29,7 +29,7 @@ from aerobat.simulation import Flight
 from aerobat.storage import whole_folder
 
 if TYPE_CHECKING:  # which takes long to import
-    from aerobat.studies.sweep import Sweep
+    from aerobat.studies.trials import Trials
 
 FLIGHT = "flight.npz"
 AUTOPILOT = "autopilot.txt"  # the settings of the firmware that flew
@@ -157,7 +157,7 @@ def finish(
     return ExitCode.WELL if report.is_well else ExitCode.NOT_WELL
 
 
-def _trials(plan: Plan, record: RunRecord) -> Sweep | None:
+def _trials(plan: Plan, record: RunRecord) -> Trials | None:
     """Flights under random conditions, of which a plain run imports nothing."""
     from aerobat.cli.trials import trial_flights
 

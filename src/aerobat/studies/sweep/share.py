@@ -35,10 +35,15 @@ class Share:
         high = betaincinv(self.count + 1, others, 1.0 - outside) if others else 1.0
         return float(low), float(high)
 
+    @property
+    def range(self) -> str:
+        """The interval in percent."""
+        low, high = self.interval
+        return f"{percent(low)} to {percent(high)} %"
+
     def __str__(self) -> str:
         """The share in percent, with its interval."""
-        low, high = self.interval
-        return f"{percent(self.fraction)} % ({percent(low)} to {percent(high)} %)"
+        return f"{percent(self.fraction)} % ({self.range})"
 
 
 def percent(fraction: float) -> str:
