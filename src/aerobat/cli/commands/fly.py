@@ -13,7 +13,6 @@ from aerobat.cli.runs.folder import Flown, finish
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import flight_settings, planned
 from aerobat.control import named_controller
-from aerobat.errors import SpecError
 from aerobat.evaluation import score
 from aerobat.planning import Plan, nominal_flight
 from aerobat.simulation.flight_controller import AUTOPILOTS
@@ -42,28 +41,15 @@ def fly(
         A name that `aerobat show` lists, a problem's TOML file, or a .plan file or a run's folder, whose
         plan is flown as it is.
     """
-    settings = flight_settings(flying, _controller(flying), flying.plant, flying.autopilot)
+    PLANTS.instance(flying.plant)
+    settings = flight_settings(flying, flying.plant)
+    autopilot = AUTOPILOTS.instance(flying.autopilot)
+    if autopilot is not None:
+        autopilot.require()
     plan, record = planned(
         problem, options, "fly", settings, explain=explaining.explain, workers=flying.workers
     )
     return finish(plan, record, options, flown(plan, settings), explaining.explain)
-
-
-def _controller(flying: FlyingOptions) -> str:
-    """The name of the controller asked for. Raises SpecError for names, or pairs, that cannot fly."""
-    PLANTS.instance(flying.plant)
-    name = flying.controller or ("full" if flying.autopilot is None else "rates")
-    law = named_controller(name)
-    autopilot = AUTOPILOTS.instance(flying.autopilot)
-    if autopilot is None:
-        return name
-    autopilot.require()
-    if not getattr(law, "GIVES_RATES", False):
-        raise SpecError(
-            f"--autopilot {flying.autopilot} holds body rates, which --controller {name} does not give; "
-            "leave --controller out"
-        )
-    return name
 
 
 def flown(plan: Plan, settings: FlightSettings) -> Flown:
