@@ -28,9 +28,11 @@ class Betaflight(Autopilot):
     The vehicle is held at its start until the firmware is armed and its motors turn, then let go.
     """
 
+    lines: tuple[str, ...] = ()  # of its command line, behind those that the vehicle's settings are
+
     def begin(self, vehicle: Vehicle, setpoint: RateSetpoint, max_rate: float) -> BetaflightRun:
         """Return the firmware, armed, its motors at the first set-point; see `Autopilot.begin`."""
-        return BetaflightRun(vehicle, setpoint, max_rate)
+        return BetaflightRun(vehicle, setpoint, max_rate, self.lines)
 
     def require(self) -> None:
         """See `Autopilot.require`."""
@@ -39,7 +41,9 @@ class Betaflight(Autopilot):
     def settings(self, vehicle: Vehicle, max_rate: float) -> str:
         """Return the lines to paste to a board; what protects a vehicle on the ground stays on."""
         lines = betaflight_settings(vehicle, stick_rate(max_rate))
-        return "\n".join((f"# {vehicle.name}, for the command line of Betaflight 4.6", *lines, "save", ""))
+        return "\n".join(
+            (f"# {vehicle.name}, for the command line of Betaflight 4.6", *lines, *self.lines, "save", "")
+        )
 
 
 AUTOPILOTS.add("betaflight", Betaflight)
@@ -48,9 +52,11 @@ AUTOPILOTS.add("betaflight", Betaflight)
 class BetaflightRun:
     """A firmware that flies a vehicle; see `AutopilotRun`."""
 
-    def __init__(self, vehicle: Vehicle, setpoint: RateSetpoint, peak: float) -> None:
+    def __init__(
+        self, vehicle: Vehicle, setpoint: RateSetpoint, peak: float, more: tuple[str, ...] = ()
+    ) -> None:
         rate = stick_rate(peak)
-        lines = betaflight_settings(vehicle, rate, simulated=True)
+        lines = (*betaflight_settings(vehicle, rate, simulated=True), *more)
         self._order = rotor_order(vehicle)
         self._low = vehicle.min_thrusts[list(self._order)]
         self._span = vehicle.max_thrusts[list(self._order)] - self._low
