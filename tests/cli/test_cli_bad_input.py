@@ -183,6 +183,11 @@ ARGUMENT_FAULTS = {
     "a limit below zero": (["check", "taken", "--max-speed", "-1"], "max-speed"),
     "rows at no rate": (["check", "taken", "--rate", "0"], "rate"),
     "conditions of a plan that need not pass": (["plan", "line", "--conditions", "lab"], "--pass"),
+    "an autopilot of a plan that need not pass": (["plan", "line", "--autopilot", "betaflight"], "--pass"),
+    "a controller that gives no rates": (
+        ["plan", "line", "--pass", "0.9", "--autopilot", "betaflight", "--controller", "lee"],
+        "leave --controller out",
+    ),
     "to pass for certain": (["fly", "line", "--pass", "1", "--conditions", "lab"], "--pass"),
     "to pass as in the paper": (
         ["plan", "line", "--paper", "--pass", "0.9", "--conditions", "lab"],

@@ -26,7 +26,7 @@ RUNS = {
     "a flight under conditions": ("fly", "line", "--conditions", "lab", "--seed", "7", "--order", "5"),
     "an angle and another vehicle": ("fly", "half-flip", "--angle", "-30", "--vehicle", "crazyflie"),
     "the paper's program and law": ("fly", "flip-roll", "--paper", "--controller", "paper"),
-    "a plan that passes": ("plan", "line", "--order", "4", "--pass", "0.5", "--conditions", "lab"),
+    "a plan that passes": ("plan", "line", "--order", "4", "--pass", "0.5", "--autopilot", "betaflight"),
     "another planner, no flight": ("plan", "section-v", "--planner", "min-snap", "--stop-after", "3"),
     "a problem and a vehicle of one's own": (
         "fly",

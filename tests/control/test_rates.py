@@ -95,7 +95,7 @@ def test_rates_stay_within_what_a_gyro_tells() -> None:
     start = ab.BodyState(
         [0.0, 0.0, 1.0], [0.0] * 3, [0.7071067811865476, 0.7071067811865475, 0.0, 0.0], [0.0] * 3
     )
-    path = ab.Trajectory(np.array([1.0]), np.array([[[0.0, 0.0, 1.0]]]))
+    path = ab.Trajectory(np.array([3.0]), np.array([[[0.0, 0.0, 1.0]]]))
     flight = ab.fly(path, QUAD, start=start, controller="rates")
     assert np.abs(flight.omega_body).max() < 8.0
     assert flight.position_error[-1] < 0.3

@@ -9,6 +9,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,13 @@ import pytest
 
 import aerobat as ab
 from aerobat.errors import SpecError
+from aerobat.interchange import read_blackbox
 from aerobat.kernels.rate_loop import RateSetpoint
 from aerobat.links.betaflight import autopilot
 from aerobat.links.betaflight.autopilot import Betaflight, BetaflightRun
 from aerobat.links.betaflight.process import Firmware, FirmwareEnded, configured
 from aerobat.links.betaflight.settings import betaflight_settings
+from aerobat.reporting.blackbox import blackbox_figure
 from aerobat.simulation.flight_controller import Sensed
 from command_lines import run, without_pictures
 from shared_plans import shared_plan
@@ -166,6 +169,7 @@ def test_the_command_flies_writes_the_settings_of_a_board_and_repeats(
     ended, _, said = run(capsys, "fly", "half-flip", "--autopilot", "betaflight", "--out", tmp_path / "run")
     assert ended == 0, said
     assert "set p_roll = " in (tmp_path / "run" / "autopilot.txt").read_text()
+    assert len((tmp_path / "run" / "blackbox.bfl").read_bytes()) > 10_000
     assert '"rates on betaflight"' in (tmp_path / "run" / "report.json").read_text()
     assert "bit for bit" in run(capsys, "repeat", tmp_path / "run")[2]
 
@@ -176,3 +180,69 @@ def test_a_controller_that_gives_no_rates_is_refused_before_anything_is_planned(
     ended, _, said = run(capsys, "fly", "half-flip", "--autopilot", "betaflight", "--controller", "lee")
     assert ended == 2
     assert "leave --controller out" in said
+
+
+def test_a_blackbox_log_by_a_library_tells_the_flight_that_was_flown(tmp_path: Path) -> None:
+    plan, file = shared_plan("half-flip"), tmp_path / "blackbox.bfl"
+    flight = ab.fly(plan, autopilot=Betaflight(blackbox=str(file)), controller="rates", rate=1000.0)
+    log = read_blackbox(file)
+    planned = ab.reference(plan, times=flight.times)
+    begin = log.begin(planned.times, planned.setpoint.omega_body)
+    for logged, flown in ((log.omega_body, flight.omega_body), (log.rate_setpoint, flight.rate_setpoint)):
+        there = np.stack([np.interp(flight.times + begin, log.times, axis) for axis in logged.T], axis=-1)
+        assert np.sqrt(np.mean((there - flown) ** 2)) < 0.03 * np.abs(flown).max()
+    assert 0.0 <= log.motors.min() < log.motors.max() <= 1.0
+    drawn = blackbox_figure(log, plan).axes
+    assert [len(axes.lines) for axes in drawn] == [3, 3, 3, 4]
+    with pytest.raises(SpecError, match="shorter than the plan"):
+        log.begin(np.array([0.0, 60.0]), np.zeros((2, 3)))
+
+
+def test_what_is_no_blackbox_log_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    for content in (b"", b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n", b"text"):
+        file = tmp_path / "log.bfl"
+        file.write_bytes(content)
+        with pytest.raises(SpecError, match="no flight with gyro, setpoint and motors"):
+            read_blackbox(file)
+    with pytest.raises(SpecError, match="No such file"):
+        read_blackbox(tmp_path / "none.bfl")
+
+
+DEFAULT_GAINS = tuple(
+    f"set {kind}_{axis} = {gain}"
+    for axis in ("roll", "pitch", "yaw")
+    for kind, gain in (("p", 45), ("i", 80), ("d", 30))
+)
+SLOW_RATES = tuple(
+    f"set {axis}_{name} = 30" for axis in ("roll", "pitch", "yaw") for name in ("rc_rate", "srate")
+)
+REAR_AND_FRONT_RIGHT_SWAPPED = (
+    "mixer CUSTOM", "mmix reset",
+    "mmix 0 1.0 -1.0 -1.0 1.0", "mmix 1 1.0 -1.0 1.0 -1.0", "mmix 2 1.0 1.0 1.0 1.0",
+    "mmix 3 1.0 1.0 -1.0 -1.0",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("cause", "lines"),
+    [
+        (None, ()),
+        ("rate gains", DEFAULT_GAINS),
+        ("rates", SLOW_RATES),
+        ("motor order", REAR_AND_FRONT_RIGHT_SWAPPED),
+    ],
+)
+def test_a_firmware_set_wrongly_is_found_in_its_flights(cause: str | None, lines: tuple[str, ...]) -> None:
+    plan = shared_plan("half-flip")
+    drawn = {"conditions": "lab", "seed": 1, "flights": range(1), "controller": "rates"}
+    fault = ab.inspect_flight(ab.fly(plan, autopilot=Betaflight(lines=lines), **drawn)[0], plan).fault
+    assert (fault and fault.cause) == cause
+
+
+def test_rotors_twice_as_slow_are_found_in_a_flight() -> None:
+    plan = shared_plan("half-flip")
+    slow = replace(QUAD, rotors=tuple(replace(rotor, lag=2.0 * rotor.lag) for rotor in QUAD.rotors))
+    flown = ab.fly(plan, slow, nominal=QUAD, controller="rates", autopilot="betaflight", rate=1000.0)
+    fault = ab.inspect_flight(flown, plan).fault
+    assert fault is not None
+    assert fault.cause == "lag"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -84,6 +85,64 @@ def test_a_planted_cause_is_named_first_and_explains_most_of_the_error(
     # all parts add up: at every time, and along the largest error
     np.testing.assert_allclose(sum(found.errors.values()), found.error, atol=1e-4)
     assert sum(share.error for share in found.shares) == pytest.approx(found.largest, abs=1e-3)
+
+
+@cache
+def by_rates() -> tuple[ab.Plan, ab.Flight]:
+    plan = shared_plan("half-flip")
+    return plan, ab.fly(plan, conditions="lab", flights=range(1), controller="rates")[0]
+
+
+def changed_log(**series: np.ndarray) -> ab.Flight:
+    flight = by_rates()[1]
+    return replace(flight, series={**flight.series, **series})
+
+
+def with_motors_swapped() -> ab.Flight:
+    return changed_log(commands=by_rates()[1].commands[:, [0, 2, 1, 3]])
+
+
+def with_half_the_rates() -> ab.Flight:
+    return changed_log(rate_setpoint=2.0 * by_rates()[1].rate_setpoint)
+
+
+def with_gains_for_more_inertia() -> ab.Flight:
+    plan, _ = by_rates()
+    assert plan.vehicle is not None
+    heavy = replace(plan.vehicle, inertia=2.0 * plan.vehicle.inertia)
+    return ab.fly(plan, plan.vehicle, nominal=heavy, controller="rates", rate=1000.0)
+
+
+def with_twice_the_lag() -> ab.Flight:
+    plan, _ = by_rates()
+    return ab.fly(plan, with_rotors(plan, lag=2.0), nominal=plan.vehicle, controller="rates", rate=1000.0)
+
+
+@pytest.mark.parametrize(
+    ("cause", "flown", "evidence"),
+    [
+        ("motor order", with_motors_swapped, "rotor 1 obeys what rotor 2 should"),
+        ("rates", with_half_the_rates, r"turns at 0\.5\d? of the rates asked"),
+        ("rate gains", with_gains_for_more_inertia, r"gain is [23]\.\d times as large in roll"),
+        ("lag", with_twice_the_lag, "rotors take 4[01] ms to follow, not 20 ms"),
+    ],
+)
+def test_a_fault_of_the_inner_loop_is_named_by_its_log(
+    cause: str, flown: Callable[[], ab.Flight], evidence: str
+) -> None:
+    found = ab.inspect_flight(flown(), by_rates()[0])
+    assert found.fault is not None
+    assert found.fault.cause == cause
+    assert re.search(evidence, found.fault.evidence)
+    assert found.fault.evidence in f"{found.verdict} {' '.join(found.remarks)}"
+    np.testing.assert_allclose(sum(found.errors.values()), found.error, atol=1e-4)
+
+
+def test_a_flight_by_an_inner_loop_as_set_shows_no_fault_of_it() -> None:
+    plan, flight = by_rates()
+    assert ab.inspect_flight(flight, plan).fault is None
+    assert ab.inspect_flight(ab.fly(plan, controller="rates"), plan).fault is None
+    assert ab.inspect_flight(ab.fly(plan), plan).fault is None
 
 
 @pytest.mark.parametrize("number", [0, pytest.param(1, marks=pytest.mark.slow)])

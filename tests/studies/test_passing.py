@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.studies.passing import Passing, Round
+from aerobat.studies.passing.passing import _Tightening
 
 WEAK = ab.Dispersion(name="weak", mass=0.05, rotor=0.04, start_position=0.02)
 HARSH = ab.Dispersion(name="harsh", start_velocity=30.0, mass=1e-4)
@@ -53,6 +57,17 @@ def test_a_probability_that_is_met_already_costs_nothing():
     )
     assert found.price == 0.0
     assert len(found.rounds) == 1
+
+
+@given(first=st.integers(1, 5), need=st.integers(1, 20), room=st.integers(0, 20))
+def test_the_least_reserve_is_found_wherever_plans_end(first: int, need: int, room: int):
+    """Without a plan above some reserve, a smaller one that is enough is found all the same."""
+    tightening = object.__new__(_Tightening)
+    tightening.task = SimpleNamespace(is_enough=lambda share: share)
+    most = need + room
+    tightening._round = lambda steps: None if steps > most else SimpleNamespace(share=steps >= need)
+    steps, done = tightening._smallest(first)
+    assert (steps, done.share) == (need, True)
 
 
 @pytest.mark.slow

@@ -206,7 +206,7 @@ class PlanningOptions(PlannerOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class ConditionsOptions:
-    """Options of the conditions, and of planning for them."""
+    """Options of the conditions, of what flies under them, and of planning for both."""
 
     probability: Annotated[
         float | None,
@@ -222,6 +222,17 @@ class ConditionsOptions:
     seed: Seed = 0
     """The seed of the conditions: the same seed, the same flight."""
 
+    controller: Annotated[str | None, Parameter(group=flying)] = None
+    """The control law: full, or paper, the paper's own without moment feed-forward, motor-lag compensation
+    and tilt before yaw, both at the gains of the vehicle's file; lee, lqr, indi; rates, collective thrust and
+    body rates for an inner loop (CTBR); or one of your own that --import brings in. Default: full, with
+    --autopilot rates."""
+
+    autopilot: Annotated[str | None, Parameter(group=flying)] = None
+    """A flight controller's firmware, to which the controller rates gives rates and thrust: betaflight, or
+    your own that --import brings in. The folder of a flight then holds settings to paste to a board. The
+    flights of --pass have the model of its inner loop in its place."""
+
     workers: Annotated[
         str | None,
         Workers(
@@ -235,16 +246,6 @@ class ConditionsOptions:
 @dataclass(frozen=True, kw_only=True)
 class FlyingOptions(ConditionsOptions):
     """Options of the flight."""
-
-    controller: Annotated[str | None, Parameter(group=flying)] = None
-    """The control law: full, or paper, the paper's own without moment feed-forward, motor-lag compensation
-    and tilt before yaw, both at the gains of the vehicle's file; lee, lqr, indi; rates, collective thrust and
-    body rates for an inner loop (CTBR); or one of your own that --import brings in. Default: full, with
-    --autopilot rates."""
-
-    autopilot: Annotated[str | None, Parameter(group=flying)] = None
-    """A flight controller's firmware, to which the controller rates gives rates and thrust: betaflight, or
-    your own that --import brings in. The run's folder then holds settings to paste to a board."""
 
     plant: Annotated[str | None, Parameter(group=flying)] = None
     """Another simulator's physics in place of the built-in: mujoco, in which a gate that is touched is felt,

@@ -20,6 +20,7 @@ from aerobat.cli.progress import Progress, planning_progress, showing
 from aerobat.cli.runs.record import USUAL_CONDITIONS, FlightSettings, RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.cli.terminal import say
+from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
 from aerobat.errors import Infeasible, SpecError
 from aerobat.interchange import column_groups
@@ -35,6 +36,7 @@ from aerobat.planning import (
     with_explanation,
 )
 from aerobat.problem import Problem, load_problem
+from aerobat.simulation.flight_controller import AUTOPILOTS
 from aerobat.vehicle import Vehicle
 
 
@@ -100,19 +102,14 @@ def planned(
     return plan_of(record, explain, workers) if make is None else make(record), record
 
 
-def flight_settings(
-    options: ConditionsOptions,
-    controller: str = "full",
-    plant: str | None = None,
-    autopilot: str | None = None,
-) -> FlightSettings:
+def flight_settings(options: ConditionsOptions, plant: str | None = None) -> FlightSettings:
     """Return the settings by which a plan is flown.
 
     Args:
         options: As they were given.
-        controller: The name of what flies it.
         plant: The name of the physics, None for the built-in.
-        autopilot: The name of the firmware of the inner loop, None for our model.
+
+    Raises SpecError for names, or pairs, that cannot fly.
     """
     named = options.conditions
     if named is None and options.probability is not None:
@@ -121,13 +118,25 @@ def flight_settings(
     if options.workers is not None and options.probability is None:
         raise SpecError("--workers fly for --pass; give that too, or leave --workers out")
     return FlightSettings(
-        controller,
+        _controller(options),
         conditions,
         options.seed,
         plant=plant,
-        autopilot=autopilot,
+        autopilot=options.autopilot,
         probability=options.probability,
     )
+
+
+def _controller(options: ConditionsOptions) -> str:
+    """The name of the controller asked for. Raises SpecError for names, or pairs, that cannot fly."""
+    name = options.controller or ("full" if options.autopilot is None else "rates")
+    gives_rates = getattr(named_controller(name), "GIVES_RATES", False)
+    if AUTOPILOTS.instance(options.autopilot) is not None and not gives_rates:
+        raise SpecError(
+            f"--autopilot {options.autopilot} holds body rates, which --controller {name} does not give; "
+            "leave --controller out"
+        )
+    return name
 
 
 def plan_of(record: RunRecord, explain: bool = False, workers: str | None = None) -> Plan:

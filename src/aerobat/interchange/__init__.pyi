@@ -1,3 +1,4 @@
+from .blackbox import Blackbox, read_blackbox
 from .columns import column_groups, write_columns
 from .csv import read_csv, read_rows, write_csv
 from .flight_log import read_flight_log
@@ -5,7 +6,9 @@ from .read import read_plan, read_trajectory
 from .tables import read_table, write_table
 
 __all__ = [
+    "Blackbox",
     "column_groups",
+    "read_blackbox",
     "read_csv",
     "read_flight_log",
     "read_plan",

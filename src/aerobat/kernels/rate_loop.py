@@ -22,7 +22,8 @@ from aerobat.kernels.vectors import ZERO, add, add_scaled, clip_components, scal
 _FREQUENCY = 75.0  # [rad/s] of the poles in roll and pitch, which the filters' delays let pass
 _DAMPING = 0.8  # [-] ratio of all poles
 _YAW_SHARE = 0.01  # [s/rad] of all the moment of yaw, that an error of yaw rate asks for
-_INTEGRAL = 8.0  # [1/s] integral gain over the proportional one
+_INTEGRAL = 8.0  # [1/s] integral gain over the proportional one, at most
+_INTEGRAL_SHARE = 0.125  # [-] of a proportional gain, which that ratio is at most: the loop stays damped
 _SHORTEST_LAG = 0.01  # [s] of rotors: faster ones leave the loop's own delays
 _MAX_INTEGRAL = 0.25  # [rad] of the rate error, per axis
 _TINY = 1e-300  # keeps 0/0 away and changes no other quotient
@@ -75,8 +76,8 @@ def rate_gains(ops: Ops, airframe: Airframe) -> RateGains:
     tilt, yaw = _FREQUENCY * _FREQUENCY * lag, 1.0 / (4.0 * _DAMPING * _DAMPING * lag)
     yaw = ops.minimum(yaw, _YAW_SHARE * torque / inertia[2][2])
     damping = ops.maximum(2.0 * _DAMPING * _FREQUENCY * lag - 1.0, 0.0)
-    proportional = (tilt, tilt, yaw)
-    return RateGains(proportional, scale(_INTEGRAL, proportional), (damping, damping, 0.0))
+    integral, slow = (gain * ops.minimum(_INTEGRAL, _INTEGRAL_SHARE * gain) for gain in (tilt, yaw))
+    return RateGains((tilt, tilt, yaw), (integral, integral, slow), (damping, damping, 0.0))
 
 
 def init(thrusts: PerRotor, gyro: Vector) -> RateLoopState:

@@ -28,7 +28,12 @@ WIDTH = 10.4  # [in]
 @facts.register
 def _(found: Inspection) -> Iterator[Fact]:
     yield Fact("verdict", found.verdict, text=found.verdict)
-    yield from kept(cause=found.cause, max_position_error_m=found.largest, time_s=found.time)
+    yield from kept(
+        cause=found.cause,
+        inner_loop_fault=None if found.fault is None else found.fault.cause,
+        max_position_error_m=found.largest,
+        time_s=found.time,
+    )
     yield Fact("shares", found.shares, "shares")
     yield from (Fact("", text=remark) for remark in found.remarks)
     place = found.alignment
@@ -66,7 +71,7 @@ def inspection_figure(inspection: Inspection) -> Figure:
     The main cause is red; a line marks the time of the largest error.
     """
     with house_style():
-        height = AXIS + len(CAUSES) * (CAUSE + GAP) + ERROR + TITLES
+        height = AXIS + len(inspection.shares) * (CAUSE + GAP) + ERROR + TITLES
         figure = blank_page(height, "What caused the error", [inspection.verdict])
         top = height - TITLES - ERROR
         whole = panel(figure, LEFT, top, WIDTH, ERROR)
@@ -81,7 +86,7 @@ def inspection_figure(inspection: Inspection) -> Figure:
             heading(axes, "", str(share))
             _draw(axes, inspection, parts[share.cause], colour)
             axes.set_ylim(-limit, limit)
-            axes.tick_params(labelbottom=k == len(CAUSES))
+            axes.tick_params(labelbottom=k == len(inspection.shares))
         axes.set_xlabel("time [s]")
     return figure
 

@@ -325,10 +325,13 @@ class LogRow(NamedTuple):
     motion: VehicleState
     commands: Commands
     observed: LoggedEstimate | tuple[()]  # () where the true state is known
+    rate_setpoint: RateSetpoint | tuple[()]  # in effect; () where no inner loop takes one
 
 
 def log_row(signals: Signals) -> LogRow:
     """The row of a flight's log."""
     body, own = signals.observer
     observed = LoggedEstimate(body, own.filter.since_pose) if own else ()
-    return LogRow(signals.plant, rotor_commands(signals), observed)
+    in_effect = setpoint_in_effect(signals)
+    rate_setpoint = in_effect if isinstance(in_effect, RateSetpoint) else ()
+    return LogRow(signals.plant, rotor_commands(signals), observed, rate_setpoint)

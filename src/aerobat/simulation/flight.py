@@ -48,7 +48,9 @@ class Series:
     per_vehicle: bool = True
     over_time: bool = True
     logical: bool = False
-    part: str | None = None  # of a flight that only some have: what a filter saw, what the plant felt
+    part: str | None = (
+        None  # of a flight that only some have: what a filter saw, what an inner loop was asked
+    )
 
 
 SERIES = (
@@ -63,6 +65,8 @@ SERIES = (
     Series("observed_velocity", "m/s", (3,), part="observer"),
     Series("observed_q_world_body", "", (4,), part="observer"),
     Series("since_pose", "s", part="observer"),  # [s] since the exposure of the last pose that was taken
+    Series("rate_setpoint", "rad/s", (3,), part="inner loop"),  # body rates asked of it, in effect
+    Series("thrust_setpoint", "N", part="inner loop"),  # collective, likewise
     Series("contact", "", part="plant"),  # what the vehicle touched, by the codes of Contact
     Series("setpoint_position", "m", (3,), per_vehicle=False),
     Series("setpoint_velocity", "m/s", (3,), per_vehicle=False),
@@ -90,9 +94,10 @@ class Flight:
 
     Row k of every series is the situation at `times[k]`: the true state, the thrusts that the rotors give,
     and the commands that the controller sends then and holds until the next row. Each series of SERIES is an
-    attribute too, as `flight.thrusts`; what a filter made of its sensors is there where one flew, what the
-    vehicle touched where its plant felt that. A vehicle that diverges ends at its `ends`; in a batch its
-    later rows repeat that one. Raises SpecError for shapes that do not match and numbers that are not finite.
+    attribute too, as `flight.thrusts`; what a filter made of its sensors is there where one flew, what an
+    inner loop was asked where it held the rates, what the vehicle touched where its plant felt that. A
+    vehicle that diverges ends at its `ends`; in a batch its later rows repeat that one. Raises SpecError for
+    shapes that do not match and numbers that are not finite.
     """
 
     times: Array  # [s], (T,), rising
@@ -139,6 +144,11 @@ class Flight:
     def is_observed(self) -> bool:
         """True where a filter saw the flight."""
         return "since_pose" in self.series
+
+    @property
+    def has_inner_loop(self) -> bool:
+        """True where an inner loop held the rates that the controller gave."""
+        return "rate_setpoint" in self.series
 
     @property
     def first_contact(self) -> tuple[Contact, float]:

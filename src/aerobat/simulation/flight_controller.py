@@ -53,6 +53,10 @@ class Autopilot(ABC):
     def require(self) -> None:
         """Raise BackendMissing where the firmware, or what it takes to run it, is not installed."""
 
+    def logging_to(self, file: str) -> Autopilot:
+        """Return the same, which writes its own log of a flight to a file; itself where it keeps none."""
+        return self
+
     def settings(self, vehicle: Vehicle, max_rate: float) -> str:
         """Return the firmware's settings for a real board, as text for its command line; none by default.
 

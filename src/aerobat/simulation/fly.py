@@ -115,6 +115,9 @@ def _flight(
             "observed_q_world_body": body.q_world_body,
             "since_pose": log.observed.since_pose,
         }
+    if log.rate_setpoint:
+        series["rate_setpoint"] = from_components(log.rate_setpoint.omega)
+        series["thrust_setpoint"] = log.rate_setpoint.thrust
     if contact is not None:
         series["contact"] = contact
     for name in setpoint_series(setpoints[0]):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import numpy as np
@@ -9,11 +11,10 @@ from cyclopts import Parameter
 
 from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.options import ExplainingOptions, FlyingOptions, PlanningOptions
-from aerobat.cli.runs.folder import Flown, finish
+from aerobat.cli.runs.folder import BLACKBOX, Flown, finish
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import flight_settings, planned
 from aerobat.control import named_controller
-from aerobat.errors import SpecError
 from aerobat.evaluation import score
 from aerobat.planning import Plan, nominal_flight
 from aerobat.simulation.flight_controller import AUTOPILOTS
@@ -33,8 +34,9 @@ def fly(
     output folder, as one: PROBLEM.plan (the whole plan), plan.csv (position, velocity, acceleration and jerk
     at 100 Hz), flight.npz (everything that was simulated), report.png, report.json, and run.toml, from which
     `aerobat repeat` does all of it again. With --autopilot, autopilot.txt has the settings of a real board
-    for it. Exits with 0 only if the plan is certified, the flight went well, and others prove that 95 % of
-    all flights under the conditions succeed; --conditions none leaves these out.
+    for it, and blackbox.bfl the firmware's own log. Exits with 0 only if the plan is certified, the flight
+    went well, and others prove that 95 % of all flights under the conditions succeed; --conditions none leaves
+    these out.
 
     Parameters
     ----------
@@ -42,51 +44,41 @@ def fly(
         A name that `aerobat show` lists, a problem's TOML file, or a .plan file or a run's folder, whose
         plan is flown as it is.
     """
-    settings = flight_settings(flying, _controller(flying), flying.plant, flying.autopilot)
+    PLANTS.instance(flying.plant)
+    settings = flight_settings(flying, flying.plant)
+    autopilot = AUTOPILOTS.instance(flying.autopilot)
+    if autopilot is not None:
+        autopilot.require()
     plan, record = planned(
         problem, options, "fly", settings, explain=explaining.explain, workers=flying.workers
     )
     return finish(plan, record, options, flown(plan, settings), explaining.explain)
 
 
-def _controller(flying: FlyingOptions) -> str:
-    """The name of the controller asked for. Raises SpecError for names, or pairs, that cannot fly."""
-    PLANTS.instance(flying.plant)
-    name = flying.controller or ("full" if flying.autopilot is None else "rates")
-    law = named_controller(name)
-    autopilot = AUTOPILOTS.instance(flying.autopilot)
-    if autopilot is None:
-        return name
-    autopilot.require()
-    if not getattr(law, "GIVES_RATES", False):
-        raise SpecError(
-            f"--autopilot {flying.autopilot} holds body rates, which --controller {name} does not give; "
-            "leave --controller out"
-        )
-    return name
-
-
 def flown(plan: Plan, settings: FlightSettings) -> Flown:
     """The flight of a plan, and its score."""
     assert plan.vehicle is not None, "a command plans for a vehicle"
     controller = named_controller(settings.controller, plan.vehicle.controller)
+    autopilot = AUTOPILOTS.instance(settings.autopilot)
     given = settings.conditions, settings.plant, settings.autopilot
     is_nominal = given == (None, None, None) and controller == plan.vehicle.controller
     if is_nominal:  # the flight that the plan was judged by
         flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.surroundings)
-    else:
+        return Flown(flight, score(flight, plan, plan.vehicle), settings.controller, settings.plant)
+    with TemporaryDirectory() as folder:
+        log = Path(folder) / BLACKBOX
         flight = simulate(
             plan,
             controller=controller,
             conditions=settings.conditions,
             seed=settings.seed,
             plant=settings.plant,
-            autopilot=settings.autopilot,
+            autopilot=None if autopilot is None else autopilot.logging_to(str(log)),
         )
+        own_log = log.read_bytes() if log.exists() else b""
     judged = score(flight, plan, plan.vehicle)
-    autopilot = AUTOPILOTS.instance(settings.autopilot)
     if autopilot is None:
         return Flown(flight, judged, settings.controller, settings.plant)
     by = f"{settings.controller} on {settings.autopilot}"
     peak = float(np.abs(flight.setpoint.omega_body).max())
-    return Flown(flight, judged, by, settings.plant, autopilot.settings(plan.vehicle, peak))
+    return Flown(flight, judged, by, settings.plant, autopilot.settings(plan.vehicle, peak), own_log)

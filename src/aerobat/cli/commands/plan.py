@@ -33,9 +33,10 @@ def plan(
     settings = FlightSettings()
     if passing.probability is not None:
         settings = flight_settings(passing)
-    elif passing.conditions is not None or passing.seed or passing.workers is not None:
+    elif passing != ConditionsOptions():
         raise SpecError(
-            "--conditions, --seed and --workers are for --pass, or for `aerobat fly`; leave them out"
+            "--conditions, --seed, --controller, --autopilot and --workers are for --pass, or for "
+            "`aerobat fly`; leave them out"
         )
     found, record = planned(
         problem, options, "plan", settings, explain=explaining.explain, workers=passing.workers

@@ -33,12 +33,14 @@ if TYPE_CHECKING:  # which takes long to import
 
 FLIGHT = "flight.npz"
 AUTOPILOT = "autopilot.txt"  # the settings of the firmware that flew
+BLACKBOX = "blackbox.bfl"  # its own log of the flight
 INSPECTION = "inspect.png"  # so does its inspection, by `aerobat inspect`
 REPLAY = "replay.html"  # joins the run later, by `aerobat view`
 FILES = (
     RECORD,
     FLIGHT,
     AUTOPILOT,
+    BLACKBOX,
     REPLAY,
     INSPECTION,
     "plan.npz",
@@ -116,6 +118,7 @@ class Flown:
     controller: str
     plant: str | None  # the name of another simulator
     settings: str = ""  # of a firmware that flew, for its command line
+    own_log: bytes = b""  # of that firmware
 
 
 def finish(
@@ -146,6 +149,8 @@ def finish(
             flight.save(staging / FLIGHT)
         if flown is not None and flown.settings:
             (staging / AUTOPILOT).write_text(flown.settings, encoding="utf-8")
+        if flown is not None and flown.own_log:
+            (staging / BLACKBOX).write_bytes(flown.own_log)
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "report.png").write_bytes(picture)
 

@@ -31,6 +31,8 @@ from aerobat.kernels.vectors import (
     transform,
 )
 
+_YAW_SHARE = 1.0 / 3.0  # [-] of the inner loop's gain of yaw: a faster outer loop is not damped
+
 
 class RatesState(NamedTuple):
     """State of the outer loop from tick to tick, its set-point among it."""
@@ -52,8 +54,8 @@ class Rates(ControlLaw):
     GIVES_RATES: ClassVar[bool] = True
 
     tilt_gain: NonNegative = 16.0  # [1/s] rate per angle of roll and pitch
-    yaw_gain: NonNegative = 6.0  # [1/s] rate per angle of yaw
-    max_correction: Positive = 5.0  # [rad/s] of each axis, beside what the reference asks
+    yaw_gain: NonNegative = 6.0  # [1/s] rate per angle of yaw, at most a third of the inner loop's gain
+    max_correction: Positive = 3.0  # [rad/s] of each axis, beside what the reference asks
     max_rate: Positive = 34.0  # [rad/s] of each axis: gyros tell 35, which are 2000°/s
 
     def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> RatesState:
@@ -83,7 +85,8 @@ class Rates(ControlLaw):
         left = subtract(turning, times(gains.integral, state.integral))
         p, q, r = gains.proportional
         lead = left[0] / p, left[1] / q, left[2] / r
-        feedback = times(scale(2.0, error.rotation), (self.tilt_gain, self.tilt_gain, self.yaw_gain))
+        yaw_gain = ops.minimum(self.yaw_gain, _YAW_SHARE * gains.proportional[2])
+        feedback = times(scale(2.0, error.rotation), (self.tilt_gain, self.tilt_gain, yaw_gain))
         asked_rate = to_body(body_axes, reference.omega)
         correction = add(subtract(to_body(body_axes, attitude.omega), asked_rate), feedback)
         correction = clip_components(ops, correction, self.max_correction)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from aerobat.errors import SpecError
@@ -9,9 +12,10 @@ from aerobat.kernels.ops import PerRotor
 from aerobat.kernels.rate_loop import RateSetpoint
 from aerobat.links.betaflight.msp import arming_disable_flags
 from aerobat.links.betaflight.packets import Sticks, idle_sticks, state_packet
-from aerobat.links.betaflight.process import Firmware, configured, require_firmware
+from aerobat.links.betaflight.process import Firmware, FirmwareEnded, configured, require_firmware
 from aerobat.links.betaflight.settings import betaflight_settings, rotor_order, stick_rate
 from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot, Sensed
+from aerobat.storage import whole_file
 from aerobat.vehicle import Vehicle
 
 _STEP = 0.02  # [s] between packets while it stands
@@ -19,6 +23,13 @@ _BOOT = 1.0  # [s] without packets: channels that come before the receiver's set
 _GRACE, _ARMING, _SPINNING_UP = 5.0, 0.5, 0.1  # [s]; it arms no earlier than 5 s after its start
 _STILL = Sensed((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), (1.0, 0.0, 0.0, 0.0))
 _THROTTLE = 0.05  # [-] from which on motors turn
+_FLUSHING = 0.2  # [s] from disarming until its log is whole
+_BLACKBOX = (
+    "set blackbox_device = VIRTUAL",
+    "set blackbox_mode = NORMAL",
+    "set blackbox_sample_rate = 1/4",  # 2 kHz
+    "set blackbox_high_resolution = ON",
+)
 _LOST = 0.02  # [s] of motors at rest under throttle, after which the firmware is disarmed
 
 
@@ -28,9 +39,18 @@ class Betaflight(Autopilot):
     The vehicle is held at its start until the firmware is armed and its motors turn, then let go.
     """
 
+    lines: tuple[str, ...] = ()  # of its command line, behind those that the vehicle's settings are
+    blackbox: str | None = None  # the file that its own log is written to, left out none
+
     def begin(self, vehicle: Vehicle, setpoint: RateSetpoint, max_rate: float) -> BetaflightRun:
         """Return the firmware, armed, its motors at the first set-point; see `Autopilot.begin`."""
-        return BetaflightRun(vehicle, setpoint, max_rate)
+        return BetaflightRun(vehicle, setpoint, max_rate, self.lines, self.blackbox)
+
+    def logging_to(self, file: str) -> Betaflight:
+        """See `Autopilot.logging_to`."""
+        own: Any = self
+        logging: Betaflight = replace(own, blackbox=file)
+        return logging
 
     def require(self) -> None:
         """See `Autopilot.require`."""
@@ -39,7 +59,9 @@ class Betaflight(Autopilot):
     def settings(self, vehicle: Vehicle, max_rate: float) -> str:
         """Return the lines to paste to a board; what protects a vehicle on the ground stays on."""
         lines = betaflight_settings(vehicle, stick_rate(max_rate))
-        return "\n".join((f"# {vehicle.name}, for the command line of Betaflight 4.6", *lines, "save", ""))
+        return "\n".join(
+            (f"# {vehicle.name}, for the command line of Betaflight 4.6", *lines, *self.lines, "save", "")
+        )
 
 
 AUTOPILOTS.add("betaflight", Betaflight)
@@ -48,9 +70,18 @@ AUTOPILOTS.add("betaflight", Betaflight)
 class BetaflightRun:
     """A firmware that flies a vehicle; see `AutopilotRun`."""
 
-    def __init__(self, vehicle: Vehicle, setpoint: RateSetpoint, peak: float) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        setpoint: RateSetpoint,
+        peak: float,
+        more: tuple[str, ...] = (),
+        blackbox: str | None = None,
+    ) -> None:
         rate = stick_rate(peak)
-        lines = betaflight_settings(vehicle, rate, simulated=True)
+        logging = () if blackbox is None else _BLACKBOX
+        lines = (*betaflight_settings(vehicle, rate, simulated=True), *logging, *more)
+        self._blackbox = blackbox
         self._order = rotor_order(vehicle)
         self._low = vehicle.min_thrusts[list(self._order)]
         self._span = vehicle.max_thrusts[list(self._order)] - self._low
@@ -104,4 +135,12 @@ class BetaflightRun:
 
     def close(self) -> None:
         """See `AutopilotRun.close`."""
-        self._firmware.close()
+        try:
+            if self._blackbox is not None:
+                self._stand(_FLUSHING, idle_sticks(armed=False))
+                with whole_file(self._blackbox) as file:
+                    file.write_bytes(self._firmware.log())
+        except FirmwareEnded:
+            pass  # which the flight has said
+        finally:
+            self._firmware.close()

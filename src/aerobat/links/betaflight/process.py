@@ -176,6 +176,11 @@ class Firmware:
             return self._saved.read_bytes()
         raise FirmwareEnded("autopilot: Betaflight does not save its settings; run it again")
 
+    def log(self) -> bytes:
+        """Return the last log that it wrote as if to a card; empty if there is none."""
+        logs = sorted(Path(self._folder.name).glob("LOG*"))
+        return logs[-1].read_bytes() if logs else b""
+
     def close(self) -> None:
         """End the process and remove its folder."""
         if self._serial is not None:

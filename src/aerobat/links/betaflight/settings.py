@@ -22,6 +22,7 @@ from aerobat.vehicle.fleet import Fleet
 
 # the firmware's src/main/flight/pid.h: a thousandth of a motor's range for 1°/s, 1°, and 1°/s²
 _PROPORTIONAL, _INTEGRAL, _DERIVATIVE = 0.032029, 0.244381, 0.000529
+_YAW_INTEGRAL = 2.5  # times as much, pid_init.c
 _MIXED = 1000.0
 _MAX_GAIN = 250
 GYRO_LIMIT = 1998.0  # [°/s] of the gyro, and of what a stick can ask
@@ -125,10 +126,11 @@ def _gains(vehicle: Vehicle) -> Iterator[tuple[str, int]]:
     for k, axis in enumerate(("roll", "pitch", "yaw")):
         for letter, kind, scale in (
             ("p", gains.proportional, _PROPORTIONAL),
-            ("i", gains.integral, _INTEGRAL),
+            ("i", gains.integral, _INTEGRAL * (_YAW_INTEGRAL if axis == "yaw" else 1.0)),
             ("d", gains.derivative, _DERIVATIVE),
         ):
             value = round(kind[k] / authority[k] * _MIXED * pi / 180.0 / scale)
+            value = max(value, 1 if kind[k] > 0.0 else 0)  # a small gain is no gain at all else
             if value > _MAX_GAIN:
                 raise SpecError(
                     f"autopilot: the rotors of '{vehicle.name}' are too weak for Betaflight's gains, "

@@ -11,6 +11,7 @@ from aerobat.planning import Plan
 from aerobat.simulation import Flight
 from aerobat.studies.inspection.alignment import aligned
 from aerobat.studies.inspection.disturbances import PositionLoop, command_delay, disturbances
+from aerobat.studies.inspection.inner_loop import inner_loop_fault
 from aerobat.studies.inspection.responses import responses
 from aerobat.studies.inspection.result import Inspection
 from aerobat.vehicle import Vehicle
@@ -32,7 +33,9 @@ def inspect_flight(
     The flight's acceleration differs from what its controller would have had it do by what the observer saw
     wrongly, what rotors and attitude did not deliver, and what the vehicle's model leaves out. Each, and the
     start's offset, is carried through the closed position loop; the errors that come of it add up to the
-    flight's own. Raises SpecError for a batch, for a log too short, and for one that is not of the plan.
+    flight's own. Where an inner loop held the rates, its commands are compared with those of its model.
+
+    Raises SpecError for a batch, for a log too short, and for one that is not of the plan.
 
     Args:
         flight: The log of one flight.
@@ -59,7 +62,9 @@ def inspect_flight(
     error = flight.position - flight.setpoint_position
     rate = flight.velocity - flight.setpoint_velocity
     unsaturated = "delay" if delay > NOTICED else "gains"
-    errors = responses(flight.times, (error[0], rate[0]), causes, loop, unsaturated)
+    fault = inner_loop_fault(flight, nominal)
+    named = None if fault is None else fault.cause
+    errors = responses(flight.times, (error[0], rate[0]), causes, loop, unsaturated, named)
     return Inspection(
         times=flight.times,
         error=error,
@@ -68,4 +73,5 @@ def inspect_flight(
         saturated=float(flight.saturated.mean()),
         observed=flight.is_observed,
         alignment=alignment,
+        fault=fault,
     )

@@ -10,16 +10,22 @@ from aerobat.studies.inspection.disturbances import Disturbances, PositionLoop, 
 
 _DIGITS = 9  # of a row's duration [s], so that rows alike are stepped alike
 _ANSWERED = 1e-3  # [m/s²] of feedback, below which it answers nothing but rounding
-NAMES = ("start", "hand-off", "vehicle", "saturation", "delay", "gains")
+NAMES = ("start", "hand-off", "vehicle", "saturation", "delay", "gains")  # of every flight
 
 
 def responses(
-    times: Array, start: tuple[Array, Array], found: Disturbances, loop: PositionLoop, unsaturated: str
+    times: Array,
+    start: tuple[Array, Array],
+    found: Disturbances,
+    loop: PositionLoop,
+    unsaturated: str,
+    fault: str | None = None,
 ) -> dict[str, Array]:
     """Errors [m] by their causes, (T, 3) each.
 
     What is missing in a saturation that the plan did not ask for goes to the cause whose error was the
-    largest when it began: that error is what the controller was answering.
+    largest when it began: that error is what the controller was answering. Where the inner loop has a fault,
+    all that is missing goes to it, but for what the plan asked too much.
 
     Args:
         times: Of the rows [s], (T,).
@@ -27,27 +33,31 @@ def responses(
         found: Accelerations held between rows.
         loop: The position loop.
         unsaturated: The cause of what is missing without a saturation, of NAMES.
+        fault: The cause that is the inner loop's, if it has a fault.
     """
-    state = np.zeros((3, len(NAMES), 3))  # position, velocity, integral
+    names = NAMES if fault is None else (*NAMES, fault)
+    state = np.zeros((3, len(names), 3))  # position, velocity, integral
     state[0, 0], state[1, 0] = start
     errors = [state[0]]
     durations = np.round(np.diff(times), _DIGITS)
     steps = {float(h): _step(float(h), loop) for h in np.unique(durations)}
-    answered, before = NAMES.index(unsaturated), ShortfallCause.UNSATURATED
+    usual = names.index(fault or unsaturated)
+    answered, before = usual, ShortfallCause.UNSATURATED
     for row, h in enumerate(durations):
         kind = ShortfallCause(found.kinds[row])
         if kind is not before:
-            answered = _cause(kind, state, loop, NAMES.index(unsaturated))
+            is_faults = fault is not None and kind is ShortfallCause.LED_TO
+            answered = usual if is_faults else _cause(kind, state, loop, usual)
         before = kind
-        push = np.zeros((len(NAMES), 3))
-        push[NAMES.index("hand-off")] = found.observer[row]
-        push[NAMES.index("vehicle")] = found.vehicle[row]
+        push = np.zeros((len(names), 3))
+        push[names.index("hand-off")] = found.observer[row]
+        push[names.index("vehicle")] = found.vehicle[row]
         push[answered] += found.missing[row]
         forward, gain = steps[float(h)]
         state = np.einsum("ij,jck->ick", forward, state) + gain[:, None, None] * push
         errors.append(state[0])
     series = np.stack(errors)
-    return {name: series[:, k] for k, name in enumerate(NAMES)}
+    return {name: series[:, k] for k, name in enumerate(names)}
 
 
 def _cause(kind: ShortfallCause, state: Array, loop: PositionLoop, unsaturated: int) -> int:

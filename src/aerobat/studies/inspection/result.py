@@ -13,6 +13,7 @@ from aerobat.arrays import Array
 from aerobat.declaration import by_value, short
 from aerobat.simulation.outcome import length
 from aerobat.studies.inspection.alignment import Alignment
+from aerobat.studies.inspection.inner_loop import InnerLoopFault
 
 NEGLIGIBLE = 0.005  # [m] of error at most that calls for no cause: millimetres remain in the best flights
 _SHOWN = 5e-4  # [m] that is more than nothing in a line
@@ -33,6 +34,22 @@ CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
         "vehicle": (
             "a vehicle or air other than planned for",
             "weigh the vehicle and measure its thrusts: `mass`, `max_thrust`, `drag`, wind",
+        ),
+        "motor order": (
+            "an order of the motors other than the vehicle's",
+            "set order and direction of the motors in the board's configurator",
+        ),
+        "rates": (
+            "an inner loop that turns at other rates than asked",
+            "paste the run's autopilot.txt to the board, which sets the rates of its sticks",
+        ),
+        "rate gains": (
+            "an inner loop with other gains than set",
+            "paste the run's autopilot.txt to the board, which sets its gains",
+        ),
+        "lag": (
+            "a lag of the rotors longer than planned for",
+            "measure their step response, set `lag`, and plan and configure anew",
         ),
     }
 )
@@ -67,11 +84,12 @@ class Inspection:
 
     times: Array  # [s] of the log, (T,)
     error: Array  # [m] position less set-point, world, (T, 3)
-    errors: Mapping[str, Array]  # [m] of each of CAUSES, (T, 3), which add up to it
+    errors: Mapping[str, Array]  # [m] by causes of CAUSES, (T, 3), which add up to it
     delay: float  # [s] from commands to rotors, by the log
     saturated: float  # [-] part of the rows
     observed: bool  # false where the log does not tell what an observer saw
     alignment: Alignment
+    fault: InnerLoopFault | None = None  # of the inner loop, whatever it cost
 
     def __post_init__(self) -> None:
         """Write-protect."""
@@ -124,12 +142,22 @@ class Inspection:
         blind = (
             "the log does not hold what an observer saw: hand-offs and other errors of sensors do not show"
         )
-        asked = {f"{shift}; {moved}": not place.is_none, blind: not self.observed}
+        asked = {
+            str(self.fault): self.fault is not None and self.fault.cause == self.cause,
+            f"{shift}; {moved}": not place.is_none,
+            blind: not self.observed,
+        }
         return tuple(remark for remark, is_said in asked.items() if is_said)
 
     @property
     def verdict(self) -> str:
-        """The main cause and what would mend it, in one sentence."""
+        """The main cause and what would mend it, in one sentence; before it a fault of the inner loop."""
+        if self.fault is None or self.fault.cause == self.cause:
+            return self._main_cause
+        return f"{self.fault}; {CAUSES[self.fault.cause][1]}. Of the error: {self._main_cause}"
+
+    @property
+    def _main_cause(self) -> str:
         if self.cause is None:
             return f"nothing stands out: the error is {length(self.largest)} at most"
         first = self.shares[0]

@@ -196,7 +196,7 @@ class _Tightening:
     def _first_steps(self, plain: Plan) -> int:
         """The steps of reserve that the spread of the plain plan's commands asks for."""
         task = self.task
-        spread = spread_of(plain, task.vehicle, task.conditions, task.seed, self.training)
+        spread = spread_of(plain, task.vehicle, task.conditions, task.seed, task.controller, self.training)
         return min(max(ceil(spread.reserve / STEP), 1), MAX_FIRST)
 
     def _smallest(self, first: int) -> tuple[int, Round]:
@@ -205,11 +205,16 @@ class _Tightening:
         Args:
             first: Steps to begin with.
         """
-        low, steps = 0, first
-        while steps <= MAX_STEPS and (done := self._round(steps)) is not None:
-            if self.task.is_enough(done.share):
+        low, high, steps = 0, MAX_STEPS + 1, first  # high: without a plan
+        while steps > low:
+            done = self._round(steps)
+            if done is None:
+                high = steps
+            elif self.task.is_enough(done.share):
                 return self._refined(low, steps, done)
-            low, steps = steps, steps + STRIDE
+            else:
+                low = steps
+            steps = min(low + STRIDE, (low + high) // 2)
         best = max(self.rounds, key=lambda each: each.share.count)
         if best.share.fraction < self.task.probability:
             raise self._unreachable(best, self.training)
@@ -268,7 +273,7 @@ class _Tightening:
 
     def _proven(self, done: Round, share: Share, fresh: range) -> Passing:
         task, plain = self.task, self.rounds[0]
-        spread = spread_of(done.plan, task.vehicle, task.conditions, task.seed, fresh)
+        spread = spread_of(done.plan, task.vehicle, task.conditions, task.seed, task.controller, fresh)
         tube = Tube(
             conditions=task.conditions.name,
             seed=task.seed,

@@ -43,7 +43,9 @@ class Spread:
         return float(self.departure.mean())
 
 
-def spread_of(plan: Plan, vehicle: Vehicle, conditions: Dispersion, seed: int, flights: range) -> Spread:
+def spread_of(
+    plan: Plan, vehicle: Vehicle, conditions: Dispersion, seed: int, controller: str, flights: range
+) -> Spread:
     """The spread of flights, the first ones of `flights`.
 
     Args:
@@ -51,9 +53,17 @@ def spread_of(plan: Plan, vehicle: Vehicle, conditions: Dispersion, seed: int, f
         vehicle: The nominal one.
         conditions: What varies.
         seed: Of the flights.
+        controller: The name of what flies.
         flights: Their numbers.
     """
-    batch = fly(plan, vehicle, conditions=conditions, seed=seed, flights=flights[:SAMPLED])
+    batch = fly(
+        plan,
+        vehicle,
+        controller=controller,
+        conditions=conditions,
+        seed=seed,
+        flights=flights[:SAMPLED],
+    )
     spacing = float(batch.times[1] - batch.times[0]) if len(batch.times) > 1 else 1.0
     rows = slice(None, None, max(1, round(1.0 / (ROWS_RATE * spacing))))
     span = vehicle.thrust_ranges

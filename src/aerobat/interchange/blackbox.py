@@ -1,0 +1,101 @@
+"""Betaflight's blackbox logs, decoded by the package betaflight-chirp-core."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.util import find_spec
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.declaration import PathName, by_value, validated
+from aerobat.errors import BackendMissing, SpecError
+from aerobat.storage import read_whole
+
+MAX_LOG = 2**27  # bytes
+_AXES = 3
+_MICROSECOND = 1e-6  # [s]
+_FINE = 10.0  # steps of a degree per second in a log of high resolution
+_STEP = 0.005  # [s] between the beginnings that are tried
+
+
+@by_value
+@dataclass(frozen=True, eq=False)
+class Blackbox:
+    """The rates of a flight by a flight controller's own log, on its own clock. Axes are FLU."""
+
+    times: Array  # [s], (T,), rising
+    omega_body: Array  # [rad/s] by the gyro, filtered, (T, 3)
+    rate_setpoint: Array  # [rad/s] asked by the sticks, (T, 3)
+    motors: Array  # [-] of the range, in the firmware's order, (T, n)
+
+    def begin(self, times: Array, omega_body: Array) -> float:
+        """Return the time [s] of the log's clock at which rates that were planned fit those measured best.
+
+        Args:
+            times: Of the plan [s], rising, (N,).
+            omega_body: Planned then [rad/s], (N, 3).
+
+        Raises SpecError for a log that is shorter than the plan.
+        """
+        last = float(self.times[-1] - times[-1])
+        begins = np.arange(float(self.times[0]), last + _STEP, _STEP)
+        if last < self.times[0]:
+            raise SpecError("the log is shorter than the plan; give the flight's own plan")
+        misfits = [float(np.mean((self._rates(times + begin) - omega_body) ** 2)) for begin in begins]
+        return float(begins[int(np.argmin(misfits))])
+
+    def _rates(self, times: Array) -> Array:
+        return np.stack([np.interp(times, self.times, axis) for axis in self.omega_body.T], axis=-1)
+
+
+@validated
+def read_blackbox(path: PathName) -> Blackbox:
+    """Read the last flight of a Betaflight blackbox log, as of `aerobat fly --autopilot betaflight`.
+
+    Raises SpecError for a file that is no such log, BackendMissing without betaflight-chirp-core.
+    """
+    try:
+        raw = read_whole(path, MAX_LOG)
+        names, rows, header = _decoded(raw)
+        columns = {name: rows[:, names.index(name)] for name in names}
+        low, high = header["motorOutput"]
+        scale = pi / 180.0 / (_FINE if header.get("blackbox_high_resolution") else 1.0)
+        motors = [columns[name] for name in names if name.startswith("motor[")]
+        return Blackbox(
+            times=_MICROSECOND * columns["time"],
+            omega_body=scale * _three(columns, "gyroADC"),
+            rate_setpoint=scale * _three(columns, "setpoint"),
+            motors=(np.stack(motors, axis=-1) - low) / (high - low),
+        )
+    except OSError as error:
+        raise SpecError(f"blackbox log {path}: {error.strerror}") from None
+    except SpecError as error:
+        raise SpecError(f"blackbox log {path}: {error}") from None
+    except (KeyError, ValueError, IndexError, TypeError):
+        raise SpecError(
+            f"blackbox log {path}: it has no flight with gyro, setpoint and motors; log these in NORMAL mode"
+        ) from None
+
+
+def _three(columns: dict[str, Array], name: str) -> Array:
+    return np.stack([columns[f"{name}[{axis}]"] for axis in range(_AXES)], axis=-1)
+
+
+def _decoded(raw: bytes) -> tuple[list[str], Array, dict[str, Any]]:
+    """Names and rows of the last flight's frames, and the settings before them."""
+    if find_spec("betaflight_chirp_core") is None:
+        raise BackendMissing(
+            "blackbox logs need betaflight-chirp-core; install it with `pip install betaflight-chirp-core`"
+        )
+    from betaflight_chirp_core.decoder import FlightLogParser, split_sessions
+
+    parser = FlightLogParser(raw, *split_sessions(raw)[-1])
+    parser.parse_header()
+    parser.parse_data()
+    names = parser.frame_defs["I"]["name"]
+    rows = np.array([row[: len(names)] for row in parser.main_frames], dtype=np.float64)
+    rising = np.diff(rows[:, names.index("time")], prepend=-1.0) > 0.0
+    return names, rows[rising], parser.sys_config

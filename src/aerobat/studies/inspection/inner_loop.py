@@ -1,0 +1,210 @@
+"""Faults of a flight controller's inner loop, by what its log says it was asked, measured and commanded.
+
+An inner loop as its model is commands J (p (r − ω) + i ∫(r − ω) − d ω'). Motors in another order command the
+same by other rotors; other rates, p (s r − ω) + …; other gains, another p. All are told by regression.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import exp
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.signal import lfilter
+
+from aerobat.arrays import Array
+from aerobat.control.parameters import airframe_parameters, controller_parameters
+from aerobat.engines.floats import FloatOps, first_numbers
+from aerobat.kernels import rate_loop
+from aerobat.kernels.rate_loop import RateLoopModel, RateSetpoint, rate_gains
+from aerobat.simulation import Flight
+from aerobat.simulation.law_controller import DERIVATIVE, GYRO
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.fleet import Fleet
+
+_SMOOTHED = (
+    0.008  # [s] of each of two lags, which leave what a gyro's noise and the loop's filters do not make
+)
+_OTHER_ORDER = 0.6  # [-] of the misfit of commands, that another order leaves at most
+_OTHER_RATES = 0.5  # [-] of what the model does not explain, that other rates leave at most
+_RATES_OFF = 0.15  # [-] by which rates are others
+_GAIN_OFF = (
+    0.4  # [-] by which a gain is another one: the firmware's whole numbers, filters and delays take 0.2
+)
+_ERRORS = 4.0  # standard errors of a gain, beside that
+_LAG_OFF = 0.4  # [-] by which rotors are slower than planned for: twice what a lab's spread makes of four
+_EXCITED = 0.05  # [rad/s] of the rate error, RMS, that tells a gain
+_FEWEST = 20  # rows without saturation that tell a gain
+_AXES = ("roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True)
+class InnerLoopFault:
+    """A fault that a log shows of the inner loop, whatever it cost."""
+
+    cause: str  # of CAUSES
+    evidence: str  # a sentence with its numbers
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return self.evidence
+
+
+def inner_loop_fault(flight: Flight, vehicle: Vehicle) -> InnerLoopFault | None:
+    """Return the fault of the inner loop that a log shows, None where it shows none, or no inner loop.
+
+    Args:
+        flight: The log of one flight.
+        vehicle: The vehicle that the inner loop was set for.
+    """
+    if not flight.has_inner_loop:
+        return None
+    log = _InnerLoopLog.of(flight, vehicle)
+    return log.order() or log.rates() or log.gains() or log.lag()
+
+
+@dataclass(frozen=True, eq=False)
+class _InnerLoopLog:
+    """A log beside the model of its inner loop."""
+
+    flight: Flight
+    vehicle: Vehicle
+    fleet: Fleet
+    period: float  # [s] between rows
+    free: Array  # rows that no saturation is felt in, (T,)
+
+    @classmethod
+    def of(cls, flight: Flight, vehicle: Vehicle) -> _InnerLoopLog:
+        period = float(np.median(np.diff(flight.times)))
+        felt = np.ones(max(1, round(4.0 * _SMOOTHED / period)))
+        free = lfilter(felt, [1.0], flight.saturated.astype(np.float64)) < 0.5
+        return cls(flight, vehicle, Fleet.of([vehicle]), period, free)
+
+    def order(self) -> InnerLoopFault | None:
+        """Other rotors than the model's do what it commands."""
+        expected = self._model_commands()
+        misfit = np.mean((self.flight.commands[:, :, None] - expected[:, None, :]) ** 2, axis=0)
+        rotors, meant = linear_sum_assignment(misfit)
+        if misfit[rotors, meant].sum() > _OTHER_ORDER**2 * np.trace(misfit) or (rotors == meant).all():
+            return None
+        swapped = (
+            f"rotor {k} obeys what rotor {m} should" for k, m in zip(rotors, meant, strict=True) if k != m
+        )
+        return InnerLoopFault("motor order", f"motors are in another order: {', '.join(swapped)}")
+
+    def rates(self) -> InnerLoopFault | None:
+        """The commands are those for a multiple of the rates asked."""
+        asked, rest = self._asked, self._commanded + self._model_feedback
+        factors, unexplained, before = [], 0.0, 0.0
+        for axis in range(len(_AXES)):
+            columns = np.stack([asked[:, axis], np.ones(len(asked))], axis=1)[self.free]
+            goal = rest[self.free, axis]
+            if len(goal) < _FEWEST:
+                return None
+            found = np.linalg.lstsq(columns, goal, rcond=None)[0]
+            factors.append(float(found[0]))
+            unexplained += float(np.sum((goal - columns @ found) ** 2))
+            off = goal - columns[:, 0]
+            before += float(np.sum((off - off.mean()) ** 2))
+        strongest = int(np.argmax(np.std(asked[self.free], axis=0)))
+        factor = factors[strongest]
+        if unexplained > _OTHER_RATES**2 * before or abs(factor - 1.0) < _RATES_OFF:
+            return None
+        axis_name = _AXES[strongest]
+        return InnerLoopFault(
+            "rates", f"the inner loop turns at {factor:.2f} of the rates asked in {axis_name}"
+        )
+
+    def gains(self) -> InnerLoopFault | None:
+        """The commands are those of another proportional gain."""
+        off = [
+            f"{factor:.1f} times as large in {axis}"
+            for axis, (factor, error) in zip(_AXES, self._gain_factors(), strict=False)
+            if abs(factor - 1.0) > _GAIN_OFF + _ERRORS * error
+        ]
+        return InnerLoopFault("rate gains", f"the inner loop's gain is {', '.join(off)}") if off else None
+
+    def lag(self) -> InnerLoopFault | None:
+        """Rotors follow their commands later than the vehicle's file says."""
+        thrusts = self.flight.thrusts
+        missing, change = (self.flight.commands - thrusts)[:-1], np.diff(thrusts, axis=0)
+        share = float(np.sum(missing * change) / max(np.sum(missing**2), 1e-12))
+        lag = -self.period / np.log(np.clip(1.0 - share, 1e-9, 1.0 - 1e-9))
+        planned = float(self.vehicle.lags.mean())
+        if lag < (1.0 + _LAG_OFF) * planned:
+            return None
+        return InnerLoopFault("lag", f"rotors take {1e3 * lag:.0f} ms to follow, not {1e3 * planned:.0f} ms")
+
+    def _gain_factors(self) -> Iterator[tuple[float, float]]:
+        """The proportional gain over the model's, and its standard error, by axis."""
+        omega, setpoint = self.flight.omega_body, self.flight.rate_setpoint
+        error = setpoint - omega
+        terms = (error, self._integral(error), np.gradient(omega, self.period, axis=0))
+        smoothed = [self._smoothed(term) for term in (*terms, self._commanded)]
+        correlated = 8.0 * _SMOOTHED / self.period  # rows of which one is worth as much alone
+        for axis, gain in enumerate(self._gains.proportional):
+            *columns, goal = (term[self.free, axis] for term in smoothed)
+            if len(goal) < max(_FEWEST, 2.0 * correlated):
+                return
+            matrix = np.stack([*columns, np.ones(len(goal))], axis=1)
+            found = np.linalg.lstsq(matrix, goal, rcond=None)[0]
+            if np.std(columns[0]) < _EXCITED:
+                yield 1.0, np.inf
+                continue
+            spread = float(np.var(goal - matrix @ found)) * correlated
+            variance = np.linalg.pinv(matrix.T @ matrix)[0, 0] * spread
+            yield float(found[0]) / gain, float(np.sqrt(variance)) / gain
+
+    @cached_property
+    def _gains(self) -> rate_loop.RateGains:
+        return rate_gains(FloatOps, first_numbers(airframe_parameters(self.fleet)))
+
+    @property
+    def _commanded(self) -> Array:
+        """The angular acceleration [rad/s²] that the commands ask of the nominal vehicle, (T, 3)."""
+        moment = self.flight.commands @ self.fleet.allocation[0, 1:].T
+        return np.asarray(moment @ np.linalg.inv(self.fleet.inertia[0]).T)
+
+    @property
+    def _asked(self) -> Array:
+        """The part of the model's commands that its set-points make [rad/s²], (T, 3)."""
+        return self._proportional_integral(self.flight.rate_setpoint)
+
+    @property
+    def _model_feedback(self) -> Array:
+        """The part that the measured rates make, its sign turned [rad/s²], (T, 3)."""
+        omega = self.flight.omega_body
+        slope = np.asarray(self._gains.derivative) * np.gradient(omega, self.period, axis=0)
+        return np.asarray(self._proportional_integral(omega) + slope)
+
+    def _proportional_integral(self, rates: Array) -> Array:
+        gains = self._gains
+        integral = np.asarray(gains.integral) * self._integral(rates)
+        return np.asarray(np.asarray(gains.proportional) * rates + integral)
+
+    def _integral(self, rates: Array) -> Array:
+        return np.asarray(self.period * np.cumsum(rates, axis=0))
+
+    def _smoothed(self, values: Array) -> Array:
+        left = exp(-self.period / _SMOOTHED)
+        lags = [(1.0 - left) ** 2], [1.0, -2.0 * left, left * left]
+        return np.asarray(lfilter(*lags, values - values[:1], axis=0))
+
+    def _model_commands(self) -> Array:
+        """The commands [N] of the model for what the log says was asked and measured, (T, n)."""
+        known = controller_parameters(self.vehicle.controller, self.fleet, self.flight.environment)
+        airframe, mixer = first_numbers(airframe_parameters(self.fleet)), first_numbers(known.mixer)
+        model = RateLoopModel(airframe, mixer, GYRO, DERIVATIVE)
+        rows = (self.flight.rate_setpoint, self.flight.thrust_setpoint, self.flight.omega_body)
+        first = self.flight.commands[0].tolist(), self.flight.omega_body[0].tolist()
+        state = rate_loop.init(*map(tuple, first))
+        commands = []
+        steps = np.diff(self.flight.times, prepend=self.flight.times[0] - self.period)
+        for omega, thrust, gyro, elapsed in zip(*(row.tolist() for row in (*rows, steps)), strict=True):
+            setpoint = RateSetpoint(tuple(omega), thrust)
+            state = rate_loop.step(FloatOps, model, state, setpoint, tuple(gyro), elapsed)
+            commands.append(state.commands.thrusts)
+        return np.asarray(np.array(commands))
