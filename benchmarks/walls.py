@@ -159,8 +159,8 @@ def main() -> None:
         print(
             f"{family}: {len(seconds)} of {arguments.count} planned, {certified} certified, {flying} fly; "
             f"{np.median(seconds):.2f} s of the processor, {max(seconds):.1f} at most; "
-            f"{np.median(durations):.2f} s long; {100 * min(gaps):.2f} cm clear at least; over the best of many {np.median(ratios):.3f}, "
-            f"{np.max(ratios):.3f} at most"
+            f"{np.median(durations):.2f} s long; {100 * min(gaps):.2f} cm clear at least; "
+            f"over the best of many {np.median(ratios):.3f}, {np.max(ratios):.3f} at most"
         )
 
 

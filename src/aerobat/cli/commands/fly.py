@@ -35,8 +35,8 @@ def fly(
     at 100 Hz), flight.npz (everything that was simulated), report.png, report.json, and run.toml, from which
     `aerobat repeat` does all of it again. With --autopilot, autopilot.txt has the settings of a real board
     for it, and blackbox.bfl the firmware's own log. Exits with 0 only if the plan is certified, the flight
-    went well, and others prove that 95 % of all flights under the conditions succeed; --conditions none leaves
-    these out.
+    went well, and others prove that 95 % of all flights under the conditions succeed; --conditions none
+    leaves these out.
 
     Parameters
     ----------
