@@ -2,8 +2,7 @@
 
 Where a route passes between things, a curtain is drawn from wall to wall across it, and what lies in it costs
 more: the next cheapest route takes another passage, if that is not much longer. Two routes that can be moved
-into one another with nothing in between are one (Zhou et al., "Robust and efficient quadrotor trajectory
-generation for fast autonomous flight", 2020: uniform visibility deformation).
+into one another with nothing in between are one (Zhou et al., RAPTOR, 2021: uniform visibility deformation).
 """
 
 from __future__ import annotations
