@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import fcl
 import numpy as np
 import pytest
 from hypothesis import given
@@ -17,7 +18,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Ellipsoid, load_vehicle
-from fcl_peer import EXACT, distance, solid
+from fcl_peer import EXACT, convex, distance, gap_between, solid
 from random_flights import Flight, moved, random_flight, with_lags
 from random_obstacles import KINDS, random_obstacle
 from suites import examples
@@ -109,6 +110,33 @@ def test_certified_bodies_are_as_near_as_samples_of_another_library_say(seed):
 @pytest.mark.parametrize("seed", range(4, 64))
 def test_many_certified_bodies_are_as_near_as_samples_of_another_library_say(seed):
     check_against_samples(forest(seed), 20_000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 2, 3, 4, 17, 23])
+def test_no_point_of_a_certified_body_enters_an_obstacle(seed):
+    """At 10⁵ instants, the hull of 200 points of its surface."""
+    flight = forest(seed)
+    found, body = certified(flight), flight.vehicle.bounding_ellipsoid
+    assert found.verdict is Verdict.HOLDS
+    hull = convex(sphere_points(200) * body.semi_axes)
+    times = np.linspace(0.0, flight.trajectory.duration, 100_000)
+    at = reference(flight.trajectory, flight.vehicle, times, environment=flight.environment)
+    places = flight.trajectory.evaluate(times)
+    centres, axes = places + body.turned(at.setpoint.q_world_body)[0], so3.axes(at.setpoint.q_world_body)
+    for obstacle in flight.environment.obstacles:
+        away = Environment(obstacles=(obstacle,)).pieces.box_distances(places)[:, 0]
+        for k in np.flatnonzero(away < body.revolved.reach + found.value):
+            hull.setTransform(fcl.Transform(axes[k], centres[k]))
+            assert gap_between(solid(obstacle), hull) >= found.bound - EXACT
+
+
+def sphere_points(count: int) -> np.ndarray:
+    """Points of the unit sphere along a spiral, (count, 3)."""
+    height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    angle = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
+    across = np.sqrt(1.0 - height**2)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
 
 
 @examples(12)

@@ -37,6 +37,10 @@ def distance(
     other: fcl.CollisionObject, centre: np.ndarray, axes: np.ndarray, semi_axes: np.ndarray
 ) -> float:
     """Of an ellipsoid with these columns as axes; negative where it overlaps, by nothing that counts."""
-    body = fcl.CollisionObject(fcl.Ellipsoid(*semi_axes), fcl.Transform(axes, centre))
+    return gap_between(other, fcl.CollisionObject(fcl.Ellipsoid(*semi_axes), fcl.Transform(axes, centre)))
+
+
+def gap_between(one: fcl.CollisionObject, other: fcl.CollisionObject) -> float:
+    """The distance of any two; negative where they overlap, by nothing that counts."""
     request = fcl.DistanceRequest(gjk_solver_type=fcl.GJKSolverType.GST_LIBCCD)
-    return float(fcl.distance(other, body, request, fcl.DistanceResult()))
+    return float(fcl.distance(one, other, request, fcl.DistanceResult()))

@@ -68,9 +68,10 @@ def certify(
     `envelope.conditions` do; of a rotor with lag the command too, and what `envelope.passages` ask at their
     instants; among obstacles the clearance of the whole body, in all angles about its thrust axis at once.
     Bounds are proven over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's
-    range (1e-5 after tens of seconds, and of a command) stays undecided. So does all that needs an attitude
-    where thrust, and with it the attitude, is undetermined. Speed and what `envelope.limits` and `envelope.conditions` bound
-    may meet their limits exactly (`path.kinematics.LIMIT_TOLERANCE`).
+    range (1e-5 after tens of seconds, and of a command) stays undecided, and of clearance one nearer than
+    1e-6 m. So does all that needs an attitude where thrust, and with it the attitude, is undetermined. Speed
+    and what `envelope.limits` and `envelope.conditions` bound may meet their limits exactly
+    (`path.kinematics.LIMIT_TOLERANCE`).
     Dead rotors are left out, and the others counted without them. Raises SpecError for derivatives beyond all
     reason, and for a vehicle that its dead rotors leave without control.
 

@@ -66,10 +66,11 @@ def clearance_finding(attitude: BodyPath | None, ball: BodyPath, pieces: Pieces)
     known = LeastGap() if attitude is None else least_gap(attitude, pieces)
     around = least_gap(ball, pieces)
     bound = min(known.bound, around.bound)
-    verdict = Verdict.HOLDS if bound >= 0.0 else Verdict.UNDECIDED
-    nearest = min(known, around, key=lambda gap: gap.value)
-    if known.value < 0.0:  # whereas a ball that overlaps says nothing of the body in it
-        verdict, nearest = Verdict.VIOLATED, known
+    nearest, verdict = min(known, around, key=lambda gap: gap.value), Verdict.UNDECIDED
+    if bound >= 0.0:
+        verdict = Verdict.HOLDS
+    elif known.value < 0.0:  # whereas a ball that overlaps says nothing of the body in it
+        nearest, verdict = known, Verdict.VIOLATED
     value = max(nearest.value, bound)  # where bodies overlap, another plane may separate them better
     found = Finding("clearance", "m", Side.MIN, value, bound, nearest.time, 0.0, verdict)
     return replace(found, obstacle=nearest.obstacle, field="environment.obstacles")
