@@ -77,8 +77,8 @@ def view_live(
 
     The scene is that of `view`. Sliders move and tilt gates, move obstacles, say the maneuver's least
     thrusts, the planner's order, the vehicle's thrust-to-weight and how much flights are dispersed; the
-    verdict is in words. It is served to this machine alone until it is closed. Raises Infeasible or SpecError where there is no plan to
-    begin with, and SpecError for a port that is taken.
+    verdict is in words. It is served to this machine alone until it is closed. Raises Infeasible or SpecError
+    where there is no plan to begin with, and SpecError for a port that is taken.
 
     Args:
         shown: What is planned, or its name, or a plan to begin with.
