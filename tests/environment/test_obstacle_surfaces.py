@@ -84,6 +84,6 @@ def test_what_reaches_far_is_cut_off_and_what_is_far_is_left_out() -> None:
     moved = replace(tree, position=np.array([40.0, 0.0, 1.0]))
     path = np.array([[0.0, 0.0, 1.0], [8.0, 0.0, 1.0]])
     (seen,) = surfaces_around((*ceiling.pieces, *moved.pieces), path)
-    assert seen.points.min(axis=0) == pytest.approx([-4.0, -4.0, 3.0])
-    assert seen.points.max(axis=0) == pytest.approx([12.0, 4.0, 3.0]), "its plane alone"
+    assert seen.points.min(axis=0) == pytest.approx([-2.0, -2.0, 3.0])
+    assert seen.points.max(axis=0) == pytest.approx([10.0, 2.0, 3.0]), "its plane alone"
     assert len(surfaces_around(tree.pieces, path)) == 1

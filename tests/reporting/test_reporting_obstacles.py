@@ -10,6 +10,7 @@ from aerobat.environment.obstacles.surface import surface_of
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.motion.picture import MovingPicture, subject_of
 from aerobat.reporting.panels import path as path_panel
+from aerobat.reporting.panels.clearances import clearances
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.obstacles import obstacle_shapes
 from obstacle_cases import open_cruise, walled_cruise
@@ -61,3 +62,29 @@ def test_a_video_shows_obstacles() -> None:
         MovingPicture(subject_of(plan, None, None), 40).at(0.2) for plan in (open_cruise(), walled_cruise())
     ]
     assert (frames[0] != frames[1]).any()
+
+
+def test_the_clearance_is_the_distance_from_the_nearest_obstacle_however_far() -> None:
+    """A level body beside a wall, above a ball and far from both."""
+    vehicle = ab.load_vehicle("agile-quad")
+    body = vehicle.bounding_ellipsoid
+    wall = ab.HalfSpace((0.0, 5.0, 0.0), (0.0, -1.0, 0.0))
+    ball = ab.Sphere((0.0, 0.0, -1.0), 0.5)
+    pieces = ab.Environment(obstacles=(wall, ball)).pieces
+    places = np.array([[0.0, 4.0, 1.0], [0.0, 0.0, 0.0], [0.0, -40.0, 0.0], [0.0, 4.9, 1.0]])
+    level = np.tile([1.0, 0.0, 0.0, 0.0], (4, 1))
+    wide, high = body.semi_axes[1], body.semi_axes[2]
+    offset = body.centre
+    found = clearances(places - offset, level, vehicle, pieces)
+    far = np.hypot(40.0, 1.0) - 0.5
+    assert found[:2] == pytest.approx([1.0 - wide, 0.5 - high], abs=1e-5)
+    assert far - wide - 1e-3 < found[2] < far - high
+    assert found[3] < 0.0
+
+
+def test_a_report_has_the_clearance_where_there_are_obstacles_and_only_there() -> None:
+    for plan, shown in ((open_cruise(), False), (walled_cruise(), True)):
+        for flight in (None, ab.fly(plan, rate=100.0, engine="floats")):
+            page = report_figure(plan, plan.vehicle, flight)
+            labels = [axes.get_ylabel() for axes in page.axes]
+            assert labels.count("clearance [m]") == shown

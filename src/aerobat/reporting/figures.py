@@ -13,6 +13,7 @@ from aerobat.planning import Plan
 from aerobat.reporting.captions import error_caption, plan_captions, score_caption
 from aerobat.reporting.page import AXIS, COLUMNS, TITLES, Place, blank_page, heading, house_style, panel
 from aerobat.reporting.panels import timelines
+from aerobat.reporting.panels.clearances import draw_clearance
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
 from aerobat.reporting.panels.stages import draw_stages
@@ -20,6 +21,7 @@ from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle, as_vehicle
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WIDTH = 4.75  # [in] of a timeline
@@ -129,11 +131,12 @@ def _flight_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | No
     facts = [*plan_captions(plan), error_caption(flight) if score is None else score_caption(score)]
     reference = reference_poses(plan_reference(plan, vehicle))
     figure, rows = _pictures(plan, vehicle, reference, actual_poses(flight), 2, facts)
-    errors, thrusts = ([panel(figure, x, y, WIDTH, ROW) for y in rows] for x in COLUMNS)
+    errors, thrusts = ([panel(figure, x, y, WIDTH, ROW) for y in rows[:2]] for x in COLUMNS)
     timelines.draw_position_error(errors[0], flight, plan.tube)
     timelines.draw_attitude_error(errors[1], flight, plan.tube)
     timelines.draw_specific_thrust(thrusts[0], plan, vehicle)
     timelines.draw_rotor_thrusts(thrusts[1], flight.times, flight.thrusts, vehicle)
+    errors += _clearance_panel(figure, rows[2:], plan, vehicle, reference)
     timelines.finish_column(errors, "Tracking error", plan.stages, plan.duration)
     timelines.finish_column(thrusts, "Thrust", plan.stages, plan.duration)
     return figure
@@ -142,13 +145,25 @@ def _flight_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | No
 def _plan_page(plan: Plan, vehicle: Vehicle) -> Figure:
     reference = plan_reference(plan, vehicle)
     facts = [*plan_captions(plan), *([] if plan.tube is None else [str(plan.tube)])]
-    figure, rows = _pictures(plan, vehicle, reference_poses(reference), [], 1, facts)
+    poses = reference_poses(reference)
+    figure, rows = _pictures(plan, vehicle, poses, [], 1, facts)
     specific, rotors = (panel(figure, x, rows[0], WIDTH, ROW) for x in COLUMNS)
     timelines.draw_specific_thrust(specific, plan, vehicle)
     timelines.draw_rotor_thrusts(rotors, reference.times, reference.rotor_thrusts, vehicle)
-    timelines.finish_column([specific], "Thrust", plan.stages, plan.duration)
+    below = _clearance_panel(figure, rows[1:], plan, vehicle, poses)
+    timelines.finish_column([specific, *below], "Thrust", plan.stages, plan.duration)
     timelines.finish_column([rotors], "Thrust of each rotor", plan.stages, plan.duration)
     return figure
+
+
+def _clearance_panel(
+    figure: Figure, rows: Sequence[float], plan: Plan, vehicle: Vehicle, poses: PoseHistory
+) -> list[Axes]:
+    """The clearance as planned, in the first column of the row that is left; none without obstacles."""
+    panels = [panel(figure, COLUMNS[0], y, WIDTH, ROW) for y in rows]
+    for axes in panels:
+        draw_clearance(axes, poses, vehicle, plan.problem.surroundings.pieces)
+    return panels
 
 
 def _pictures(
@@ -159,7 +174,12 @@ def _pictures(
     rows: int,
     facts: Sequence[str],
 ) -> tuple[Figure, list[float]]:
-    """A page with its two pictures, and the bottoms [in] of its rows of timelines, top row first."""
+    """A page with its two pictures, and the bottoms [in] of its rows of timelines, top row first.
+
+    Where there are obstacles it has a row more.
+    """
+    problem, pieces = plan.problem, plan.problem.surroundings.pieces.pieces
+    rows += bool(pieces)
     layout = PICTURES_STACKED if reference.is_flat else PICTURES_SIDE_BY_SIDE
     foot = AXIS + PITCH * (rows - 1) + ROW + TITLES
     warnings = () if plan.assessment is None else plan.assessment.warnings
@@ -168,7 +188,6 @@ def _pictures(
         panel(figure, left, foot + bottom, width, height)
         for left, bottom, width, height in (layout.path, layout.stages)
     )
-    problem, pieces = plan.problem, plan.problem.surroundings.pieces.pieces
     note = draw_path(path, reference, actual, vehicle, problem.gates, plan.stages, pieces=pieces)
     heading(path, "Path and attitude", note)
     heading(stages, "Stages" if plan.stages else "Attitudes", draw_stages(stages, plan, vehicle))

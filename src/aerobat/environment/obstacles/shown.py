@@ -15,7 +15,7 @@ from aerobat.arrays import Array
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.surface import Surface, beyond, surface_of
 
-NEAR, CUT = 0.25, 0.5  # of the longest side of what is shown: from there, up to there obstacles are shown
+NEAR, WHOLE = 0.25, 0.5  # of the longest side of what is shown: shown from there, whole if it ends there
 ALIKE = 1e-6  # [m] within which faces lie in one plane
 LEAST_AREA = 1e-6  # [m²] of a face
 MANY = 300  # pieces: of more, as of a map, each is drawn as it is
@@ -28,16 +28,19 @@ def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surfa
         pieces: In the world.
         points: What else is shown [m], (n, 3).
     """
-    lower, upper = points.min(axis=0), points.max(axis=0)
-    size = float((upper - lower).max())
-    near = [
-        piece
-        for piece in pieces
-        if (piece.box[0] <= upper + NEAR * size).all() and (piece.box[1] >= lower - NEAR * size).all()
-    ]
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float((high - low).max())
+    lower, upper = low - NEAR * size, high + NEAR * size
+    near = [each for each in pieces if (each.box[0] <= upper).all() and (each.box[1] >= lower).all()]
     whole = [surface_of(piece) for piece in near]
     parts = _apart(near, whole) if len(near) <= MANY else whole
-    found = (surface.within(lower - CUT * size, upper + CUT * size) for surface in parts)
+    margin = WHOLE * size
+    found = (
+        part
+        if (part.points >= low - margin).all() and (part.points <= high + margin).all()
+        else part.within(lower, upper)
+        for part in parts
+    )
     return tuple(surface for surface in found if surface.faces)
 
 
