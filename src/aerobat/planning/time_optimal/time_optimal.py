@@ -103,9 +103,12 @@ class TimeOptimal(Planner):
                 if own is not None:
                     return own
         last = attempts[-1].outcome
+        remedy = "ask less of its stages and limits, or give more intervals"
+        if len(task.environment.pieces):
+            remedy = "this planner knows no obstacles, take free-knots, which goes around them"
         sentence = (
             f"no motion of '{problem.name}' was found that {task.vehicle.name} can do: at the last attempt "
-            f"{last}; ask less of its stages and limits, or give more intervals"
+            f"{last}; {remedy}"
         )
         raise Infeasible(Reason(sentence, limits_of(last)), attempts)
 
