@@ -111,13 +111,13 @@ def criterion(problem: Problem) -> str:
     tolerance = problem.tolerance
     passed = [
         *(["gates as asked"] if problem.gates else []),
-        *(["no obstacle touched"] if problem.surroundings.obstacles else []),
         *(["waypoints within their radius"] if any(stage.ball for stage in stages) else []),
     ]
     within = "the goal and the places of other stages" if passed else "the whole path"
     angle = f"{degrees(tolerance.attitude):.3g}°"
     kept = f"{within} within {length(tolerance.position)}, attitudes of stages within {angle}"
-    return ", ".join([*passed, kept])
+    clear = ["no obstacle touched"] if problem.surroundings.obstacles else []
+    return ", ".join([*passed, *clear, kept])
 
 
 def _nearest_stages(problem: Problem, path: SampledPath) -> list[tuple[Stage, float]]:

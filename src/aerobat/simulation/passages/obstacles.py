@@ -2,8 +2,8 @@
 
 The body, an ellipsoid with its propellers inside, is judged at every row of a flight: a tick, in flights that
 are scored as they are flown. What it moves between two ticks is not looked at. Few rows are separated from
-few obstacles: stretches of a flight lie in boxes, and a plane that separates at one row bounds the clearance
-at its neighbours from below, so that only what may be nearer than what is known is looked at again.
+few obstacles. Stretches of a flight lie in boxes, most far from every piece. A plane that separates at
+one row bounds the clearance at its neighbours from below; only what may be nearer is looked at again.
 """
 
 from __future__ import annotations
