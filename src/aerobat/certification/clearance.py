@@ -1,14 +1,15 @@
-"""How far a body is from all obstacles over continuous time: the least gap, enclosed.
+"""Clearance of a body from all obstacles over continuous time: the least gap, enclosed.
 
-For a unit vector n from an obstacle's piece to the body, u = n·b3 and s(u) = √(wide² − (wide² − high²) u²),
+Planes that are normal to a unit vector n leave a gap between an obstacle's piece and the body. With u = n·b3
+and s(u) = √(wide² − (wide² − high²) u²) the gap is
 
-    φ(n) = n·p + up u − s(u) − aside − h(n)
+    φ(n) = n·p + up u − s(u) − aside − h(n).
 
-is a lower bound of the distance, whichever n is taken. s is concave where wide ≥ high: its tangent is above
-it, and with that in its place φ is linear in position p and thrust axis b3, whose Chebyshev series are known.
-Branch and bound over parts of the path, each beside one piece, takes n at the middle of a part, bounds φ
-along the part, and cuts into shorter parts what may yet be nearer than the nearest that was found.
-DERIVATION.md, section 9, has the details.
+It is a lower bound of the distance, whichever n is taken. s is concave where wide ≥ high, so its tangent is
+above it. With the tangent in place of s, φ is linear in position p and thrust axis b3, whose Chebyshev series
+are known. Branch and bound looks at parts of the path, each beside one piece. It takes n at the middle of a
+part and bounds φ along the part. What may yet be nearer than the nearest that was found is cut into shorter
+parts. DERIVATION.md, section 9, has the details.
 """
 
 from __future__ import annotations
@@ -163,7 +164,7 @@ class _Pairs:
         return replace(known, value=float(gaps[row]), time=time, obstacle=name)
 
     def left_open(self, found: LeastGap) -> tuple[LeastGap, _Pairs]:
-        """What is found with the bound of all pairs that are far enough, and the other pairs."""
+        """Return what is found with the bound of all pairs that are far enough, and the other pairs."""
         near = self.lower < found.enough
         bound = (self.lower - self.error)[~near].min(initial=found.bound)
         return replace(found, bound=float(bound)), self[near]

@@ -46,7 +46,7 @@ class Subintervals:
         return Subintervals.joined([Subintervals(self.interval, start, half) for start in starts])
 
     def rest(self, count: int) -> Subintervals:
-        """What is left of `count` intervals beside these parts, which do not overlap."""
+        """Return what is left of `count` intervals beside these parts, which do not overlap."""
         whole = Subintervals.whole(count)
         segment = np.concatenate([whole.interval, self.interval])
         start = np.concatenate([whole.start, self.start + self.length])
