@@ -34,10 +34,11 @@ ab.fly(path, "agile-quad", autopilot="betaflight")
 
 def main(aborted: int) -> None:
     """Fly, abort, and print."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     errors = []
     for _ in range(RUNS // AT_ONCE):
         programs = [started(FLIGHT, subprocess.PIPE) for _ in range(AT_ONCE)]
-        errors += [float(program.communicate()[0]) for program in programs]
+        errors += [float(program.communicate()[0] or "nan") for program in programs]
     spread = 1e3 * (max(errors) - min(errors))
     print(
         f"{RUNS} flights: {100 * max(errors):.2f} cm off the path at most, {spread:.3g} mm apart", flush=True
@@ -61,7 +62,9 @@ def started(script: str, output: int, folder: str | None = None) -> subprocess.P
     """A program that runs a script, its temporary files in a folder of ours."""
     own = {**os.environ} | ({"TMPDIR": folder} if folder else {})
     command = [sys.executable, "-c", script]
-    return subprocess.Popen(command, stdout=output, stderr=subprocess.DEVNULL, env=own)
+    return subprocess.Popen(
+        command, stdout=output, stderr=None if output == subprocess.PIPE else output, env=own
+    )
 
 
 def flew_in(process: Path, folder: str) -> bool:

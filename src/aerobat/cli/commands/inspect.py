@@ -29,10 +29,9 @@ CSV = ".csv"  # a log of another system
 def inspect(log: Path, options: Annotated[InspectOptions, Parameter(name="*")] = InspectOptions()) -> None:
     """Say what caused a recorded flight's error: start, saturation, delay, hand-off, gains or the vehicle.
 
-    Of a flight whose rates an inner loop held, it also says whether its motors are in another order, its
-    rates or gains are not those of its settings, or its rotors are slower than planned for. Prints each
-    cause's part of the largest position error and what would mend the main one, and writes a picture of them
-    to inspect.png in the log's folder.
+    Of a flight whose rates an inner loop held, it also names motors in another order, rates or gains other
+    than set, and slow rotors. It prints each cause's part of the largest position error and what would mend
+    the main one, and writes a picture of them to inspect.png in the log's folder.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -22,10 +22,8 @@ from aerobat.errors import BackendMissing, SpecError
 _ORDER = struct.Struct("<QII144s40s")
 _ANSWER = struct.Struct("<QI4f4x")
 _PATIENCE = 20.0  # [s] of the wall for an answer
-_CONNECTING = 500  # steps of the firmware until its serial line listens
 _STEP = 0.01  # [s] of the firmware between looks at its serial line
 _LOOK = 0.002  # [s] of the wall that each look lasts
-_LOOKS = 1500  # until a line is answered
 _PROMPT = b"\n# "
 _REFUSAL = "###ERROR"
 _LINES_AT_ONCE = 20  # that its buffer holds
@@ -130,7 +128,7 @@ class Firmware:
             self._serial = self._connected()
         self._serial.sendall(data)
         answer = b""
-        for _ in range(_LOOKS):
+        for _ in _looks():
             self.step(_STEP)
             try:
                 answer += self._serial.recv(4096)
@@ -141,7 +139,7 @@ class Firmware:
         raise FirmwareEnded("autopilot: Betaflight does not answer on its serial line; run it again")
 
     def _connected(self) -> socket.socket:
-        for _ in range(_CONNECTING):
+        for _ in _looks():
             self.step(_STEP)
             try:
                 line = socket.create_connection(("127.0.0.1", self._port), 1.0)
@@ -169,7 +167,7 @@ class Firmware:
         assert self._serial is not None, "it was spoken to"
         self._serial.sendall(b"save\n")
         try:
-            for _ in range(_LOOKS):
+            for _ in _looks():
                 self.step(_STEP)
                 time.sleep(_LOOK)
         except FirmwareEnded:
@@ -200,6 +198,13 @@ class Firmware:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _looks() -> Iterator[None]:
+    """Go on for as long as an answer is waited for, however slowly a busy machine gives it."""
+    last = time.monotonic() + _PATIENCE
+    while time.monotonic() < last:
+        yield
 
 
 @lru_cache(maxsize=32)
