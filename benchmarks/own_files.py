@@ -29,6 +29,7 @@ from aerobat.problem import load_problem
 from aerobat.simulation import fly
 from aerobat.vehicle import implausibilities, load_vehicle
 from own_courses import course, crossing, figure, place_of_stage
+from own_obstacles import obstacles, wall
 
 Table = dict[str, Any]
 Draw = Callable[["Pen"], Any]
@@ -88,6 +89,12 @@ def random_files(seed: int, case: int) -> Case:
         angle = pen.number(0.05, 0.5)
         tilt = pen.one_of({"attitude": angle}, {"attitude_deg": round(np.degrees(angle), 1)})
         found.problem["tolerance"] = {"position": pen.size(0.02, 1.0)} | tilt
+    if pen.chance(0.2):
+        world = found.problem.get("environment", {})
+        found.problem["environment"] = world | {"obstacles": obstacles(pen)}
+    for gate in (*found.problem.get("gates", ()), found.problem.get("gate")):
+        if gate and pen.chance(0.1):
+            gate["wall"] = wall(pen)
     return found
 
 
