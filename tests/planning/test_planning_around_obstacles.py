@@ -120,7 +120,7 @@ def test_ways_around_obstacles_are_asked_of_free_knots_but_flips_of_the_exact_se
 def test_a_hall_without_a_way_through_is_refused_for_that() -> None:
     closed = hall(ab.Box(position=(4.0, 0.0, 2.0), size=(0.2, 9.0, 5.0), name="wall"))
     with pytest.raises(ab.Infeasible, match="between obstacles no way was found"):
-        ab.plan(closed, ab.FreeKnots(segments=4, time_limit=2.0), QUAD)
+        ab.plan(closed, ab.FreeKnots(segments=4), QUAD)
     with pytest.raises(
         ab.SpecError, match=r"start\.position: the body of agile-quad reaches .* into 'crate'"
     ):
