@@ -255,9 +255,17 @@ def test_a_users_planner_is_one_registered_class_and_gets_its_certificate() -> N
 def test_the_command_lines_options_follow_from_the_fields() -> None:
     flags = {name: [o.flag for o in planner_options(cls)] for name, cls in registered_planners().items()}
     assert flags == {
-        "miqp": ["--order", "--intervals", "--backend", "--time-limit", "--reserve", "--no-rescue"],
+        "miqp": [
+            "--order",
+            "--intervals",
+            "--backend",
+            "--time-limit",
+            "--reserve",
+            "--clearance",
+            "--no-rescue",
+        ],
         "min-snap": ["--order", "--stop-after", "--time-limit"],
-        "free-knots": ["--segments", "--reserve", "--time-limit"],
+        "free-knots": ["--segments", "--reserve", "--clearance", "--time-limit"],
         "time-optimal": ["--reserve", "--starts", "--planar", "--time-limit"],
     }
 

@@ -36,6 +36,7 @@ def test_options_of_the_usual_planner_bring_it_back(tmp_path, capsys) -> None:
     from aerobat.cli.tasks import make_planner
 
     assert make_planner(PlanningOptions(), course, QUAD) == planner_for(course, QUAD)
-    assert planner_for(course, QUAD) == ab.FreeKnots(reserve=0.15)  # what is planned is to be flown
-    assert make_planner(replace(PlanningOptions(), order=4), course, QUAD) == ab.Miqp(order=4, reserve=0.15)
+    flown = {"reserve": 0.15, "clearance": 0.1}  # what is planned is to be flown
+    assert planner_for(course, QUAD) == ab.FreeKnots(**flown)
+    assert make_planner(replace(PlanningOptions(), order=4), course, QUAD) == ab.Miqp(order=4, **flown)
     assert make_planner(replace(PlanningOptions(), planner="miqp"), course, QUAD).kind == "miqp"

@@ -1,9 +1,9 @@
 """The clearance of the body from obstacles: what is left between both across planes that separate them.
 
 The plane between a body and a convex piece is held while a path is moved, as its normal n is found anew from
-round to round: what is left is n·p − e − h, with the position p, the piece's support h along n and the extent
-e of the body against n, in the attitude that its thrust gives it. Whichever plane is taken, the body is no
-nearer to the piece than that.
+round to round. With the position p, the piece's support h along n and the body's extent e against n,
+n·p − e − h is left between them. The body's attitude is the one that its thrust gives it. Whichever plane is
+taken, the body is no nearer to the piece than that.
 """
 
 from __future__ import annotations

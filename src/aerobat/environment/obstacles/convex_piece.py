@@ -51,13 +51,13 @@ class ConvexPiece:
         if len(self.points) > 2 and len(self.face_normals):
             return np.broadcast_to(self.face_normals, (len(points), *self.face_normals.shape))
         if len(self.points) != 2:
-            return _units(points[:, None] - self.points)
+            return units(points[:, None] - self.points)
         along = self.points[1] - self.points[0]
         length = max(float(along @ along), TINY)
         nearest = first - np.clip(first @ along / length, 0.0, 1.0)[:, None] * along
         square = first - (first @ along / length)[:, None] * along
         ends = np.broadcast_to(along, first.shape)
-        return _units(np.stack([nearest, square, ends, -ends], axis=1))
+        return units(np.stack([nearest, square, ends, -ends], axis=1))
 
     def distances(self, points: Array) -> Array:
         """Return lower bounds of the distances to points (m, 3) [m], exact beside faces, (m,)."""
@@ -75,7 +75,7 @@ class ConvexPiece:
             return np.zeros((0, 3))
 
 
-def _units(vectors: Array) -> Array:
-    """Vectors (..., 3) of length one; upward where they are none."""
+def units(vectors: Array) -> Array:
+    """Return vectors (..., 3) scaled to length one; upward where they are zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.where(length > TINY, vectors / np.maximum(length, TINY), [0.0, 0.0, 1.0])

@@ -22,7 +22,7 @@ from math import inf
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
-from aerobat.environment.obstacles.convex_piece import TINY, ConvexPiece
+from aerobat.environment.obstacles.convex_piece import TINY, ConvexPiece, units
 
 STEPS = 40  # of Newton's method at most; most pairs take five
 ENOUGH = 1e-11  # [m] a step that gains less is the last
@@ -280,8 +280,7 @@ def _away_from_zero(values: Array) -> Array:
 def _best_of(piece: ConvexPiece, centres: Array, shapes: Array) -> Array:
     """Of the directions to bodies that a piece knows, those with the largest gap, (m, 3)."""
     offsets = centres[:, None] - piece.points
-    length = np.maximum(np.linalg.norm(offsets, axis=-1, keepdims=True), TINY)
-    candidates = np.concatenate([piece.normals_toward(centres), offsets / length], axis=1)
+    candidates = np.concatenate([piece.normals_toward(centres), units(offsets)], axis=1)
     roundings = np.broadcast_to(piece.rounding, (len(centres), 3, 3))
     best = np.argmax(_Pairs(offsets, roundings, shapes).gaps(candidates), axis=1)
     return np.asarray(np.take_along_axis(candidates, best[:, None, None], axis=1)[:, 0])

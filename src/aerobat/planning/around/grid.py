@@ -87,7 +87,7 @@ class Grid:
 
     @cached_property
     def cost(self) -> Array:
-        """What a metre through a cell costs, (n,)."""
+        """The cost of a metre through a cell, (n,)."""
         close = (self.room - self.clearance) / (self.room - self.body.revolved.high)
         return 1.0 + CLOSE * np.clip(close, 0.0, 1.0)
 

@@ -26,7 +26,7 @@ FAR = 1e3  # [m] that is left to planes that do not count
 
 @dataclass(frozen=True, eq=False)
 class ClearanceValues:
-    """What is missing of a margin beside planes, (margin − clearance) / SIZE ≤ 0."""
+    """Constraints of a margin beside planes, (margin − clearance) / SIZE ≤ 0."""
 
     task: Task
 
