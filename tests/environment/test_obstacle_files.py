@@ -255,3 +255,9 @@ def test_an_obstacle_of_ones_own_stands_in_files(tmp_path: Path) -> None:
     problem = problem_with(tmp_path, 'kind = "arch"\nwidth = 2.0')
     assert problem.environment.obstacles == (Arch(2.0),)
     assert len(problem.surroundings.pieces) == 3
+
+
+def test_obstacles_of_one_name_are_told_apart_by_numbers() -> None:
+    balls = tuple(ab.Sphere(position=(float(x), 0.0, 0.0), radius=0.1) for x in range(3))
+    world = ab.Environment(obstacles=(*balls, ab.Sphere(position=(9.0, 0.0, 0.0), radius=0.1, name="moon")))
+    assert [piece.name for piece in world.pieces.pieces] == ["sphere 1", "sphere 2", "sphere 3", "moon"]

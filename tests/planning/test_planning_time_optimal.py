@@ -9,7 +9,7 @@ import pytest
 
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.planning import Plan, plan
-from aerobat.planning.time_optimal.optimal_control.collocation import Mesh
+from aerobat.planning.time_optimal.optimal_control.collocation import CollocationMesh
 from aerobat.planning.time_optimal.time_optimal import TimeOptimal
 from aerobat.problem import (
     EndState,
@@ -196,7 +196,7 @@ def test_rotors_without_lag_begin_and_end_with_the_acceleration_that_is_asked(na
 
 @pytest.mark.parametrize("continuous", [True, False])
 def test_the_end_intervals_are_short_where_thrust_jumps(continuous):
-    mesh = Mesh.even((2, 5), continuous, np.ones(3))
+    mesh = CollocationMesh.even((2, 5), continuous, np.ones(3))
     assert np.bincount(mesh.phase_of, mesh.fractions) == pytest.approx([1.0, 1.0])
     assert (mesh.fractions[0] < 0.8 * mesh.fractions[1]) is not continuous
     assert (mesh.fractions[-1] < 0.8 * mesh.fractions[-2]) is not continuous

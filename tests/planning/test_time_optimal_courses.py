@@ -11,7 +11,7 @@ from aerobat.planning import Miqp, Plan, TimeOptimal
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.task import Task
 from aerobat.planning.time_optimal.optimal_control.bounds import Backoff, Bounds
-from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
+from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, CollocationMesh
 from aerobat.problem import EndState, Problem, Waypoint, Waypoints, at_rest, load_problem, tilted_gate
 from aerobat.simulation import fly
 from aerobat.trajectory import Trajectory
@@ -152,7 +152,7 @@ def test_a_backoff_leaves_rotors_a_range_beside_the_reserve():
 
 
 def test_a_refined_mesh_covers_its_phases_and_is_finer_where_the_body_turns():
-    even = Mesh.even((4, 6), True, np.ones(3))
+    even = CollocationMesh.even((4, 6), True, np.ones(3))
     starts = np.zeros((3, 10))
     starts[1, 7] = 100.0  # turns in the second phase's fourth interval
     motion = CollocatedMotion(np.array([1.0, 3.0]), np.zeros((12, 11)), starts, starts)

@@ -84,11 +84,11 @@ def least_gap(path: BodyPath, pieces: Pieces) -> LeastGap:
     centres, radii = path.balls
     lower = pieces.apart(centres, centres) - radii[:, None]
     first = np.argsort(lower.min(axis=0))[:FIRST]
-    pairs = _Pairs.of(path, pieces, lower[:, first].argmin(axis=0), first).separated()
+    pairs = _Beside.of(path, pieces, lower[:, first].argmin(axis=0), first).separated()
     found = pairs.nearest(LeastGap())
     near = lower < found.enough
     found = replace(found, bound=float(lower[~near].min(initial=inf)))
-    pairs = _Pairs.of(path, pieces, *np.nonzero(near))
+    pairs = _Beside.of(path, pieces, *np.nonzero(near))
     most = MAX_OPEN + len(pairs)
     for _ in range(ROUNDS):
         pairs = pairs.separated()
@@ -103,7 +103,7 @@ def least_gap(path: BodyPath, pieces: Pieces) -> LeastGap:
 
 
 @dataclass(frozen=True, eq=False)
-class _Pairs:
+class _Beside:
     """Parts of a path, each beside a piece of an obstacle, with a plane that touches that piece."""
 
     path: BodyPath
@@ -115,7 +115,7 @@ class _Pairs:
     offsets: Array  # h [m], (m,)
 
     @classmethod
-    def of(cls, path: BodyPath, pieces: Pieces, rows: Indices, obstacles: Indices) -> _Pairs:
+    def of(cls, path: BodyPath, pieces: Pieces, rows: Indices, obstacles: Indices) -> _Beside:
         """Whole pieces of a path, before planes are known."""
         parts, count = Subintervals.whole(len(path.pieces))[rows], len(rows)
         return cls(path, pieces, parts, path.series[rows], obstacles, np.zeros((count, 3)), np.zeros(count))
@@ -123,8 +123,8 @@ class _Pairs:
     def __len__(self) -> int:
         return len(self.parts)
 
-    def __getitem__(self, rows: Mask | Indices) -> _Pairs:
-        return _Pairs(
+    def __getitem__(self, rows: Mask | Indices) -> _Beside:
+        return _Beside(
             self.path,
             self.pieces,
             self.parts[rows],
@@ -134,14 +134,14 @@ class _Pairs:
             self.offsets[rows],
         )
 
-    def halves(self) -> _Pairs:
+    def halves(self) -> _Beside:
         """Both halves of every part, beside the same planes."""
         halves = chebyshev.basis(self.series.shape[1] - 1).halves
         series = np.concatenate([half @ self.series for half in halves])
         twice = np.tile(np.arange(len(self)), 2)
         return replace(self[twice], parts=self.parts.halves(), series=series)
 
-    def separated(self) -> _Pairs:
+    def separated(self) -> _Beside:
         """The same pairs with the planes that separate best in the middle of the parts."""
         centres, axes = np.split(_in_the_middle(self.series), 2, axis=-1)
         arms, shapes = self.path.body.turned(axes / np.linalg.norm(axes, axis=-1, keepdims=True))
@@ -163,7 +163,7 @@ class _Pairs:
         name = self.pieces.pieces[self.obstacles[row]].name
         return replace(known, value=float(gaps[row]), time=time, obstacle=name)
 
-    def left_open(self, found: LeastGap) -> tuple[LeastGap, _Pairs]:
+    def left_open(self, found: LeastGap) -> tuple[LeastGap, _Beside]:
         """Return what is found with the bound of all pairs that are far enough, and the other pairs."""
         near = self.lower < found.enough
         bound = (self.lower - self.error)[~near].min(initial=found.bound)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from collections import Counter
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Annotated
 
@@ -11,6 +12,7 @@ from pydantic import PlainValidator
 
 from aerobat.arrays import Array
 from aerobat.declaration import Finite, Gravity, Vector3, declared
+from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.obstacle import OBSTACLES, Obstacle
 from aerobat.environment.obstacles.separation import Pieces
 from aerobat.so3 import UP
@@ -37,5 +39,15 @@ class Environment:
 
     @cached_property
     def pieces(self) -> Pieces:
-        """The convex pieces of all obstacles."""
-        return Pieces(tuple(piece for obstacle in self.obstacles for piece in obstacle.pieces))
+        """The convex pieces of all obstacles; names that several obstacles have are numbered."""
+        solids = [obstacle.pieces for obstacle in self.obstacles]
+        shared = Counter(pieces[0].name for pieces in solids if pieces)
+        seen: Counter[str] = Counter()
+        found: list[ConvexPiece] = []
+        for pieces in solids:
+            name = pieces[0].name if pieces else ""
+            seen[name] += 1
+            if shared[name] > 1:
+                pieces = tuple(replace(piece, name=f"{name} {seen[name]}") for piece in pieces)
+            found += pieces
+        return Pieces(tuple(found))

@@ -1,4 +1,4 @@
-from .assessment.assessment import Assessment, Box, SecondOpinion
+from .assessment.assessment import Assessment, PositionRange, SecondOpinion
 from .assessment.lower_bound import least_duration
 from .certified_solve import Judged, Solution, certified_solve
 from .evidence import Evidence
@@ -34,7 +34,6 @@ __all__ = [
     "Assessment",
     "Attempt",
     "BisectionSearch",
-    "Box",
     "Evidence",
     "FlownPassage",
     "Flyability",
@@ -48,6 +47,7 @@ __all__ = [
     "Plan",
     "Planner",
     "PlannerOption",
+    "PositionRange",
     "Recorder",
     "RotorMargin",
     "SecondOpinion",

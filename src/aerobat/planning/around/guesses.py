@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.planning.around.grid import Grid
-from aerobat.planning.around.routes import Leg, Route, routes
+from aerobat.planning.around.cells import Cells
+from aerobat.planning.around.routes import Leg, Way, routes
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
@@ -59,7 +59,7 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
     legs = list(zip([begin for _, begin in places[:-1]], [end for end, _ in places[1:]], strict=True))
     lower, upper = task.problem.path_limits.of(0)
     corners = np.array([point for leg in legs for point in leg])
-    grid = Grid.around(task.environment.pieces, task.vehicle.bounding_ellipsoid, corners, lower, upper)
+    grid = Cells.around(task.environment.pieces, task.vehicle.bounding_ellipsoid, corners, lower, upper)
     ends = float(grid.pieces.distances(corners[[0, -1]]).min())
     walls = [gate for gate in (_in_wall(task, stage) for stage in task.stages.stages) if gate is not None]
     narrowest = min([ends, *(gate.opening.inradius for gate in walls)])
@@ -76,7 +76,7 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
         yield paths
 
 
-def _different(found: Iterable[Route]) -> Iterator[Route]:
+def _different(found: Iterable[Way]) -> Iterator[Way]:
     """Yield routes without those whose corners are those of one before."""
     known: list[Array] = []
     for route in found:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aerobat.arrays import Array, Indices
-from aerobat.planning.around.grid import Grid
+from aerobat.planning.around.cells import Cells
 
 BETWEEN = 1.2  # [m] from a route to what it passes, at most, that a curtain hangs on
 WIDE = 4.0  # [m] from a route, that a curtain reaches at most
@@ -24,14 +24,14 @@ COMPARED = 20  # places of two routes
 Leg = tuple[Array, Array]  # its two ends [m]
 
 
-class Route(NamedTuple):
+class Way(NamedTuple):
     """A way through places."""
 
     legs: tuple[Array, ...]  # the corners of each [m], (k, 3), its ends included
     clearance: float  # [m] the least distance of a point on it to a piece
 
 
-def routes(grid: Grid, legs: Sequence[Leg], count: int) -> Iterator[Route]:
+def routes(grid: Cells, legs: Sequence[Leg], count: int) -> Iterator[Way]:
     """Yield up to so many routes; none where there is no way.
 
     Args:
@@ -54,12 +54,12 @@ def routes(grid: Grid, legs: Sequence[Leg], count: int) -> Iterator[Route]:
                 straightened(grid, np.concatenate([[begin], grid.centres[way[1:-1]], [end]]))
                 for (begin, end), way in zip(legs, ways, strict=True)
             )
-            yield Route(tuple(corners), float(grid.clearance[whole].min()))
+            yield Way(tuple(corners), float(grid.clearance[whole].min()))
             known.append(points)
         factor = _with_curtains(grid, whole, factor)
 
 
-def straightened(grid: Grid, points: Array) -> Array:
+def straightened(grid: Cells, points: Array) -> Array:
     """Return the corners that a way (k, 3) [m] needs: from each the farthest that is reached straight.
 
     As far from pieces as the way itself, or with room for the body.
@@ -74,14 +74,14 @@ def straightened(grid: Grid, points: Array) -> Array:
     return np.asarray(points[kept])
 
 
-def _is_straight(grid: Grid, points: Array) -> bool:
+def _is_straight(grid: Cells, points: Array) -> bool:
     """True if the straight line between the ends is as clear as the way, or has room."""
     line = _line(points[0], points[-1])
     needed = min(float(grid.pieces.distances(points[1:-1]).min()), grid.room)
     return float(grid.pieces.distances(line).min()) >= needed - 0.5 * grid.step
 
 
-def _with_curtains(grid: Grid, way: Indices, factor: Array) -> Array:
+def _with_curtains(grid: Cells, way: Indices, factor: Array) -> Array:
     """The factors, more in curtains across a way where it passes between things."""
     clearance, points = grid.clearance[way], grid.centres[way]
     factor = factor.copy()
@@ -99,7 +99,7 @@ def _with_curtains(grid: Grid, way: Indices, factor: Array) -> Array:
     return factor
 
 
-def _is_alike(grid: Grid, route: Array, other: Array) -> bool:
+def _is_alike(grid: Cells, route: Array, other: Array) -> bool:
     """True if straight lines between points of two routes, in their order, are free."""
     lines = _line(_spaced(route), _spaced(other))
     return bool(grid.free[grid.cell(lines)].all())

@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.certification import Certificate, Side
-from aerobat.planning.assessment.assessment import Assessment, Box, Point
+from aerobat.planning.assessment.assessment import Assessment, Point, PositionRange
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.task import Task
 from aerobat.trajectory import Trajectory
@@ -20,7 +20,7 @@ def assessment(task: Task, trajectory: Trajectory, certificate: Certificate) -> 
     return Assessment(
         duration=trajectory.duration,
         least_duration=least_duration(task.problem, task.vehicle),
-        room=Box(_point(lowest), _point(highest)),
+        room=PositionRange(_point(lowest), _point(highest)),
         asked=_asked(task),
         max_speed=_largest(certificate, "speed") or 0.0,
         max_tilt=_largest(certificate, "tilt"),
@@ -30,7 +30,7 @@ def assessment(task: Task, trajectory: Trajectory, certificate: Certificate) -> 
     )
 
 
-def _asked(task: Task) -> Box:
+def _asked(task: Task) -> PositionRange:
     """The box of start, goal, gates, and of what stages ask of positions along the world's axes."""
     problem = task.problem
     places = [end.position for end in problem.ends.values()] + [gate.position for gate in problem.gates]
@@ -45,7 +45,7 @@ def _asked(task: Task) -> Box:
                         place = bound / condition.direction[axes[0]]
                         lower[axes[0]] = min(lower[axes[0]], place)
                         upper[axes[0]] = max(upper[axes[0]], place)
-    return Box(_point(lower), _point(upper))
+    return PositionRange(_point(lower), _point(upper))
 
 
 def _largest(certificate: Certificate, quantity: str) -> float | None:

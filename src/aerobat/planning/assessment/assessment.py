@@ -15,7 +15,7 @@ Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Box:
+class PositionRange:
     """A box along the world's axes."""
 
     lower: Point  # [m]
@@ -26,7 +26,7 @@ class Box:
         """The length of its diagonal [m]."""
         return dist(self.lower, self.upper)
 
-    def excess(self, other: Box) -> float:
+    def excess(self, other: PositionRange) -> float:
         """Return the distance [m] by which the box exceeds another, along the axis where that is largest."""
         below = (b - a for a, b in zip(self.lower, other.lower, strict=True))
         above = (a - b for a, b in zip(self.upper, other.upper, strict=True))
@@ -55,8 +55,8 @@ class Assessment:
 
     duration: float  # [s] of the plan
     least_duration: float  # [s] that no motion of the vehicle that solves the problem falls short of
-    room: Box  # that the path stays in
-    asked: Box  # of start, goal, gates and wherever stages ask to be
+    room: PositionRange  # that the path stays in
+    asked: PositionRange  # of start, goal, gates and wherever stages ask to be
     max_speed: float  # [m/s]
     max_tilt: float | None  # [rad]; None where no attitude is determined
     max_body_rate: float | None  # [rad/s]; None likewise

@@ -16,7 +16,7 @@ from aerobat.planning.time_optimal.optimal_control.boundary import ClosedLap, Fi
 from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
 from aerobat.planning.time_optimal.optimal_control.collocation import (
     CollocatedMotion,
-    Mesh,
+    CollocationMesh,
     closed,
     trajectory_of,
 )
@@ -105,7 +105,7 @@ class CollocatedProgram:
         elements: Elements,
         start: Start,
         reserve: float,
-        mesh: Mesh,
+        mesh: CollocationMesh,
         max_iterations: int,
         tolerance: float = 1e-8,
         barrier: float | None = None,

@@ -11,7 +11,7 @@ from aerobat.arrays import Array
 from aerobat.flatness import reference
 from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.planning.task import Task
-from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
+from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, CollocationMesh
 from aerobat.planning.warm_start import WarmStart
 from aerobat.so3 import UP
 
@@ -27,7 +27,7 @@ class Start:
     in_gates: tuple[BodyInGate, ...] = ()  # those that the stages of `guess` cross
 
 
-def initial_motion(start: Start, mesh: Mesh, task: Task) -> CollocatedMotion:
+def initial_motion(start: Start, mesh: CollocationMesh, task: Task) -> CollocatedMotion:
     """States and inputs of the vehicle along a start at the mesh's nodes, inputs within twice their scale.
 
     Args:

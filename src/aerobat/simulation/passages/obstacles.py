@@ -71,7 +71,7 @@ def nearest_obstacles(pieces: Pieces, flown: FlownBodies) -> NearestObstacle:
     count = len(flown.rows)
     stretches = -(-len(flown.times) // STRETCH)
     size = max(1, AT_ONCE // (stretches * len(pieces)))
-    found = [_Search(pieces, flown, slice(k, k + size)).found() for k in range(0, count, size)]
+    found = [_NearestSearch(pieces, flown, slice(k, k + size)).found() for k in range(0, count, size)]
     piece, clearance, row = (np.concatenate(part) for part in zip(*found, strict=True))
     names = np.array([*(each.name for each in pieces.pieces), ""])  # the last where none is known
     known = piece >= 0
@@ -114,7 +114,7 @@ class _Encounters(NamedTuple):
         return _Encounters(*(part[rows] for part in self))
 
 
-class _Search:
+class _NearestSearch:
     """The search for the nearest obstacles of some flights."""
 
     def __init__(self, pieces: Pieces, flown: FlownBodies, flights: slice) -> None:

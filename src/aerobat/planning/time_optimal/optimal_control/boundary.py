@@ -15,7 +15,11 @@ from aerobat.flatness import reference
 from aerobat.kernels.quaternions import conjugate, multiply
 from aerobat.optimization.nonlinear import components, import_casadi
 from aerobat.optimization.separable import ElementFunction
-from aerobat.planning.time_optimal.optimal_control.collocation import STATE_SCALE, CollocatedMotion, Mesh
+from aerobat.planning.time_optimal.optimal_control.collocation import (
+    STATE_SCALE,
+    CollocatedMotion,
+    CollocationMesh,
+)
 from aerobat.planning.time_optimal.optimal_control.elements import Elements, weighted_sum
 from aerobat.planning.time_optimal.optimal_control.rows import Rows
 from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
@@ -48,7 +52,7 @@ class Boundary(Protocol):
         """Write the numbers that are fixed into a bound on all unknowns."""
         ...
 
-    def hold(self, rows: Rows, mesh: Mesh) -> None:
+    def hold(self, rows: Rows, mesh: CollocationMesh) -> None:
         """Add the constraints."""
         ...
 
@@ -116,7 +120,7 @@ class FixedEnds:
         if not self.goal.free_attitude:
             motion.ends[:fixed, -1] = self.goal.inputs[:fixed]
 
-    def hold(self, rows: Rows, mesh: Mesh) -> None:
+    def hold(self, rows: Rows, mesh: CollocationMesh) -> None:
         """Add that the thrust points where the goal says."""
         if not self.goal.free_attitude:
             rows.hold(self.elements.goal_thrust, mesh.states[-1:], *ALONG_Z, self.goal.thrust)
@@ -147,7 +151,7 @@ class ClosedLap:
     def fix(self, motion: CollocatedMotion, continuous: bool) -> None:
         """Write nothing: all is free."""
 
-    def hold(self, rows: Rows, mesh: Mesh) -> None:
+    def hold(self, rows: Rows, mesh: CollocationMesh) -> None:
         """Add that the end is the start, and where on the lap that is."""
         first = np.concatenate([mesh.states[0], mesh.inputs[0, 0]])
         last = np.concatenate([mesh.states[-1], mesh.inputs[1, -1]])

@@ -64,7 +64,7 @@ class CollocatedMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class CollocationMesh:
     """Phases cut into intervals, and where a motion on them stands in one column of scaled unknowns.
 
     The input of a `continuous` motion is the same on both sides of every inner node.
@@ -76,12 +76,12 @@ class Mesh:
     input_scale: Array  # what is large for an input, (3,)
 
     @classmethod
-    def even(cls, intervals: tuple[int, ...], continuous: bool, input_scale: Array) -> Mesh:
+    def even(cls, intervals: tuple[int, ...], continuous: bool, input_scale: Array) -> CollocationMesh:
         """Phases cut into so many equal intervals each, but for the two at the ends where the input jumps."""
         mesh = cls(intervals, np.repeat(1.0 / np.array(intervals), intervals), continuous, input_scale)
         return mesh if continuous else mesh.with_short_ends
 
-    def refined(self, motion: CollocatedMotion, intervals: int, minimum: int) -> Mesh:
+    def refined(self, motion: CollocatedMotion, intervals: int, minimum: int) -> CollocationMesh:
         """A mesh of about so many intervals that are shorter where a motion on this one turns its body.
 
         Their boundaries cut a weight into equal parts: time, and the change of the body rates by it, which
@@ -107,11 +107,11 @@ class Mesh:
             passed, times = (np.append(0.0, np.cumsum(x[inside])) for x in (weights, self.fractions))
             boundaries = np.interp(np.linspace(0.0, passed[-1], counts[-1] + 1), passed, times)
             fractions.append(np.diff(boundaries) / times[-1])
-        mesh = Mesh(tuple(counts), np.concatenate(fractions), self.continuous, self.input_scale)
+        mesh = CollocationMesh(tuple(counts), np.concatenate(fractions), self.continuous, self.input_scale)
         return mesh if self.continuous else mesh.with_short_ends
 
     @property
-    def with_short_ends(self) -> Mesh:
+    def with_short_ends(self) -> CollocationMesh:
         """The mesh with short intervals at its ends, where thrust without lag leaves what is fixed there."""
         fractions = self.fractions.copy()
         fractions[[0, -1]] *= SHORT_END
@@ -191,7 +191,9 @@ class IntervalSide:
 
     def __init__(self, body: ZeroYawRateBody, input_scale: Array, last: int) -> None:
         sx = import_casadi().SX
-        self.unknowns = sx.sym("z", 1 + STATES + 2 * INPUTS)  # scaled, as `Mesh.side_unknowns` orders them
+        self.unknowns = sx.sym(
+            "z", 1 + STATES + 2 * INPUTS
+        )  # scaled, as `CollocationMesh.side_unknowns` orders them
         self.fraction = sx.sym("fraction")
         self.last = last
         z = self.unknowns * np.concatenate([[1.0], STATE_SCALE, input_scale, input_scale])
@@ -247,7 +249,9 @@ class IntervalSide:
         )
 
 
-def trajectory_of(body: ZeroYawRateBody, mesh: Mesh, motion: CollocatedMotion, heading: float) -> Trajectory:
+def trajectory_of(
+    body: ZeroYawRateBody, mesh: CollocationMesh, motion: CollocatedMotion, heading: float
+) -> Trajectory:
     """The trajectory of a motion, from its start on, continuous to the last digit.
 
     Args:

@@ -19,7 +19,11 @@ from aerobat.optimization.nonlinear import SymbolicOps, components, import_casad
 from aerobat.optimization.separable import ElementFunction
 from aerobat.planning.task import Task
 from aerobat.planning.time_optimal.optimal_control.bounds import Bounds
-from aerobat.planning.time_optimal.optimal_control.collocation import STATE_SCALE, IntervalSide, Mesh
+from aerobat.planning.time_optimal.optimal_control.collocation import (
+    STATE_SCALE,
+    CollocationMesh,
+    IntervalSide,
+)
 from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     ATTITUDE,
     INPUTS,
@@ -57,9 +61,9 @@ class Elements:
         """True where the input cannot jump, for the rotors lag."""
         return bool(self.task.vehicle.lags.any())
 
-    def mesh(self, intervals: tuple[int, ...]) -> Mesh:
+    def mesh(self, intervals: tuple[int, ...]) -> CollocationMesh:
         """The unknowns of so many equal intervals in each phase."""
-        return Mesh.even(intervals, self.continuous, self.input_scale)
+        return CollocationMesh.even(intervals, self.continuous, self.input_scale)
 
     @property
     def input_scale(self) -> Array:

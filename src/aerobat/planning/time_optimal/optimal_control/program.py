@@ -19,7 +19,7 @@ from aerobat.optimization.separable import (
 )
 from aerobat.planning.time_optimal.optimal_control.boundary import Boundary
 from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
-from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, Mesh
+from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, CollocationMesh
 from aerobat.planning.time_optimal.optimal_control.elements import (
     BETWEEN,
     Elements,
@@ -54,7 +54,7 @@ class OptimalControl:
     min_thrust: float  # [m/s²] specific thrust at least, which keeps the attitude determined
     reserve: float  # of each rotor's range, kept from either of its ends
 
-    def program(self, mesh: Mesh, backoff: Backoff) -> NonlinearProgram:
+    def program(self, mesh: CollocationMesh, backoff: Backoff) -> NonlinearProgram:
         """The program of a mesh's unknowns, with bounds tightened at nodes."""
         rows = Rows()
         self._hold_intervals(rows, mesh, backoff)
@@ -74,7 +74,7 @@ class OptimalControl:
             x_max=upper,
         )
 
-    def _hold_intervals(self, rows: Rows, mesh: Mesh, backoff: Backoff) -> None:
+    def _hold_intervals(self, rows: Rows, mesh: CollocationMesh, backoff: Backoff) -> None:
         """The equations of motion, rotors, and bounds on the path where it may jump at nodes, or between."""
         elements, bounds = self.elements, self.elements.bounds
         path = len(bounds.path)
@@ -97,7 +97,7 @@ class OptimalControl:
             unknowns, fractions = mesh.side_unknowns(last), mesh.fractions[:, None]
             rows.elements.append(Element(elements.sides[last], unknowns, fractions, np.hstack([shared, own])))
 
-    def _hold_nodes(self, rows: Rows, mesh: Mesh, backoff: Backoff) -> None:
+    def _hold_nodes(self, rows: Rows, mesh: CollocationMesh, backoff: Backoff) -> None:
         """At inner nodes, and where a lap closes: what has one value there, the body rate, the plane."""
         bounds, first = self.elements.bounds, 0 if self.boundary.is_closed else 1
         path = [i for i, bound in enumerate(bounds.path) if self.elements.has_one_value(bound)]
@@ -111,7 +111,7 @@ class OptimalControl:
             unknowns = np.hstack([mesh.states[first:-1], mesh.inputs[1, before]])
             rows.hold(self.elements.node, unknowns, lower, upper)
 
-    def _hold_stage(self, rows: Rows, mesh: Mesh, index: int, stage: Stage) -> None:
+    def _hold_stage(self, rows: Rows, mesh: CollocationMesh, index: int, stage: Stage) -> None:
         """What a stage asks of the node where it holds, and when."""
         node = int(np.cumsum(mesh.intervals)[index])
         for jumping, conditions in _by_continuity(stage):
@@ -130,7 +130,7 @@ class OptimalControl:
             if 0.0 < fraction < 1.0 and (fraction == earliest or latest > earliest):
                 rows.hold(weighted_sum(len(phases)), phases[None], low, high, before - fraction)
 
-    def _hold_room(self, rows: Rows, mesh: Mesh, body: BodyInGate) -> None:
+    def _hold_room(self, rows: Rows, mesh: CollocationMesh, body: BodyInGate) -> None:
         """The room of the body in a gate, at the stage that crosses it."""
         node, parameters = int(np.cumsum(mesh.intervals)[body.stage]), body.parameters
         function = self.elements.room_in_gate(len(parameters))
@@ -140,7 +140,7 @@ class OptimalControl:
     def _squared_rates(self, rates: Array) -> Array:
         return np.asarray((rates / self.elements.rate_scale) ** 2)
 
-    def _box(self, mesh: Mesh) -> tuple[CollocatedMotion, CollocatedMotion]:
+    def _box(self, mesh: CollocationMesh) -> tuple[CollocatedMotion, CollocatedMotion]:
         """The least and the most that every unknown may be: what is fixed, and little else."""
         lower, upper = (_filled(mesh, value) for value in (-inf, inf))
         lower.phases[:] = SHORTEST_PHASE
@@ -149,7 +149,7 @@ class OptimalControl:
             self.boundary.fix(motion, mesh.continuous)
         return lower, upper
 
-    def _cost(self, mesh: Mesh) -> list[Element]:
+    def _cost(self, mesh: CollocationMesh) -> list[Element]:
         """The duration, and a little for changing the input."""
         phases = np.arange(len(mesh.intervals))[None]
         changes = [np.hstack([mesh.inputs[0], mesh.inputs[1]])]
@@ -172,7 +172,7 @@ def _by_continuity(stage: Stage) -> list[tuple[bool, tuple[Condition, ...]]]:
     return [(may, tuple(group)) for may, group in ((False, steady), (True, jumping)) if group]
 
 
-def _filled(mesh: Mesh, value: float) -> CollocatedMotion:
+def _filled(mesh: CollocationMesh, value: float) -> CollocatedMotion:
     """A motion whose every number is the same."""
     shapes = ((len(mesh.intervals),), (STATES, mesh.total + 1), (INPUTS, mesh.total), (INPUTS, mesh.total))
     return CollocatedMotion(*(np.full(shape, value) for shape in shapes))

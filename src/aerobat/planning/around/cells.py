@@ -27,7 +27,7 @@ STEPS = np.array([step for step in product((-1, 0, 1), repeat=3) if step > (0, 0
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class Cells:
     """Cells of a box in the world."""
 
     pieces: Pieces
@@ -36,7 +36,7 @@ class Grid:
     upper: Array  # [m] the opposite one, (3,)
 
     @classmethod
-    def around(cls, pieces: Pieces, body: Ellipsoid, places: Array, lower: Array, upper: Array) -> Grid:
+    def around(cls, pieces: Pieces, body: Ellipsoid, places: Array, lower: Array, upper: Array) -> Cells:
         """Return the grid around places to pass.
 
         Args:
