@@ -22,10 +22,11 @@ class FeasibilityOptions(PlannerOptions):
     field ends so; angle is the tilt of a half-flip's gate."""
 
     least: Annotated[
-        tuple[Literal["thrust-to-weight", "ceiling", "gate"], ...],
+        tuple[Literal["thrust-to-weight", "ceiling", "gate", "gate-height"], ...],
         Parameter(group=planning, negative="", show_default=False),
     ] = ()
-    """The quantity whose least value is sought, once or more often. Default: all that the problem has."""
+    """The quantity whose least value is sought, once or more often. Default: all that the problem has, but
+    gate-height, which makes slits of openings."""
 
     tolerance: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=1e-4, lte=0.5))] = (
         DEFAULT_TOLERANCE

@@ -79,7 +79,7 @@ def _(found: Requirement) -> Iterator[Fact]:
 
 def _sizes(found: Requirement) -> str:
     """The openings of the gates of a plan, where those were made smaller."""
-    if found.quantity != "gate" or found.plan is None:
+    if found.quantity not in ("gate", "gate-height") or found.plan is None:
         return ""
     sizes = (
         "{} {:.3g} x {:.3g} m".format(gate.name, *gate.opening.size) for gate in found.plan.problem.gates

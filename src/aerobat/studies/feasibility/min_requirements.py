@@ -82,8 +82,8 @@ def min_requirements(
         problem: what is planned, or its name.
         vehicle: what flies it, or its name.
         of: any of "thrust-to-weight", the rotors' full thrust in weights; "ceiling", the height that the path
-            stays below; "gate", the openings of all gates as parts of their sizes. By default all that the
-            problem has.
+            stays below; "gate", the openings of all gates as parts of their sizes; "gate-height", their
+            heights alone, which makes slits of them. By default all that the problem has, but the last.
         planner: how, or its registered name, by default the one that suits each problem.
         tolerance: between the answer and the refusal, as a part of the answer, of a ceiling of its height
             above what is met below it, or of a metre where that is more.

@@ -23,6 +23,7 @@ class NeededQuantity(ABC):
     name: ClassVar[str]
     unit: ClassVar[str] = ""
     least_size: ClassVar[float] = 0.0  # above the floor: of less no part is told apart
+    unasked: ClassVar[bool] = True  # whether it is sought where nobody names quantities
 
     @abstractmethod
     def own(self, scenario: Scenario) -> float:
@@ -99,15 +100,29 @@ class GateSize(NeededQuantity):
         return replace(whole, problem=replace(whole.problem, gates=gates))
 
 
+class GateHeight(GateSize):
+    """The heights of all gates' openings, as parts of what they are: how narrow a slit may be."""
+
+    name = "gate-height"
+    unit = "of its height"
+    unasked = False
+
+    def set(self, whole: Scenario, value: float) -> Scenario:
+        """Return the scenario with openings of that part of their height, of circles of their size."""
+        gates = tuple(gate.resized(1.0, value) for gate in whole.problem.gates)
+        return replace(whole, problem=replace(whole.problem, gates=gates))
+
+
 QUANTITIES: dict[str, NeededQuantity] = {
-    each.name: each for each in (ThrustToWeight(), Ceiling(), GateSize())
+    each.name: each for each in (ThrustToWeight(), Ceiling(), GateSize(), GateHeight())
 }
 
 
 def named_quantities(names: Sequence[str] | None, problem: Problem) -> tuple[NeededQuantity, ...]:
     """The quantities of these names, by default all that a problem has. Raises SpecError for others."""
     if names is None:
-        return tuple(each for each in QUANTITIES.values() if problem.gates or not isinstance(each, GateSize))
+        usual = (each for each in QUANTITIES.values() if each.unasked)
+        return tuple(each for each in usual if problem.gates or not isinstance(each, GateSize))
     for i, name in enumerate(names):
         if name not in QUANTITIES:
             raise unknown_name("quantity", name, QUANTITIES)
