@@ -125,7 +125,7 @@ def test_no_point_of_a_certified_body_enters_an_obstacle(seed):
     places = flight.trajectory.evaluate(times)
     centres, axes = places + body.turned(at.setpoint.q_world_body)[0], so3.axes(at.setpoint.q_world_body)
     for obstacle in flight.environment.obstacles:
-        away = Environment(obstacles=(obstacle,)).pieces.box_distances(places)[:, 0]
+        away = Environment(obstacles=(obstacle,)).pieces.apart(places, places)[:, 0]
         for k in np.flatnonzero(away < body.revolved.reach + found.value):
             hull.setTransform(fcl.Transform(axes[k], centres[k]))
             assert gap_between(solid(obstacle), hull) >= found.bound - EXACT

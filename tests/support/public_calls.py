@@ -58,7 +58,7 @@ def flight() -> ab.Flight:
     return ab.fly(plan(), rate=100.0, engine="floats")
 
 
-def ignored(attempt: object) -> None:
+def ignored(*attempt: object) -> None:
     pass
 
 

@@ -131,6 +131,8 @@ def _thrust_needed(plan: Plan, passage: Passage, fraction: float) -> float:
 
 def _planned_thrust(plan: Plan, passage: Passage) -> float:
     """The specific thrust [m/s²] of a plan as it is to pass a gate."""
+    if np.isnan(passage.planned).all():  # no flight came near
+        return 0.0
     time = min(float(np.nanmedian(passage.planned)), plan.duration)
     acceleration = plan.trajectory.evaluate(np.array([time]), 2)[0]
     return float(np.linalg.norm(acceleration + plan.problem.environment.weight))
