@@ -11,7 +11,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.planning.around.cells import Cells
-from aerobat.planning.around.routes import Leg, Way, routes
+from aerobat.planning.around.routes import Leg, Way, routes, straightened
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
@@ -24,7 +24,9 @@ BEFORE = 0.3  # [m] beyond the body's reach, from which on a gate in a wall is f
 CLOSEST = 0.5  # [m] from one corner of a route to the next
 SHARE = 0.5  # of the room that a narrow passage leaves to the body on its side, which is kept clear
 LEAST_CLEARANCE = 0.001  # [m] that is kept clear in the narrowest: what lies between places is within it
-PACES = (1.4, 1.8, 1.0)  # times the duration of a closed form, in turn: slits are reached from slow ones
+# how near straight lines cut corners, of a cell, and times the duration of a closed form, in turn: slits are
+# reached from slow ones, windows by those that cut no corner
+STARTS = ((0.1, 1.4), (0.0, 1.4), (0.1, 1.8), (0.0, 1.0))
 BOTH_WAYS = 0.5  # of an upright's height, below which the body may turn either way
 TOLERANCE = 0.1  # [rad] of a body on its side, at first
 LEAST_THRUST = 0.4  # of gravity, of a body on its side
@@ -64,26 +66,27 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
     walls = [gate for gate in (_in_wall(task, stage) for stage in task.stages.stages) if gate is not None]
     narrowest = min([ends, *(gate.opening.inradius for gate in walls)])
     body = task.vehicle.bounding_ellipsoid.revolved
-    found = list(_different(routes(grid, legs, count)))
-    for turned, pace in product(_turned(task) if found else (), PACES):
+    found = list(routes(grid, legs, count))
+    for turned, (slack, pace) in product(_turned(task) if found else (), STARTS):
         paths = []
-        for route in found:
-            room = min(narrowest, route.clearance) - min(body.wide, body.high)
+        for flown, clear in _different(grid, found, slack):
+            room = min(narrowest, clear) - min(body.wide, body.high)
             clearance = min(task.clearance, max(SHARE * room, LEAST_CLEARANCE))
-            path = _along(turned or task, route.legs).time_scaled(pace)
+            path = _along(turned or task, flown).time_scaled(pace)
             own = replace(task, clearance=clearance)
             paths.append(Guess(path, own, None if turned is None else replace(turned, clearance=clearance)))
         yield paths
 
 
-def _different(found: Iterable[Way]) -> Iterator[Way]:
-    """Yield routes without those whose corners are those of one before."""
+def _different(grid: Cells, found: Iterable[Way], slack: float) -> Iterator[tuple[list[Array], float]]:
+    """Yield the corners of ways and their clearances [m], but of ways whose corners one before has."""
     known: list[Array] = []
-    for route in found:
-        corners = np.concatenate(route.legs)
+    for way in found:
+        legs = [straightened(grid, leg, slack) for leg in way.legs]
+        corners = np.concatenate(legs)
         if not any(len(x) == len(corners) and np.abs(x - corners).max() < CLOSEST for x in known):
             known.append(corners)
-            yield route
+            yield legs, way.clearance
 
 
 def _places(task: Task) -> list[Leg] | None:

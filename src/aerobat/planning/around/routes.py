@@ -27,7 +27,7 @@ Leg = tuple[Array, Array]  # its two ends [m]
 class Way(NamedTuple):
     """A way through places."""
 
-    legs: tuple[Array, ...]  # the corners of each [m], (k, 3), its ends included
+    legs: tuple[Array, ...]  # the points of each [m], a cell a step, (k, 3), its ends included
     clearance: float  # [m] the least distance of a point on it to a piece
 
 
@@ -50,35 +50,40 @@ def routes(grid: Cells, legs: Sequence[Leg], count: int) -> Iterator[Way]:
         whole = np.concatenate(ways)
         points = grid.centres[whole]
         if not any(_is_alike(grid, points, other) for other in known):
-            corners = (
-                straightened(grid, np.concatenate([[begin], grid.centres[way[1:-1]], [end]]))
+            flown = (
+                np.concatenate([[begin], grid.centres[way[1:-1]], [end]])
                 for (begin, end), way in zip(legs, ways, strict=True)
             )
-            yield Way(tuple(corners), float(grid.clearance[whole].min()))
+            yield Way(tuple(flown), float(grid.clearance[whole].min()))
             known.append(points)
         factor = _with_curtains(grid, whole, factor)
 
 
-def straightened(grid: Cells, points: Array) -> Array:
-    """Return the corners that a way (k, 3) [m] needs: from each the farthest that is reached straight.
+def straightened(grid: Cells, points: Array, slack: float) -> Array:
+    """Return the corners that a way needs: from each the farthest that is reached straight.
 
-    As far from pieces as the way itself, or with room for the body.
+    Args:
+        grid: That the way goes through.
+        points: Of the way [m], (k, 3).
+        slack: Of a cell, by which a straight line may come nearer to pieces than the way, where the body has
+            no room.
     """
     kept, at = [0], 0
     while at < len(points) - 1:
         to = len(points) - 1
-        while to > at + 1 and not _is_straight(grid, points[at : to + 1]):
+        while to > at + 1 and not _is_straight(grid, points[at : to + 1], slack):
             to = at + max(1, (to - at) * 3 // 4)
         kept.append(to)
         at = to
     return np.asarray(points[kept])
 
 
-def _is_straight(grid: Cells, points: Array) -> bool:
-    """True if the straight line between the ends is as clear as the way, or has room."""
-    line = _line(points[0], points[-1])
-    needed = min(float(grid.pieces.distances(points[1:-1]).min()), grid.room)
-    return float(grid.pieces.distances(line).min()) >= needed - 0.5 * grid.step
+def _is_straight(grid: Cells, points: Array, slack: float) -> bool:
+    """True if the straight line between the ends is everywhere as clear as the way beside it, or has room."""
+    along = grid.pieces.distances(_spaced(points))
+    beside = np.minimum(along, np.minimum(np.roll(along, 1), np.roll(along, -1)))
+    line = grid.pieces.distances(_spaced(points[[0, -1]]))
+    return bool((line >= np.minimum(beside, grid.room) - slack * grid.step).all())
 
 
 def _with_curtains(grid: Cells, way: Indices, factor: Array) -> Array:
