@@ -38,18 +38,14 @@ class Guess(NamedTuple):
 
     path: WarmStart
     task: Task
-    turned: (
-        Task | None
-    )  # that is refined first: without walls that the body passes on its side, but turned so
+    turned: Task | None  # refined first: without walls that are passed on its side, but turned so
 
 
 def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
     """Yield paths through a task's stages around obstacles, those on different sides of them together.
 
-    First at the pace that leads on most often, then at others, turned one way in slits, then the other.
-
-    None where some stage does not say where it is, or there is no way: then only refinement moves a path off
-    obstacles.
+    First come those that lead on most often, then others: at other paces, turned the other way in slits.
+    Nothing is yielded where some stage does not say where it is, or there is no way.
 
     Args:
         task: With a vehicle and obstacles.
