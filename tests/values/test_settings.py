@@ -56,7 +56,12 @@ def test_any_value_in_any_field_makes_a_value_or_one_sentence(where: tuple[type,
     made: list[Any] = []
     said = complaint(lambda: made.append(cls(**{field: junk})))
     assert said.isprintable()
-    named = (field, "last must be ", "motion_capture is missing")  # what a field asks of others, too
+    named = (
+        field,
+        "last must be ",
+        "imu is missing",
+        "motion_capture is missing",
+    )  # what a field asks of others, too
     assert made or said.startswith(tuple(f"{cls.__name__}.{each}" for each in named))
     for value in made:
         assert not isinstance(junk, bool | complex) or isinstance(junk, bool) is isinstance(
