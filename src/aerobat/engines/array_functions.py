@@ -13,6 +13,8 @@ import numpy as np
 
 from aerobat.engines.tracing import FORMS, Symbol, TraceOps
 
+COMPLEX_STEP = 1e-20  # so small that its square is nothing beside any number
+
 ArrayFunction = Callable[[Sequence[Any]], tuple[Any, ...]]
 
 _FORMS = {

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerobat.arrays import Array
-from aerobat.environment.obstacles import Pieces
+from aerobat.arrays import Array, Indices
+from aerobat.environment.obstacles import Pieces, Separation
 from aerobat.kernels.ops import Ops, Scalar, Vector
 from aerobat.kernels.vectors import dot
 from aerobat.limits.body_in_gate import extent_of_thrust
@@ -56,11 +56,7 @@ class Clearance:
             positions: Of the centre of mass [m], (m, 3).
             thrust_axes: Unit vectors, (m, 3).
         """
-        revolved = self.body.revolved
-        offset, shapes = revolved.turned(thrust_axes)
-        centres = positions + offset
-        bodies, numbers = self.pieces.near(centres, revolved.reach, AWAY)
-        found = self.pieces.separated(numbers, centres[bodies], shapes[bodies], EXACT_WITHIN)
+        bodies, _, found = self._separated(positions, thrust_axes, EXACT_WITHIN)
         order = np.lexsort((found.gaps, bodies))
         bodies = bodies[order]
         rank = np.arange(len(bodies)) - np.searchsorted(bodies, bodies)
@@ -79,16 +75,24 @@ class Clearance:
             thrusts: Along the thrust axis there, of any length, (m, 3).
         """
         axes = thrusts / np.linalg.norm(thrusts, axis=-1, keepdims=True)
-        revolved = self.body.revolved
-        offset, shapes = revolved.turned(axes)
-        centres = positions + offset
-        bodies, numbers = self.pieces.near(centres, revolved.reach, AWAY)
-        gaps = self.pieces.separated(numbers, centres[bodies], shapes[bodies]).gaps - revolved.aside
+        bodies, numbers, found = self._separated(positions, axes, inf)
+        gaps = found.gaps - self.body.revolved.aside
         least, names = [inf] * len(positions), [""] * len(positions)
         for body, number, gap in zip(bodies.tolist(), numbers.tolist(), gaps.tolist(), strict=True):
             if gap < least[body]:
                 least[body], names[body] = gap, self.pieces.pieces[number].name
         return least, names
+
+    def _separated(
+        self, positions: Array, thrust_axes: Array, exact_within: float
+    ) -> tuple[Indices, Indices, Separation]:
+        """Bodies and pieces that are near, (m,) each, and the planes between them."""
+        revolved = self.body.revolved
+        offset, shapes = revolved.turned(thrust_axes)
+        centres = positions + offset
+        bodies, numbers = self.pieces.near(centres, revolved.reach, AWAY)
+        found = self.pieces.separated(numbers, centres[bodies], shapes[bodies], exact_within)
+        return bodies, numbers, found
 
 
 def left_between(

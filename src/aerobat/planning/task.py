@@ -44,7 +44,7 @@ class Task:
             problem: Its stages are made for the vehicle's thrust and size.
             vehicle: What shall fly.
             reserve: Kept for the controller.
-            clearance: Kept from obstacles for it [m], no more than what the ends leave.
+            clearance: Kept from obstacles for it [m].
         """
         body_radius = 0.0 if vehicle is None else vehicle.body_radius
         stages = problem.stages(max_specific_thrust(problem, vehicle), body_radius)

@@ -10,7 +10,6 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import (
     Angle,
@@ -30,6 +29,7 @@ from aerobat.declaration import (
     validated,
 )
 from aerobat.environment.obstacles import ConvexPiece, Obstacle
+from aerobat.environment.obstacles.attitude import axes_of
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, ConeAngle, Quantity, fixed
 from aerobat.problem.opening import Circle, Corners, OpeningShape, Polygon, Rectangle
@@ -309,12 +309,5 @@ def _half(diameter: Any) -> float:
 
 def _directions(heading: float, elevation: float, tilt: float) -> tuple[Array, Array]:
     """The direction of passage and the upright, unit vectors, (3,) each, for angles [rad]."""
-    turn = so3.multiply(
-        so3.about_axis(np.array([0.0, 0.0, 1.0]), np.asarray(heading)),
-        so3.multiply(
-            so3.about_axis(np.array([0.0, 1.0, 0.0]), np.asarray(-elevation)),
-            so3.about_axis(np.array([1.0, 0.0, 0.0]), np.asarray(tilt)),
-        ),
-    )
-    frame = so3.axes(turn)
+    frame = axes_of(heading, elevation, tilt)
     return frame[:, 0], frame[:, 2]

@@ -8,6 +8,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import Positive, declared
+from aerobat.environment.obstacles.surface import beyond
 from aerobat.problem.opening import OpeningShape
 
 LEAST_AREA = 1e-9  # [m²] of a part
@@ -26,21 +27,9 @@ class Wall:
         low, high = outline.min(axis=0) - self.border, outline.max(axis=0) + self.border
         whole = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
         for normal, distance in zip(*opening.sides, strict=True):
-            part = _beyond(whole, normal, float(distance))
+            part = beyond(whole, whole @ normal - distance)
             if _area(part) > LEAST_AREA:
                 yield part
-
-
-def _beyond(corners: Array, normal: Array, distance: float) -> Array:
-    """The corners of the part of a convex polygon with normal · point ≥ distance, (k, 2)."""
-    found, depth = [], corners @ normal - distance
-    for k, corner in enumerate(corners):
-        last = corners[k - 1]
-        if (depth[k] > 0.0) != (depth[k - 1] > 0.0):
-            found.append(last + depth[k - 1] / (depth[k - 1] - depth[k]) * (corner - last))
-        if depth[k] > 0.0:
-            found.append(corner)
-    return np.array(found).reshape(-1, 2)
 
 
 def _area(corners: Array) -> float:

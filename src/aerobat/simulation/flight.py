@@ -48,9 +48,7 @@ class Series:
     per_vehicle: bool = True
     over_time: bool = True
     logical: bool = False
-    part: str | None = (
-        None  # of a flight that only some have: what a filter saw, what an inner loop was asked
-    )
+    part: str | None = None  # of a flight that only some have, as what an inner loop was asked
 
 
 SERIES = (

@@ -193,4 +193,4 @@ def beyond(corners: Array, height: Array) -> Array:
             kept.append(corners[last] + height[last] / (height[last] - height[k]) * (corner - corners[last]))
         if height[k] >= 0.0:
             kept.append(corner)
-    return np.array(kept).reshape(-1, 3)
+    return np.array(kept).reshape(-1, corners.shape[1])

@@ -107,9 +107,8 @@ class Miqp(Planner):
 
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = default_order(problem, vehicle) if self.order is None else self.order
-        formulation = formulate(
-            Task.of(problem, vehicle, self.reserve, self.clearance), order, self.intervals
-        )
+        task = Task.of(problem, vehicle, self.reserve, self.clearance)
+        formulation = formulate(task, order, self.intervals)
         attempts = Attempts(formulation, solver(self.backend), recorder)
         if vehicle is None or self.search is not None:
             found = (self.search or GridSearch()).smallest(partial(_attempt, attempts))

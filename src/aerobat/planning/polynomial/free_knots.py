@@ -75,10 +75,8 @@ class FreeKnots(Planner):
         Raises SpecError without a vehicle and for input that makes no sense, Infeasible when nothing is
         certified.
         """
-        task, recorder = (
-            flown_task("free-knots", problem, vehicle, self.reserve, self.clearance),
-            Recorder(progress),
-        )
+        task = flown_task("free-knots", problem, vehicle, self.reserve, self.clearance)
+        recorder = Recorder(progress)
         refinement = Refinement.of(task, recorder, self.still_ends)
         with within_time(self.time_limit):
             found = self._fastest(refinement)

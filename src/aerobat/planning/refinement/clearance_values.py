@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array, xyz
-from aerobat.engines.array_functions import ArrayFunction, array_function, gradient
+from aerobat.engines.array_functions import COMPLEX_STEP, ArrayFunction, array_function, gradient
 from aerobat.engines.tracing import Trace, TraceOps
 from aerobat.kernels.vectors import add, add_scaled
 from aerobat.limits.clearance import NEAREST, SIZE, Clearance, Planes, left_between
 from aerobat.planning.task import Task
 from aerobat.problem.problem import DERIVATIVES
 
-COMPLEX_STEP = 1e-20
 MOVED = 6  # components of velocity and acceleration, in which clearances are not linear
 FAR = 1e3  # [m] that is left to planes that do not count
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array, Mask
-from aerobat.engines.array_functions import ArrayFunction, array_function, gradient
+from aerobat.engines.array_functions import COMPLEX_STEP, ArrayFunction, array_function, gradient
 from aerobat.engines.tracing import Trace, TraceOps
 from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag, reference_of
 from aerobat.flatness.parallel_transport import frames
@@ -28,7 +28,6 @@ from aerobat.planning.task import Task
 from aerobat.so3 import UP
 from aerobat.states import FlatState
 
-COMPLEX_STEP = 1e-20
 MOVING = slice(1, 6)  # velocity to crackle: what measures depend on
 MOTION = 15  # their components
 

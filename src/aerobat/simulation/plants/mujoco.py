@@ -20,6 +20,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment.obstacles import ConvexPiece, Obstacle
 from aerobat.environment.obstacles.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
+from aerobat.environment.obstacles.surface import surface_of
 from aerobat.errors import BackendMissing
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.rigid_body import Body
@@ -39,7 +40,6 @@ _KINDS = {
     _GATE: Contact.GATE,
     _OBSTACLE: Contact.OBSTACLE,
 }
-_AROUND = 24  # points around what is round in a mesh
 _AT_ONCE = 1e4  # [1/s] a rotor that is as fast has no lag here
 _ROUNDING = 1e-9  # of a step
 
@@ -184,11 +184,7 @@ def _shapes(obstacle: Obstacle) -> Iterator[dict[str, str]]:
 
 def _hull(piece: ConvexPiece) -> Array:
     """Points of a piece [m] whose hull it is; of what is round, points all around."""
-    if not piece.rounding.any():
-        return piece.points
-    around, down = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, _AROUND), np.linspace(0.0, np.pi, _AROUND // 2))
-    ball = np.stack([np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down)], axis=-1)
-    return np.asarray((piece.points[:, None] + ball.reshape(-1, 3) @ piece.rounding.T).reshape(-1, 3))
+    return surface_of(piece).points if piece.rounding.any() else piece.points
 
 
 def _frame_bars(gate: Gate) -> Iterator[tuple[Array, Array, tuple[float, float, float]]]:

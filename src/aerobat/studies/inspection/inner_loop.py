@@ -25,15 +25,11 @@ from aerobat.simulation.law_controller import DERIVATIVE, GYRO
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
-_SMOOTHED = (
-    0.008  # [s] of each of two lags, which leave what a gyro's noise and the loop's filters do not make
-)
+_SMOOTHED = 0.008  # [s] of each of two lags, which leave what noise and filters do not make
 _OTHER_ORDER = 0.6  # [-] of the misfit of commands, that another order leaves at most
 _OTHER_RATES = 0.5  # [-] of what the model does not explain, that other rates leave at most
 _RATES_OFF = 0.15  # [-] by which rates are others
-_GAIN_OFF = (
-    0.4  # [-] by which a gain is another one: the firmware's whole numbers, filters and delays take 0.2
-)
+_GAIN_OFF = 0.4  # [-] by which a gain is another one: rounding, filters and delays take 0.2
 _ERRORS = 4.0  # standard errors of a gain, beside that
 _LAG_OFF = 0.4  # [-] by which rotors are slower than planned for: twice what a lab's spread makes of four
 _EXCITED = 0.05  # [rad/s] of the rate error, RMS, that tells a gain

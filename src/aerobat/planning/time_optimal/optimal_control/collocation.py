@@ -191,9 +191,8 @@ class IntervalSide:
 
     def __init__(self, body: ZeroYawRateBody, input_scale: Array, last: int) -> None:
         sx = import_casadi().SX
-        self.unknowns = sx.sym(
-            "z", 1 + STATES + 2 * INPUTS
-        )  # scaled, as `CollocationMesh.side_unknowns` orders them
+        # scaled, as `CollocationMesh.side_unknowns` orders them
+        self.unknowns = sx.sym("z", 1 + STATES + 2 * INPUTS)
         self.fraction = sx.sym("fraction")
         self.last = last
         z = self.unknowns * np.concatenate([[1.0], STATE_SCALE, input_scale, input_scale])
