@@ -7,8 +7,7 @@ from itertools import pairwise
 
 from cyclopts import App, CycloptsError, Group
 
-from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.failures import IMPORT_FLAG
+from aerobat.cli.failures import IMPORT_FLAG, ExitCode
 from aerobat.errors import SpecError
 
 # each command is one file and one function of this name, imported when it is asked for

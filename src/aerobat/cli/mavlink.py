@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.interrupts import REPORTED
 from aerobat.cli.link_options import MavlinkOptions, MavlinkVehicleOptions
 from aerobat.cli.runs.saved_plans import named_vehicle

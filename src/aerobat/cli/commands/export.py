@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import POSITIVE, RunOptions, output
 from aerobat.cli.terminal import print_json, say
 from aerobat.errors import SpecError

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import prod
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
-from aerobat.cli.feasibility_options import FeasibilityOptions
-from aerobat.cli.options import OutputOptions
+from aerobat.cli.options import OutputOptions, PlannerOptions, Workers, output, planning
 from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import is_of_a_run, written
-from aerobat.cli.runs.record import FlightSettings, RunRecord
+from aerobat.cli.runs.record import DEFAULT_TOLERANCE, FlightSettings, RunRecord
 from aerobat.cli.tasks import make_planner, read_task
 from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
@@ -33,6 +33,42 @@ from aerobat.studies.feasibility import (
 from aerobat.studies.feasibility.probe import TIME_LIMIT
 
 NEED = "need.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FeasibilityOptions(PlannerOptions):
+    """Options of a map of what is feasible, and of a search for the least."""
+
+    over: Annotated[tuple[str, ...], Parameter(group=planning, negative="", show_default=False)] = ()
+    """A field and its values, FIRST:LAST:STEP or values between commas, as angle=0:90:10; once or twice.
+    Fields have the names of files, as limits.velocity, gate.width, vehicle.mass, or speed where no other
+    field ends so; angle is the tilt of a half-flip's gate."""
+
+    least: Annotated[
+        tuple[Literal["thrust-to-weight", "ceiling", "gate", "gate-height"], ...],
+        Parameter(group=planning, negative="", show_default=False),
+    ] = ()
+    """The quantity whose least value is sought, once or more often. Default: all that the problem has, but
+    gate-height, which makes slits of openings."""
+
+    tolerance: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=1e-4, lte=0.5))] = (
+        DEFAULT_TOLERANCE
+    )
+    """Between the least and the refusal beside it, as a part of the least."""
+
+    workers: Annotated[str | None, Workers(group=planning)] = None
+
+    table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
+    """The form of a map's table, map.csv or map.parquet; the latter needs aerobat[parquet]."""
+
+    def require_one(self) -> None:
+        """Raise SpecError for options of a map and of a search for the least together."""
+        of_least = {"--least": bool(self.least), "--tolerance": self.tolerance != DEFAULT_TOLERANCE}
+        for flag, is_given in of_least.items():
+            if self.over and is_given:
+                raise SpecError(f"{flag} finds the least, --over maps; leave one of them out")
+        if self.table != "csv" and not self.over:
+            raise SpecError("--table is for a map; add --over, or leave it out")
 
 
 def feasibility(

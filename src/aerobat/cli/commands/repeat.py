@@ -14,7 +14,7 @@ from aerobat.cli.commands.compare import COMPARISON, comparison_of, finish_compa
 from aerobat.cli.commands.feasibility import NEED, finish_map, finish_need, map_of, need_of
 from aerobat.cli.commands.fly import flown
 from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ExplainingOptions, OutputOptions, output
 from aerobat.cli.runs.folder import FLIGHT, finish
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now

@@ -14,7 +14,7 @@ from aerobat.evaluation import Score
 from aerobat.planning import Plan
 from aerobat.simulation.outcome import length
 from aerobat.studies.error_causes.cause import Trial
-from aerobat.studies.sweep.share import Share
+from aerobat.studies.share import Share
 
 NONE, ALL = "none", "all together"
 Level = Annotated[float, Field(ge=0.0, le=1.0)]

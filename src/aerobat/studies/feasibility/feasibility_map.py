@@ -25,7 +25,7 @@ from aerobat.studies.feasibility.binding import least_reserve
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, ProbedTask, probe
 from aerobat.studies.flights import FlightTask, fly_scores
 from aerobat.studies.lens import Lens, Scenario, lens
-from aerobat.studies.sweep.share import Share
+from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
