@@ -15,7 +15,7 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
-from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.floats import ArrayOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels.gates import progress
 from aerobat.problem.ball import Ball

@@ -10,8 +10,7 @@ import pytest
 import aerobat as ab
 from aerobat.environment.obstacles import OBSTACLES
 from aerobat.interchange.flat_outputs import FlatOutputs
-from aerobat.simulation.contact import Contact
-from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.outcome import Contact, Outcome
 from aerobat.simulation.plants import PLANTS
 from aerobat.simulation.plants.mujoco import Mujoco
 from aerobat.simulation.plants.rotorpy import RotorPy, rotorpy_vehicle

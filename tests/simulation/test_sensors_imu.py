@@ -8,9 +8,9 @@ import pytest
 
 import aerobat as ab
 from aerobat import so3
-from aerobat.engines.components import from_components
 from aerobat.engines.engine import expanded
-from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.floats import ArrayOps
+from aerobat.engines.pytree import from_components
 from aerobat.environment import Dispersion, Imu, MotionCapture
 from aerobat.kernels import imu
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState

@@ -11,8 +11,8 @@ from scipy import stats
 
 import aerobat as ab
 from aerobat import so3
-from aerobat.engines.components import components, from_components
-from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.floats import ArrayOps
+from aerobat.engines.pytree import components, from_components
 from aerobat.environment import Dispersion, HandOff, Imu, MotionCapture, Outage
 from aerobat.errors import SpecError
 from aerobat.kernels import mocap

@@ -14,9 +14,9 @@ from aerobat.environment import Battery, Dispersion, Environment, Gusts
 from aerobat.kernels import wind
 from aerobat.kernels.battery import BatteryState
 from aerobat.kernels.wind import GustFilter, GustNoise
-from aerobat.simulation.conditions.disturbances import WindSource
 from aerobat.simulation.conditions.draw import dispersed_fleet, draw_flights
 from aerobat.simulation.conditions.parts import DispersedFlights, gust_filter, wind_part
+from aerobat.simulation.conditions.sensors import WindSource
 from aerobat.trajectory import Trajectory
 from dispersed_loops import dispersed_setup, drawn, rows_of
 

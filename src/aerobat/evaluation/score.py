@@ -19,10 +19,9 @@ from aerobat.evaluation.criteria import SampledPath, criteria_of
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
-from aerobat.simulation.contact import Contact
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.metrics import Criteria, metrics_of_log
-from aerobat.simulation.outcome import Outcome, counted, length
+from aerobat.simulation.outcome import Contact, Outcome, counted, length
 from aerobat.simulation.passages import (
     NearestObstacle,
     Passage,

@@ -13,10 +13,10 @@ from aerobat.planning import Plan
 from aerobat.reporting.captions import error_caption, plan_captions, score_caption
 from aerobat.reporting.page import AXIS, COLUMNS, TITLES, Place, blank_page, heading, house_style, panel
 from aerobat.reporting.panels import timelines
-from aerobat.reporting.panels.clearances import draw_clearance
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
 from aerobat.reporting.panels.stages import draw_stages
+from aerobat.reporting.panels.timelines import draw_clearance
 from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle, as_vehicle
 

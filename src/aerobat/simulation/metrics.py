@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
-from aerobat.engines.components import components
-from aerobat.engines.numpy import ArrayOps
-from aerobat.engines.pytree import Tree, tree_leaves, tree_map
+from aerobat.engines.floats import ArrayOps
+from aerobat.engines.pytree import Tree, components, tree_leaves, tree_map
 from aerobat.environment import Environment
 from aerobat.kernels import running_metrics
 from aerobat.kernels.gates import approach, pointing, progress

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from enum import Enum
+from enum import Enum, IntEnum
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
 TOUCHDOWN = 1e-3  # [m] below the ground that is no hit: paths that land end on it
@@ -14,6 +14,15 @@ LANDING_SPEED = 2.0  # [m/s] that of a fall from 20 cm, which a landing gear tak
 LANDING_DEPTH = 0.1  # [m] the tolerance of places
 NO_LENGTH = 1e-6  # [m] less is rounding
 FEW_DECIMALS = 0.095  # what rounds to less than 0.10 has no two digits in two decimals
+
+
+class Contact(IntEnum):
+    """The object that a vehicle touches: of several, an obstacle before a gate before the ground."""
+
+    NOTHING = 0
+    GROUND = 1
+    GATE = 2
+    OBSTACLE = 3
 
 
 def length(metres: float) -> str:

@@ -30,7 +30,7 @@ from pydantic import Field, PlainValidator
 
 from aerobat.declaration import FieldError, shown
 from aerobat.declaration.registry import import_plugin, imported_plugins
-from aerobat.engines.cores import available_cores
+from aerobat.engines.engine import available_cores
 from aerobat.errors import BackendMissing, SpecError
 from aerobat.provenance import installed_versions
 

@@ -28,13 +28,6 @@ OF_VEHICLES, OF_PROBLEMS = (
 )  # keys of their files
 
 
-def write_new(text: str, out: Path) -> None:
-    """Write a text to a file that is not there yet. Raises SpecError where there is one."""
-    if out.exists():
-        raise SpecError(f"--out {out} is there already; name a new file")
-    write_whole(out, text)
-
-
 def show(name: str | None = None, /, *, out: Annotated[Path | None, Parameter(group=output)] = None) -> None:
     """List the built-in problems and vehicles; describe one, or write its file to begin your own with.
 
@@ -106,3 +99,10 @@ def _text(name: str) -> str:
     else:
         named_vehicle(name)
     return found.toml()
+
+
+def write_new(text: str, out: Path) -> None:
+    """Write a text to a file that is not there yet. Raises SpecError where there is one."""
+    if out.exists():
+        raise SpecError(f"--out {out} is there already; name a new file")
+    write_whole(out, text)

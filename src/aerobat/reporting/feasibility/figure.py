@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import validated
-from aerobat.reporting.feasibility.legend import kinds_of, letter_of
+from aerobat.reporting.feasibility.facts import kinds_of, letter_of
 from aerobat.reporting.page import AXIS, COLUMNS, MARGIN, PAGE_WIDTH, blank_page, house_style, panel, write
 from aerobat.reporting.style import BAND, BLUE, FAINT, HAIR, INK, MUTED, PAPER, RED, SMALL
 from aerobat.studies.feasibility import Cell, Feasibility, FeasibilityMap

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aerobat.errors import SpecError
+from aerobat.evaluation import Opening
 from aerobat.evaluation.criteria import criterion
 from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture, said
-from aerobat.reporting.sweeps.words import known_opening, outcome_name
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
 from aerobat.studies.sweep import Share, Sweep
@@ -31,6 +32,25 @@ ERRORS = (  # columns of the table, and what people call them
 PASSAGE = (("miss_m", "off its centre"), ("attitude_error_deg", "attitude"))
 WIDTHS = (0.01, 0.02, 0.05, 0.1)  # [m] off a gate's centre
 NEVER = "not passed"
+
+
+def success_sentence(sweep: Sweep) -> str:
+    """Return a sentence with the share of flights that went well, its interval and the seed."""
+    return f"{sweep.success} of the flights went well, at 95 % confidence; seed {sweep.seed}"
+
+
+def known_opening(sweep: Sweep, passage: str) -> Opening | None:
+    """The smallest opening that 99 % pass; None where the flights are too few to say, or too many miss."""
+    try:
+        found = sweep.smallest_opening(passage)
+    except SpecError:
+        return None
+    return found if isfinite(found.scale) else None
+
+
+def outcome_name(outcome: Outcome) -> str:
+    """An outcome in two or three words."""
+    return outcome.name.lower().replace("_", " ")
 
 
 @facts.register

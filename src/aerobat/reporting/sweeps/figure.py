@@ -23,7 +23,7 @@ from aerobat.reporting.page import (
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.crossings import Crossings, draw_opening, draw_scatter
 from aerobat.reporting.style import BAND, BLUE, INK, MUTED, RED, SKY, SMALL
-from aerobat.reporting.sweeps.words import known_opening, outcome_name, success_sentence
+from aerobat.reporting.sweeps.facts import known_opening, outcome_name, success_sentence
 from aerobat.simulation.outcome import length
 from aerobat.studies.share import percent
 from aerobat.studies.sweep import Sweep

@@ -10,8 +10,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.control.parameters import airframe_parameters, environment_parameters
-from aerobat.engines.components import components
-from aerobat.engines.pytree import Tree
+from aerobat.engines.pytree import Tree, components
 from aerobat.environment import (
     Battery,
     Dispersion,
@@ -28,15 +27,17 @@ from aerobat.kernels.mocap import MocapParameters, Seam
 from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.wind import GustFilter, GustState, WindParameters
 from aerobat.problem import Gate
-from aerobat.simulation.conditions.disturbances import BatterySag, Wind, WindSource
 from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.sensors import (
+    BatterySag,
     FeltParameters,
     ImuBias,
     ImuSensor,
     ImuSource,
     MocapSource,
     MotionCaptureSensor,
+    Wind,
+    WindSource,
 )
 from aerobat.simulation.setup import LoopPart
 from aerobat.trajectory import Trajectory

@@ -15,9 +15,14 @@ from aerobat.simulation.components import (
     DelayTicks,
     StateObserver,
 )
-from aerobat.simulation.conditions.disturbance_observer import DisturbanceObserver, DisturbanceParameters
 from aerobat.simulation.conditions.draw import dispersed_fleet, draw_flights
-from aerobat.simulation.conditions.observer import EkfObserver, ObserverParameters, ObserverSource
+from aerobat.simulation.conditions.observer import (
+    DisturbanceObserver,
+    DisturbanceParameters,
+    EkfObserver,
+    ObserverParameters,
+    ObserverSource,
+)
 from aerobat.simulation.conditions.parts import WHOLE, DispersedFlights, condition_parts, whole_ticks
 from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig

@@ -24,8 +24,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
 from aerobat.declaration import by_value
-from aerobat.engines.components import components
-from aerobat.engines.pytree import tree_map
+from aerobat.engines.pytree import components, tree_map
 from aerobat.kernels.gates.progress import GatePlane, GateProgress
 from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
 from aerobat.kernels.gates.swath import NOWHERE, Extreme, Swath

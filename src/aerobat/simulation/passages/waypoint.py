@@ -10,7 +10,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification import PlannedWaypoint
 from aerobat.declaration import by_value
-from aerobat.engines.components import components
+from aerobat.engines.pytree import components
 from aerobat.kernels.gates.approach import Approach, Target
 from aerobat.simulation.outcome import Outcome
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, one_of_many

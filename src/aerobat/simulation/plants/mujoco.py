@@ -25,7 +25,7 @@ from aerobat.errors import BackendMissing
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.problem.gate import Gate
-from aerobat.simulation.contact import Contact
+from aerobat.simulation.outcome import Contact
 from aerobat.simulation.plants.plant import PLANTS, Actuation, Plant, PlantScene
 
 if TYPE_CHECKING:

@@ -39,9 +39,9 @@ from aerobat.simulation.components import (
     with_ceiling,
     with_wind,
 )
-from aerobat.simulation.contact import Contact
 from aerobat.simulation.flight_controller import AutopilotRun, Sensed
 from aerobat.simulation.loop import Controlling, LoopInput, Signals, compose
+from aerobat.simulation.outcome import Contact
 from aerobat.simulation.plants.plant import Actuation, PlantRun, PlantScene
 from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle.ellipsoid import Ellipsoid

@@ -19,7 +19,7 @@ from aerobat.declaration import FieldError, shown, validated
 from aerobat.errors import BackendMissing, SpecError
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.rigid_body import Body
-from aerobat.simulation.contact import Contact
+from aerobat.simulation.outcome import Contact
 from aerobat.simulation.plants.plant import PLANTS, Actuation, Plant, PlantScene
 from aerobat.vehicle import Rotor, Vehicle
 

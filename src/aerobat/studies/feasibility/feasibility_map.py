@@ -21,8 +21,7 @@ from aerobat.errors import SpecError
 from aerobat.planning import Planner, as_planner
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.axis import MAX_CELLS, Axis
-from aerobat.studies.feasibility.binding import least_reserve
-from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, ProbedTask, probe
+from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, ProbedTask, least_reserve, probe
 from aerobat.studies.flights import FlightTask, fly_scores
 from aerobat.studies.lens import Lens, Scenario, lens
 from aerobat.studies.share import Share
