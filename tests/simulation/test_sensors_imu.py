@@ -15,7 +15,7 @@ from aerobat.environment import Dispersion, Imu, MotionCapture
 from aerobat.kernels import imu
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
 from aerobat.simulation.conditions.draw import draw_flights
-from aerobat.simulation.conditions.sensors import ImuSource
+from aerobat.simulation.conditions.sensors import imu_source
 from dispersed_loops import RATE, dispersed_setup, drawn, rows_of
 
 QUAD = ab.load_vehicle("agile-quad")
@@ -76,7 +76,7 @@ def measured(parameters: ImuParameters, felt: ImuSample, noise: ImuSample) -> Im
 
 def noise_of(ticks: int, vehicles: int, stream: str = "imu") -> ImuSample:
     draws = draw_flights(Dispersion(), 4, 1, range(vehicles))
-    noise: ImuSample = expanded(ImuSource(draws, stream, 1).chunk(0, ticks))
+    noise: ImuSample = expanded(imu_source(draws, stream, 1).chunk(0, ticks))
     return noise
 
 

@@ -12,16 +12,12 @@ from cyclopts import Parameter, validators
 
 from aerobat.cli.options import OutputOptions, PlannerOptions, Workers, output, planning
 from aerobat.cli.progress import Progress, showing
-from aerobat.cli.runs.folder import is_of_a_run, written
+from aerobat.cli.runs.folder import finish_study, is_of_a_run
 from aerobat.cli.runs.record import DEFAULT_TOLERANCE, FlightSettings, RunRecord
 from aerobat.cli.tasks import make_planner, read_task
 from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.reporting.feasibility.facts import requirements
-from aerobat.reporting.feasibility.figure import map_figure
-from aerobat.reporting.page import png
-from aerobat.reporting.plain_data import to_json
-from aerobat.reporting.tables import table
 from aerobat.storage import require_replaceable
 from aerobat.studies.feasibility import (
     Axis,
@@ -31,8 +27,6 @@ from aerobat.studies.feasibility import (
     min_requirements,
 )
 from aerobat.studies.feasibility.probe import TIME_LIMIT
-
-NEED = "need.json"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,15 +137,8 @@ def map_of(record: RunRecord, workers: str | None = None) -> FeasibilityMap:
 
 def finish_map(found: FeasibilityMap, record: RunRecord, options: OutputOptions) -> None:
     """Write a map, then show it."""
-    facts = to_json(found)
-    picture = png(map_figure(found))
-
-    def write(staging: Path) -> None:
-        write_table(found.table, staging / f"map.{record.flight.table}")
-        (staging / "map.json").write_text(facts + "\n", encoding="utf-8")
-        (staging / "map.png").write_bytes(picture)
-
-    written(record, options, write, facts, table(found))
+    name = f"map.{record.flight.table}"
+    finish_study(found, record, options, lambda staging: write_table(found.table, staging / name))
 
 
 def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement, ...]:
@@ -179,14 +166,11 @@ def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement,
 
 
 def finish_need(found: Sequence[Requirement], record: RunRecord, options: OutputOptions) -> None:
-    """Write what is needed, then show it."""
-    told = requirements(record.problem.name, record.vehicle.name, found)
-    facts = to_json(told)
+    """Write what is needed with its plans, then show it."""
 
-    def write(staging: Path) -> None:
-        (staging / NEED).write_text(facts + "\n", encoding="utf-8")
+    def write_plans(staging: Path) -> None:
         for each in found:
             if each.plan is not None:
                 each.plan.save(staging / f"{record.problem.name}-{each.quantity}.plan")
 
-    written(record, options, write, facts, table(told))
+    finish_study(requirements(record.problem.name, record.vehicle.name, found), record, options, write_plans)

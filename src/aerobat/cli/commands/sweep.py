@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, Workers, flying, output
 from aerobat.cli.progress import Progress, showing
-from aerobat.cli.runs.folder import is_of_a_run, written
+from aerobat.cli.runs.folder import finish_study, is_of_a_run
 from aerobat.cli.runs.record import RECORD, FlightSettings, RunRecord, read_record, write_record
 from aerobat.cli.tasks import plan_of, planned
 from aerobat.cli.terminal import say
@@ -22,10 +22,6 @@ from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.planning import Plan, load_plan
-from aerobat.reporting.page import png
-from aerobat.reporting.plain_data import to_json
-from aerobat.reporting.sweeps.figure import sweep_figure
-from aerobat.reporting.tables import table
 from aerobat.storage import require_replaceable
 from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep import sweep as sweep_plan
@@ -180,15 +176,11 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: str
 
 
 def finish_sweep(sweep: Sweep, record: RunRecord, options: OutputOptions) -> None:
-    """Write a sweep, then show it."""
-    facts = to_json(sweep)
-    picture = png(sweep_figure(sweep))
+    """Write a sweep with its plan and its table, then show it."""
 
-    def write(staging: Path) -> None:
+    def write_others(staging: Path) -> None:
         sweep.plan.save(staging / f"{sweep.plan.problem.name}.plan")
         write_table(sweep.table, staging / table_name(record.flight))
-        (staging / "sweep.json").write_text(facts + "\n", encoding="utf-8")
-        (staging / "sweep.png").write_bytes(picture)
 
-    written(record, options, write, facts, table(sweep))
+    finish_study(sweep, record, options, write_others)
     Unfinished.beside(options.out or record.folder).remove()

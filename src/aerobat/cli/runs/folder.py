@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.console import Group
 
@@ -22,7 +23,7 @@ from aerobat.errors import SpecError
 from aerobat.evaluation import Score
 from aerobat.interchange.columns import write_columns
 from aerobat.planning import Plan
-from aerobat.reporting.facts import EXPLAIN, REPORT
+from aerobat.reporting.facts import EXPLAIN, REPORT, picture
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.page import import_undocumented, png
 from aerobat.reporting.plain_data import to_json
@@ -110,6 +111,30 @@ def written(
     print(f"\n{hint}written to {folder}/" + (", in the place of an earlier run" if replaced else ""))
 
 
+def finish_study(
+    result: Any, record: RunRecord, options: OutputOptions, write_others: Callable[[Path], None] | None = None
+) -> None:
+    """Write a study's facts and its picture, where it has one, as COMMAND.json and COMMAND.png, then show it.
+
+    Args:
+        result: What the study came to.
+        record: What it takes to do it again.
+        options: Where to write, and in what form to say it.
+        write_others: Writes what else there is to a folder.
+    """
+    told, drawn = to_json(result), picture(result)
+    pixels = None if drawn is None else png(drawn)
+
+    def write(staging: Path) -> None:
+        (staging / f"{record.command}.json").write_text(told + "\n", encoding="utf-8")
+        if pixels is not None:
+            (staging / f"{record.command}.png").write_bytes(pixels)
+        if write_others is not None:
+            write_others(staging)
+
+    written(record, options, write, told, table(result))
+
+
 @dataclass(frozen=True)
 class Flown:
     """A plan's flight, its score, and the names of what flew it."""
@@ -141,7 +166,7 @@ def finish(
     report = Report(plan, score, controller, plant, trials)
     facts = to_json(report)
     import_undocumented()
-    picture = png(report_figure(plan, plan.vehicle, flight, score))
+    pixels = png(report_figure(plan, plan.vehicle, flight, score))
 
     def write(staging: Path) -> None:
         plan.save(staging / f"{plan.problem.name}.plan")
@@ -153,7 +178,7 @@ def finish(
         if flown is not None and flown.own_log:
             (staging / BLACKBOX).write_bytes(flown.own_log)
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
-        (staging / "report.png").write_bytes(picture)
+        (staging / "report.png").write_bytes(pixels)
 
     tables = [table(report, most=REPORT)]
     if explain:

@@ -33,11 +33,11 @@ from aerobat.simulation.conditions.sensors import (
     FeltParameters,
     ImuBias,
     ImuSensor,
-    ImuSource,
-    MocapSource,
     MotionCaptureSensor,
     Wind,
-    WindSource,
+    imu_source,
+    mocap_source,
+    wind_source,
 )
 from aerobat.simulation.setup import LoopPart
 from aerobat.trajectory import Trajectory
@@ -123,7 +123,7 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
         gust_filter(period / flights.rate / time_constant, len(flights.draws)),
         GustState(along, (first, second), (third, fourth)),
     )
-    return LoopPart(Wind(period), parameters, WindSource(flights.draws, period))
+    return LoopPart(Wind(period), parameters, wind_source(flights.draws, period))
 
 
 def gust_filter(step: float, vehicles: int) -> GustFilter:
@@ -178,8 +178,8 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
         ImuParameters(*map(flights.all, numbers)),
     )
     return (
-        LoopPart(ImuBias(slow), biases, ImuSource(flights.draws, "imu_bias", slow, block=32)),
-        LoopPart(ImuSensor(period), felt, ImuSource(flights.draws, "imu", period)),
+        LoopPart(ImuBias(slow), biases, imu_source(flights.draws, "imu_bias", slow, block=32)),
+        LoopPart(ImuSensor(period), felt, imu_source(flights.draws, "imu", period)),
     )
 
 
@@ -205,7 +205,7 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
         seam=_seam(capture.hand_off, flights),
         first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
     )
-    source = MocapSource(flights.draws, period, flights.rate)
+    source = mocap_source(flights.draws, period, flights.rate)
     return LoopPart(MotionCaptureSensor(period, latency), parameters, source)
 
 

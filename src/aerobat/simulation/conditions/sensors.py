@@ -10,7 +10,6 @@ import numpy as np
 
 from aerobat.arrays import Array, Mask
 from aerobat.engines.engine import Coded
-from aerobat.engines.pytree import Tree
 from aerobat.kernels import battery, imu, mocap, motors, rigid_body, wind
 from aerobat.kernels.battery import BatteryParameters, BatteryState
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
@@ -43,22 +42,13 @@ class Wind:
         return wind.step(parameters, state, noise)
 
 
-class WindSource:
-    """Random numbers of gusts."""
+def wind_source(draws: Draws, period: int) -> RandomSource:
+    """Return the random numbers of gusts, for a component that steps at every so many ticks."""
 
-    per_vehicle = True
+    def noise(x: Sequence[Coded], *_: Array) -> GustNoise:
+        return GustNoise(x[0], (x[1], x[2]), (x[3], x[4]))
 
-    def __init__(self, draws: Draws, period: int) -> None:
-        """Prepare to draw, for a component that steps at every so many ticks."""
-        self._numbers = RandomSource(draws.stream("wind"), normals=5, period=period, block=32)
-
-    def chunk(self, begin: int, end: int) -> Tree:
-        """See `Source.chunk`; a GustNoise."""
-
-        def noise(x: Sequence[Coded], _: Array) -> GustNoise:
-            return GustNoise(x[0], (x[1], x[2]), (x[3], x[4]))
-
-        return self._numbers.inputs(begin, end, noise)
+    return RandomSource(draws.stream("wind"), noise, normals=5, period=period, block=32)
 
 
 @dataclass(frozen=True)
@@ -135,30 +125,20 @@ class ImuSensor:
         return imu.step(ops, parameters.errors, state, felt, signals.of(ImuSample), noise)
 
 
-class ImuSource:
-    """Random numbers of an IMU's white noise, or of the walk of its biases."""
+def imu_source(draws: Draws, stream: str, period: int, block: int = 256) -> RandomSource:
+    """Return the random numbers of an IMU's white noise, or of the walk of its biases.
 
-    per_vehicle = True
+    Args:
+        draws: of each vehicle.
+        stream: "imu" or "imu_bias".
+        period: ticks from one sample to the next.
+        block: samples drawn at once.
+    """
 
-    def __init__(self, draws: Draws, stream: str, period: int, block: int = 256) -> None:
-        """Prepare to draw.
+    def noise(x: Sequence[Coded], *_: Array) -> ImuSample:
+        return ImuSample((x[0], x[1], x[2]), (x[3], x[4], x[5]))
 
-        Args:
-            draws: of each vehicle.
-            stream: "imu" or "imu_bias".
-            period: ticks from one sample to the next.
-            block: samples drawn at once.
-        """
-        seeds = draws.stream(stream)
-        self._numbers = RandomSource(seeds, normals=6, period=period, block=block)
-
-    def chunk(self, begin: int, end: int) -> Tree:
-        """See `Source.chunk`; an ImuSample."""
-
-        def noise(x: Sequence[Coded], _: Array) -> ImuSample:
-            return ImuSample((x[0], x[1], x[2]), (x[3], x[4], x[5]))
-
-        return self._numbers.inputs(begin, end, noise)
+    return RandomSource(draws.stream(stream), noise, normals=6, period=period, block=block)
 
 
 class MocapState(NamedTuple):
@@ -208,29 +188,18 @@ class MotionCaptureSensor:
         return np.asarray((since >= 0) & (since % self.period == 0))
 
 
-class MocapSource:
-    """Time, and random numbers of motion capture."""
+def mocap_source(draws: Draws, period: int, rate: float) -> RandomSource:
+    """Return the time, and the random numbers of motion capture.
 
-    per_vehicle = True
+    Args:
+        draws: of each vehicle.
+        period: ticks from one sample to the next.
+        rate: of the ticks [1/s].
+    """
 
-    def __init__(self, draws: Draws, period: int, rate: float) -> None:
-        """Prepare to draw.
+    def sampled(x: Sequence[Coded], chance: Array, ticks: Array) -> MocapInput:
+        return MocapInput(ticks / rate, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), chance[0])
 
-        Args:
-            draws: of each vehicle.
-            period: ticks from one sample to the next.
-            rate: of the ticks [1/s].
-        """
-        seeds = draws.stream("motion_capture")
-        self._numbers = RandomSource(seeds, normals=9, uniforms=1, period=period, block=32)
-        self._period = period
-        self._rate = rate
-
-    def chunk(self, begin: int, end: int) -> Tree:
-        """See `Source.chunk`; a MocapInput."""
-
-        def sampled(x: Sequence[Coded], chance: Array) -> MocapInput:
-            times = (begin // self._period + np.arange(chance.shape[1])) * self._period / self._rate
-            return MocapInput(times, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), chance[0])
-
-        return self._numbers.inputs(begin, end, sampled)
+    return RandomSource(
+        draws.stream("motion_capture"), sampled, normals=9, uniforms=1, period=period, block=32
+    )
