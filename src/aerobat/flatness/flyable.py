@@ -10,7 +10,8 @@ from aerobat.declaration import AS_IT_IS
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.trajectory import HasTrajectory, Trajectory
-from aerobat.vehicle import Vehicle, as_vehicle
+from aerobat.vehicle.files import as_vehicle
+from aerobat.vehicle.vehicle import Vehicle
 
 
 @runtime_checkable

@@ -18,9 +18,13 @@ from math import isinf, isnan, radians
 from aerobat.environment import Environment
 from aerobat.planning.passages import PlacedStage, planned_passages
 from aerobat.planning.task import Task
-from aerobat.simulation import Flight, FlightConfig, Outcome, fly
-from aerobat.simulation.outcome import DIVERGENCE_RADIUS, length
-from aerobat.simulation.passages import NearestObstacle, Passage, log_rows, nearest_in_log, passages_in_log
+from aerobat.simulation.config import FlightConfig
+from aerobat.simulation.flight import Flight
+from aerobat.simulation.fly import fly
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
+from aerobat.simulation.passages.log import log_rows, passages_in_log
+from aerobat.simulation.passages.obstacles import NearestObstacle, nearest_in_log
+from aerobat.simulation.passages.passage import Passage
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 

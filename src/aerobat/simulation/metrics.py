@@ -31,15 +31,10 @@ from aerobat.simulation.components import rotor_commands
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.loop import Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, LANDING_DEPTH, LANDING_SPEED, TOUCHDOWN, Outcome
-from aerobat.simulation.passages import (
-    PlannedAttitude,
-    attitude_direction,
-    bounding_ellipsoid,
-    gate_places,
-    log_rows,
-    scan_log,
-    waypoint_target,
-)
+from aerobat.simulation.passages.log import log_rows, scan_log
+from aerobat.simulation.passages.passage import bounding_ellipsoid, gate_places
+from aerobat.simulation.passages.stage_attitude import PlannedAttitude, attitude_direction
+from aerobat.simulation.passages.waypoint import waypoint_target
 from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle import Ellipsoid
 

@@ -11,7 +11,8 @@ import numpy as np
 from aerobat.control import ControlLaw, Controller
 from aerobat.engines import choose
 from aerobat.environment import Dispersion
-from aerobat.evaluation import Score, score_flights
+from aerobat.evaluation.score import Score
+from aerobat.evaluation.score_flights import score_flights
 from aerobat.planning import Plan
 from aerobat.simulation import FlightConfig
 from aerobat.studies.share import Share, Trials

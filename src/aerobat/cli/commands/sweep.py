@@ -23,9 +23,9 @@ from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.planning import Plan, load_plan
 from aerobat.storage import require_replaceable
-from aerobat.studies.sweep import Sweep
-from aerobat.studies.sweep import sweep as sweep_plan
 from aerobat.studies.sweep.kept import finished_flights
+from aerobat.studies.sweep.result import Sweep
+from aerobat.studies.sweep.sweep import sweep as sweep_plan
 from aerobat.studies.workers import WorkerEnded
 
 PLAN = "sweep.plan"

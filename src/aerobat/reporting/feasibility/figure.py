@@ -11,7 +11,8 @@ from aerobat.declaration import validated
 from aerobat.reporting.feasibility.facts import kinds_of, letter_of
 from aerobat.reporting.page import AXIS, COLUMNS, MARGIN, PAGE_WIDTH, blank_page, house_style, panel, write
 from aerobat.reporting.style import BAND, BLUE, FAINT, HAIR, INK, MUTED, PAPER, RED, SMALL
-from aerobat.studies.feasibility import Cell, Feasibility, FeasibilityMap
+from aerobat.studies.feasibility.feasibility_map import Cell, FeasibilityMap
+from aerobat.studies.feasibility.probe import Feasibility
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

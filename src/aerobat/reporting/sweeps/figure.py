@@ -26,9 +26,8 @@ from aerobat.reporting.style import BAND, BLUE, INK, MUTED, RED, SKY, SMALL
 from aerobat.reporting.sweeps.facts import known_opening, outcome_name, success_sentence
 from aerobat.simulation.outcome import length
 from aerobat.studies.share import percent
-from aerobat.studies.sweep import Sweep
 from aerobat.studies.sweep.flights import PASSED
-from aerobat.studies.sweep.result import ErrorBand
+from aerobat.studies.sweep.result import ErrorBand, Sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -19,7 +19,7 @@ from aerobat.engines.engine import Coded, Held
 from aerobat.engines.pytree import Tree
 
 Words: TypeAlias = NDArray[np.uint16]
-Arrange: TypeAlias = Callable[[Sequence[Coded], Array, Array], Tree]
+Arrange: TypeAlias = Callable[[Sequence[Coded], Array, NDArray[np.intp]], Tree]
 
 _LEVELS = 2**16
 _WORDS_AT_ONCE = 4  # 16-bit words in a number of the generator

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerobat.arrays import Array, Mask
 from aerobat.engines.engine import Coded
@@ -45,7 +46,7 @@ class Wind:
 def wind_source(draws: Draws, period: int) -> RandomSource:
     """Return the random numbers of gusts, for a component that steps at every so many ticks."""
 
-    def noise(x: Sequence[Coded], *_: Array) -> GustNoise:
+    def noise(x: Sequence[Coded], *_: object) -> GustNoise:
         return GustNoise(x[0], (x[1], x[2]), (x[3], x[4]))
 
     return RandomSource(draws.stream("wind"), noise, normals=5, period=period, block=32)
@@ -135,7 +136,7 @@ def imu_source(draws: Draws, stream: str, period: int, block: int = 256) -> Rand
         block: samples drawn at once.
     """
 
-    def noise(x: Sequence[Coded], *_: Array) -> ImuSample:
+    def noise(x: Sequence[Coded], *_: object) -> ImuSample:
         return ImuSample((x[0], x[1], x[2]), (x[3], x[4], x[5]))
 
     return RandomSource(draws.stream(stream), noise, normals=6, period=period, block=block)
@@ -197,7 +198,7 @@ def mocap_source(draws: Draws, period: int, rate: float) -> RandomSource:
         rate: of the ticks [1/s].
     """
 
-    def sampled(x: Sequence[Coded], chance: Array, ticks: Array) -> MocapInput:
+    def sampled(x: Sequence[Coded], chance: Array, ticks: NDArray[np.intp]) -> MocapInput:
         return MocapInput(ticks / rate, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), chance[0])
 
     return RandomSource(

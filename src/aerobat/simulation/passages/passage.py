@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage
+from aerobat.certification.envelope import PlannedPassage
 from aerobat.declaration import by_value
 from aerobat.engines.pytree import components, tree_map
 from aerobat.kernels.gates.progress import GatePlane, GateProgress

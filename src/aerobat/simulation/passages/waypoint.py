@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import PlannedWaypoint
+from aerobat.certification.envelope import PlannedWaypoint
 from aerobat.declaration import by_value
 from aerobat.engines.pytree import components
 from aerobat.kernels.gates.approach import Approach, Target

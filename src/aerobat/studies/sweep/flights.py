@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.evaluation import Passage, Score
+from aerobat.evaluation.score import Score
 from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
 from aerobat.simulation.conditions.draw import Draws, draw_flights
+from aerobat.simulation.passages import Passage
 from aerobat.studies.flights import CHUNK, FlightTask, cut
 
 SAMPLED = 4 * CHUNK  # flights, the first ones, whose errors are kept over time
