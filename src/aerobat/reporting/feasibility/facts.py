@@ -2,58 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from string import ascii_lowercase
-from typing import TYPE_CHECKING
 
 from aerobat.reporting.facts import NONE, Columns, Fact, Facts, facts, kept, picture
+from aerobat.reporting.feasibility.figure import Kind, kinds_of, letter_of, map_figure
 from aerobat.studies.feasibility import Cell, Feasibility, FeasibilityMap, Requirement
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-NOT_NAMED = "no limit named"
 WIDE = 14  # values across: of more, letters alone fit
-
-
-@dataclass(frozen=True)
-class Kind:
-    """Cells of one feasibility that the same limits bind."""
-
-    letter: str
-    feasibility: Feasibility
-    limits: tuple[str, ...]
-    count: int
-    first: Cell
-
-    @property
-    def name(self) -> str:
-        """The name of the kind in a few words: its feasibility and the limits that bind."""
-        return f"{self.feasibility}: {', '.join(self.limits) or NOT_NAMED}"
-
-
-def kinds_of(found: FeasibilityMap) -> dict[tuple[Feasibility, tuple[str, ...]], Kind]:
-    """The kinds of a map's cells: the planned ones first, of each the most frequent first."""
-    counts = Counter((cell.feasibility, cell.limits) for cell in found.cells)
-    order = list(Feasibility)
-    keys = sorted(counts, key=lambda key: (order.index(key[0]), -counts[key], key[1]))
-    first: dict[tuple[Feasibility, tuple[str, ...]], Cell] = {}
-    for cell in found.cells:
-        first.setdefault((cell.feasibility, cell.limits), cell)
-    return {key: Kind(_letter(i), *key, counts[key], first[key]) for i, key in enumerate(keys)}
-
-
-def letter_of(cell: Cell, kinds: dict[tuple[Feasibility, tuple[str, ...]], Kind]) -> str:
-    """The letter of a cell's kind."""
-    return kinds[cell.feasibility, cell.limits].letter
-
-
-def _letter(number: int) -> str:
-    """a, b, ... z, and then a2, b2."""
-    turn, place = divmod(number, len(ascii_lowercase))
-    return ascii_lowercase[place] + (str(turn + 1) if turn else "")
 
 
 @facts.register
@@ -76,11 +31,7 @@ def _(found: FeasibilityMap) -> Iterator[Fact]:
         yield from (Fact("", text=_legend(found, kind)) for kind in kinds_of(found).values())
 
 
-@picture.register(FeasibilityMap)
-def _(found: FeasibilityMap) -> Figure:
-    from aerobat.reporting.feasibility.figure import map_figure
-
-    return map_figure(found)
+picture.register(FeasibilityMap, map_figure)
 
 
 def requirements(problem: str, vehicle: str, found: Iterable[Requirement]) -> Facts:

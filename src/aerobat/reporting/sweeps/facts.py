@@ -6,22 +6,17 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import starmap
 from math import isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aerobat.errors import SpecError
-from aerobat.evaluation import Opening
 from aerobat.evaluation.criteria import criterion
 from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture, said
+from aerobat.reporting.sweeps.figure import known_opening, outcome_name, sweep_figure
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
 from aerobat.studies.sweep import Share, Sweep
 from aerobat.studies.sweep.flights import CLEARANCE, NEAREST
 from aerobat.studies.sweep.result import LEVELS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 ERRORS = (  # columns of the table, and what people call them
     ("max_position_error_m", "position, max"),
@@ -32,25 +27,6 @@ ERRORS = (  # columns of the table, and what people call them
 PASSAGE = (("miss_m", "off its centre"), ("attitude_error_deg", "attitude"))
 WIDTHS = (0.01, 0.02, 0.05, 0.1)  # [m] off a gate's centre
 NEVER = "not passed"
-
-
-def success_sentence(sweep: Sweep) -> str:
-    """Return a sentence with the share of flights that went well, its interval and the seed."""
-    return f"{sweep.success} of the flights went well, at 95 % confidence; seed {sweep.seed}"
-
-
-def known_opening(sweep: Sweep, passage: str) -> Opening | None:
-    """The smallest opening that 99 % pass; None where the flights are too few to say, or too many miss."""
-    try:
-        found = sweep.smallest_opening(passage)
-    except SpecError:
-        return None
-    return found if isfinite(found.scale) else None
-
-
-def outcome_name(outcome: Outcome) -> str:
-    """An outcome in two or three words."""
-    return outcome.name.lower().replace("_", " ")
 
 
 @facts.register
@@ -76,11 +52,7 @@ def _(share: Share) -> Iterator[Fact]:
     yield from kept(count=share.count, fraction=share.fraction, low=low, high=high)
 
 
-@picture.register(Sweep)
-def _(sweep: Sweep) -> Figure:
-    from aerobat.reporting.sweeps.figure import sweep_figure
-
-    return sweep_figure(sweep)
+picture.register(Sweep, sweep_figure)
 
 
 def _outcome(outcome: Outcome, share: Share) -> Fact:
