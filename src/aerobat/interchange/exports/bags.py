@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.errors import BackendMissing
+from aerobat.errors import import_extra
 from aerobat.flatness import reference
 from aerobat.interchange.exports.loss import Content, ExportRows
 from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, Stamped
@@ -52,7 +52,7 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
 
     Lost is what lies between them. Raises BackendMissing without rosbags.
     """
-    _require_rosbags()
+    import_extra("rosbags", "bags need rosbags", "aerobat[ros]", "export to csv")
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if container == "ros1" else Stores.ROS2_HUMBLE)
@@ -69,14 +69,6 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
 ros1_bag = partial(_bag, "ros1")
 ros2_bag = partial(_bag, "ros2")
 mcap = partial(_bag, "mcap")
-
-
-def _require_rosbags() -> None:
-    try:
-        import rosbags  # noqa: F401
-    except ImportError:
-        remedy = 'pip install "aerobat[ros]"'
-        raise BackendMissing(f"bags need rosbags; install it with {remedy}, or export to csv") from None
 
 
 def _write_ros1(store: Any, messages: Sequence[Stamped], path: Path) -> Mapping[str, bytes]:
