@@ -14,16 +14,16 @@ from aerobat.problem import load_problem
 from aerobat.reporting.page import AXIS, TITLES, blank_page, heading, house_style, panel, size_of
 from aerobat.reporting.panels.path import mark_ends
 from aerobat.reporting.panels.poses import plan_reference, reference_poses
-from aerobat.reporting.panels.signals import draw_limits
+from aerobat.reporting.panels.timelines import draw_limits
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.glyphs import enlargement, vehicle_shapes
 from aerobat.reporting.scene.shapes import draw_depth_sorted
 from aerobat.reporting.style import BAND, BLUE, INK, MUTED, RED, SMALL
-from aerobat.reporting.tracking import tracking_page
 from aerobat.simulation.outcome import length
 from aerobat.vehicle import Vehicle, load_vehicle
 from paper.flights import FlownPlan, flown
 from paper.paper_figure import Caption, PaperFigure
+from paper.tracking import tracking_page
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -32,7 +32,7 @@ from aerobat.reporting.page import (
 from aerobat.reporting.panels.keyframes import plane_of
 from aerobat.reporting.panels.path import mark_ends
 from aerobat.reporting.panels.poses import is_flat, plan_reference
-from aerobat.reporting.panels.signals import draw_limits, fit_to_limits
+from aerobat.reporting.panels.timelines import draw_limits, fit_to_limits
 from aerobat.reporting.scene.axes_box import box_around, draw_axes_box, room_for_box
 from aerobat.reporting.scene.camera import best_view
 from aerobat.reporting.scene.glyphs import gate_corners, gate_shapes

@@ -26,6 +26,8 @@ ROWS = 200  # instants, at most, whose clearance is drawn
 DEEPEST = -0.25  # [m] that an overlap is shown
 NEAR, FAR = 0.5, 1e4  # [m] within which obstacles are looked for first, and at last
 SPIN_RAMPS = {1: ("#00315f", "#6fa3d4"), -1: ("#1c2b39", "#8b97a3")}  # dark to light, by the sense of turning
+LIMIT: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
+REACH = 1.0  # by how many times the limits' distance an axis extends beyond them, at most
 LENGTHS = (("m", 1.0), ("cm", 1e-2))
 FEW_ROTORS = 4  # whose names a legend has room for
 NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and by the letter
@@ -101,12 +103,33 @@ def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicl
         label = f"rotor {i}" if i == 0 or len(colours) <= FEW_ROTORS else f"{i}"
         draw_series(axes, times, thrusts[..., i], colour, width=1.0, label=label)
     limits = sorted({*vehicle.min_thrusts.tolist(), *vehicle.max_thrusts.tolist()})
-    for limit in limits:
-        label = "limits" if limit == limits[-1] else ""
-        axes.axhline(limit, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), label=label)
-    low = min(float(thrusts.min()), float(vehicle.min_thrusts.min()))
-    high = max(float(thrusts.max()), float(vehicle.max_thrusts.max()))
+    draw_limits(axes, limits, "limits")
+    low, high = min(float(thrusts.min()), limits[0]), max(float(thrusts.max()), limits[-1])
     axes.set(ylabel="rotor thrust [N]", ylim=(low - 0.08 * (high - low), high + 0.08 * (high - low)))
+
+
+def draw_limits(axes: Axes, limits: Sequence[float], label: str = "") -> None:
+    """Draw dashed lines across axes, the last of them with a name."""
+    for limit in limits:
+        axes.axhline(limit, **LIMIT, label=label if limit == limits[-1] else "")
+
+
+def fit_to_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
+    """Make the upright axis show limits and values (...), cut off, and saying so, far beyond the limits."""
+    low, high = min(limits), max(limits)
+    lowest = min(float(values.min()), low)
+    highest = max(float(values.max()), high)
+    bottom = max(lowest, low - REACH * (high - low))
+    top = min(highest, high + REACH * (high - low))
+    pad = 0.08 * (top - bottom)
+    axes.set_ylim(bottom - pad, top + pad)
+    if lowest < bottom or highest > top:
+        x, y = 1.0 - 0.06 / size_of(axes)
+        note = f"cut off: {lowest:.4g} to {highest:.4g}".replace("-", "−")
+        axes.text(
+            x, y, note, size=SMALL, color=MUTED, ha="right", va="top", transform=axes.transAxes,
+            bbox={"fc": "white", "ec": "none", "pad": 1.5}, zorder=4.0,
+        )  # fmt: skip
 
 
 def rotor_colours(vehicle: Vehicle) -> list[str]:
