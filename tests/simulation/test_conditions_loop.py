@@ -21,7 +21,7 @@ from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.wind import WindState
 from aerobat.simulation import Outcome, fly
 from aerobat.simulation.components import log_row
-from aerobat.simulation.conditions.draw import draw_flights
+from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.random_source import RandomSource
 from aerobat.simulation.conditions.sensors import MocapState
 from aerobat.simulation.setup import LoopPart
@@ -97,7 +97,7 @@ def test_engines_agree_with_floats_on_flights_under_conditions(engine: str) -> N
 
 
 def test_a_flight_of_a_batch_is_the_flight_alone() -> None:
-    batch, draws = rows("floats", 5), draw_flights(ALL, 6, 7, [3])
+    batch, draws = rows("floats", 5), Draws(ALL, 6, 7, [3])
     setup = dispersed_setup(loops(1.0), HEXA, ALL, draws, engine="floats")
     alone = tree_leaves(rows_of(setup, everything, TICKS))
     for one, other in zip(batch, alone, strict=True):

@@ -65,7 +65,7 @@ class DispersedFlights:
 
     def each(self, name: str) -> Tree:
         """A field of the draws: a leaf (vehicles,), or for an array a tuple of them."""
-        values = self.draws.column(name)
+        values = self.draws.columns[name]
         return values if values.ndim == 1 else components(values)
 
     def all(self, value: float) -> Array:
@@ -79,7 +79,7 @@ class DispersedFlights:
     @property
     def effectiveness(self) -> Array:
         """Of the rotors [-], (vehicles, n)."""
-        return self.draws.column("effectiveness")
+        return self.draws.columns["effectiveness"]
 
     def slow_period(self, rate: float = SLOW) -> int:
         """The ticks of a step at so many a second, or of the next faster one."""
@@ -107,9 +107,9 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
     """Mean wind and gusts."""
     time_constant = gusts.length / gusts.airspeed
     period = flights.slow_period(max(SLOW, GUSTY / time_constant))
-    mean = flights.environment.wind + flights.draws.column("mean_wind")
+    mean = flights.environment.wind + flights.draws.columns["mean_wind"]
     speed = np.hypot(mean[:, 0], mean[:, 1])
-    heading = flights.draws.column("gust_heading")
+    heading = flights.draws.columns["gust_heading"]
     is_calm = speed == 0.0
     divisor = np.where(is_calm, 1.0, speed)
     along, first, second, third, fourth = flights.each("gust")
@@ -212,7 +212,7 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
 def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
     """The plane of hand-off; without one, some plane, and no misfit."""
     point, normal = hand_off_plane(hand_off or HandOff(), flights.trajectory, flights.gates)
-    rotation = so3.exp(flights.draws.column("hand_off_rotation"))
+    rotation = so3.exp(flights.draws.columns["hand_off_rotation"])
     return Seam(
         flights.vector(point),
         flights.vector(normal),

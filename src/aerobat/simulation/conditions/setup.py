@@ -15,7 +15,7 @@ from aerobat.simulation.components import (
     DelayTicks,
     StateObserver,
 )
-from aerobat.simulation.conditions.draw import dispersed_fleet, draw_flights
+from aerobat.simulation.conditions.draw import Draws, dispersed_fleet
 from aerobat.simulation.conditions.observer import (
     DisturbanceObserver,
     DisturbanceParameters,
@@ -61,7 +61,7 @@ def dispersed_setup(
     nominal.without_dead_rotors()
     rate = _tick_rate(conditions, config.control_rate)
     numbers = config.flights or range(1)
-    draws = draw_flights(conditions, len(nominal.rotors), config.seed, numbers)
+    draws = Draws(conditions, len(nominal.rotors), config.seed, numbers)
     controller = config.controller_of([nominal])
     flights = DispersedFlights(
         draws=draws,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array
 from aerobat.evaluation.score import Score
 from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
-from aerobat.simulation.conditions.draw import Draws, draw_flights
+from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.passages import Passage
 from aerobat.studies.flights import CHUNK, FlightTask, cut
 
@@ -67,7 +67,7 @@ def fly_chunk(task: FlightTask, flights: range) -> Chunk:
 
 def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> tuple[Columns, ErrorsOverTime]:
     """Columns of the table for some flights, and their errors over time if they are sampled."""
-    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
+    draws = Draws(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
     stride = STRIDE if is_sampled else None
     scores, errors = score_over_time(task.plan, task.vehicle, None, None, task.config(numbers), stride)
     return _drawn(draws) | _scored(scores), errors
@@ -75,20 +75,20 @@ def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> tuple[Columns,
 
 def _drawn(draws: Draws) -> Columns:
     """What flights draw, in few numbers."""
-    effectiveness = draws.column("effectiveness")
+    effectiveness = draws.columns["effectiveness"]
     return {
         "flight": np.array(draws.flights),
-        "mass": draws.column("mass"),
-        "inertia": draws.column("inertia"),
-        "lag_mean": draws.column("lags").mean(axis=1),
+        "mass": draws.columns["mass"],
+        "inertia": draws.columns["inertia"],
+        "lag_mean": draws.columns["lags"].mean(axis=1),
         "thrust_mean": effectiveness.mean(axis=1),
         "thrust_min": effectiveness.min(axis=1),
-        "drag_1_s": draws.column("drag"),
-        "start_offset_m": _norms(draws.column("start_position")),
-        "start_speed_m_s": _norms(draws.column("start_velocity")),
-        "start_tilt_deg": np.rad2deg(_norms(draws.column("start_attitude"))),
-        "mean_wind_m_s": _norms(draws.column("mean_wind")),
-        "charge": draws.column("charge"),
+        "drag_1_s": draws.columns["drag"],
+        "start_offset_m": _norms(draws.columns["start_position"]),
+        "start_speed_m_s": _norms(draws.columns["start_velocity"]),
+        "start_tilt_deg": np.rad2deg(_norms(draws.columns["start_attitude"])),
+        "mean_wind_m_s": _norms(draws.columns["mean_wind"]),
+        "charge": draws.columns["charge"],
     }
 
 
