@@ -46,5 +46,7 @@ def vehicle_of(flown: Flyable | Trajectory, vehicle: Vehicle | str | None) -> Ve
         return as_vehicle(vehicle)
     own = None if isinstance(flown, Trajectory) else flown.vehicle
     if own is None:
-        raise SpecError("vehicle is missing: a trajectory, or a plan without one, says not what flies it")
+        raise SpecError(
+            "vehicle is missing: a path, or a plan without one, says not what flies it; give vehicle="
+        )
     return own

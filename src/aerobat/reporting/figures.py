@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from aerobat.declaration import validated
-from aerobat.errors import SpecError
 from aerobat.evaluation.score import Score
+from aerobat.flatness import vehicle_of
 from aerobat.planning import Plan, Tube
 from aerobat.reporting.captions import error_caption, plan_captions, score_caption
 from aerobat.reporting.page import AXIS, COLUMNS, TITLES, Place, blank_page, heading, house_style, panel
@@ -57,17 +57,13 @@ def draw(flight: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str
         plan: What was flown.
         vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
     """
-    if vehicle is None and isinstance(own := plan or flight, Plan):
-        vehicle = own.vehicle
     if isinstance(flight, Plan):
-        if vehicle is None:
-            raise SpecError("vehicle is missing: a plan without one says not what to draw; give vehicle=...")
-        return report_figure(flight, as_vehicle(vehicle))
-    vehicle = as_vehicle(flight.vehicles[0] if vehicle is None else vehicle)
+        return report_figure(flight, vehicle_of(flight, vehicle))
+    flown_by = as_vehicle(vehicle or (plan and plan.vehicle) or flight.vehicles[0])
     if plan is not None:
-        return report_figure(plan, vehicle, flight)
+        return report_figure(plan, flown_by, flight)
     with house_style():
-        return _bare_page(flight, vehicle)
+        return _bare_page(flight, flown_by)
 
 
 def _bare_page(flight: Flight, vehicle: Vehicle) -> Figure:

@@ -83,17 +83,6 @@ class Outcome(Enum):
         """True where nothing went wrong."""
         return self in (Outcome.COMPLETE, Outcome.THROUGH_GATES)
 
-    @property
-    def is_miss(self) -> bool:
-        """True where a gate was not passed."""
-        return self in (
-            Outcome.MISSED_GATE,
-            Outcome.BACKWARDS,
-            Outcome.SHORT_OF_GATE,
-            Outcome.STOPPED_IN_GATE,
-            Outcome.EARLY,
-        )
-
     def sentence(self, **numbers: object) -> str:
         """The sentence with its numbers."""
         return self.value.format(**{"radius": DIVERGENCE_RADIUS, **numbers})
