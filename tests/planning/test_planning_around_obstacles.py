@@ -60,6 +60,19 @@ def test_a_forest_is_flown_on_the_fastest_of_several_sides() -> None:
 
 
 @pytest.mark.slow
+def test_a_hundred_metres_of_forest_take_little_longer_than_is_possible_without() -> None:
+    rng = np.random.default_rng(3)
+    places = rng.uniform((4.0, -15.0, 0.8), (96.0, 15.0, 1.5), (45, 3)).tolist()
+    world = ab.Environment(obstacles=tuple(trunk(x, y, radius) for x, y, radius in places))
+    hall = ab.Limits(lower=np.array([-5.0, -15.0, 0.5]), upper=np.array([105.0, 15.0, 3.5]), velocity=10.0)
+    ends = ab.at_rest((0.0, 0.0, 2.0)), ab.at_rest((100.0, 0.0, 2.0))
+    plan = ab.plan(ab.Problem("forest", *ends, limits=hall, environment=world), vehicle=QUAD)
+    assert plan.certified
+    assert least_gap(plan) > 0.0
+    assert plan.assessment.ratio < 1.1
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", [10.0, 60.0, 90.0])
 def test_a_body_passes_a_slit_on_its_side_that_it_does_not_pass_level(tilt: float) -> None:
     thickness = 2.0 * QUAD.bounding_ellipsoid.semi_axes[2]
