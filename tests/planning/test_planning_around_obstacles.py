@@ -12,8 +12,10 @@ from aerobat.planning.around.cells import Cells
 from aerobat.planning.around.routes import routes
 from aerobat.planning.planners import suited_planner
 from aerobat.planning.task import Task
+from places import ROOT
 
 QUAD = ab.load_vehicle("agile-quad")
+EXAMPLES = ROOT / "examples" / "problems"
 HALL = ab.Limits(lower=np.array([-2.0, -4.0, 0.2]), upper=np.array([10.0, 4.0, 3.8]))
 ENDS = ab.at_rest((0.0, 0.0, 1.5)), ab.at_rest((8.0, 0.0, 1.5))
 
@@ -56,6 +58,15 @@ def test_a_forest_is_flown_on_the_fastest_of_several_sides() -> None:
     plan = ab.plan(hall(*trunks), vehicle=QUAD)
     assert plan.planner == "free-knots"
     assert plan.certified
+    assert least_gap(plan) > 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.toml")))
+def test_problems_that_come_with_the_repository_are_planned_clear_of_everything(name: str) -> None:
+    plan = ab.plan(ab.load_problem(EXAMPLES / name), vehicle=QUAD)
+    assert plan.certified
+    assert plan.flies
     assert least_gap(plan) > 0.0
 
 
