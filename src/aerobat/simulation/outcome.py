@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from enum import Enum, IntEnum
+from types import MappingProxyType
+from typing import NamedTuple
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
 TOUCHDOWN = 1e-3  # [m] below the ground that is no hit: paths that land end on it
@@ -86,3 +88,15 @@ class Outcome(Enum):
     def sentence(self, **numbers: object) -> str:
         """The sentence with its numbers."""
         return self.value.format(**{"radius": DIVERGENCE_RADIUS, **numbers})
+
+
+class FlightFailure(NamedTuple):
+    """What went wrong in one flight, and when."""
+
+    time: float  # [s]
+    outcome: Outcome
+    numbers: Mapping[str, object] = MappingProxyType({})  # of its sentence
+
+    def sentence(self, **others: object) -> str:
+        """The outcome with its numbers."""
+        return self.outcome.sentence(**{"time": self.time, **self.numbers, **others})

@@ -114,7 +114,7 @@ def _scored(scores: Score) -> Columns:
 def _passage_outcome(passage: Passage) -> str:
     """One passage's end, as the outcome of a flight that has no other would be."""
     if passage.failure is not None:
-        return passage.failure[0].name.lower()
+        return passage.failure.outcome.name.lower()
     return NOT_REACHED if np.isnan(passage.time) else PASSED
 
 
