@@ -29,7 +29,7 @@ from aerobat.kernels.running_metrics import (
 )
 from aerobat.simulation.components import rotor_commands
 from aerobat.simulation.flight import Flight
-from aerobat.simulation.loop import Signals
+from aerobat.simulation.loop import Component, Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, LANDING_DEPTH, LANDING_SPEED, TOUCHDOWN, Outcome
 from aerobat.simulation.passages.log import log_rows, scan_log
 from aerobat.simulation.passages.passage import bounding_ellipsoid, gate_places
@@ -51,11 +51,8 @@ class Criteria(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MetricsMonitor:
+class MetricsMonitor(Component):
     """The loop's component that adds up a flight's metrics."""
-
-    period: int = 1
-    feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: MetricsParameters, inputs: MetricsInput, signals: Signals

@@ -17,7 +17,7 @@ from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.vectors import ZERO, add_scaled, scale, subtract
 from aerobat.simulation.components import Disturbance
 from aerobat.simulation.conditions.sensors import MocapState, MotionCaptureSensor
-from aerobat.simulation.loop import Estimate, Signals
+from aerobat.simulation.loop import Component, Estimate, Signals
 
 
 class DisturbanceParameters(NamedTuple):
@@ -29,7 +29,7 @@ class DisturbanceParameters(NamedTuple):
 
 
 @dataclass(frozen=True)
-class DisturbanceObserver:
+class DisturbanceObserver(Component):
     """The low-passed difference between what is measured and the nominal model, of force and of moment.
 
     The model's is that of the rotors as the controller takes them to be, of drag at the estimated state, and
@@ -37,7 +37,6 @@ class DisturbanceObserver:
     """
 
     period: int = 1
-    feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: DisturbanceParameters, inputs: tuple[()], signals: Signals
@@ -102,13 +101,11 @@ class FilterState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class EkfObserver:
+class EkfObserver(Component):
     """The error-state Kalman filter; it knows the reference's start, and of the flight what sensors say."""
 
     exposure_period: int  # ticks
     latency: int  # ticks
-    period: int = 1
-    feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: ObserverParameters, inputs: ObserverInput, signals: Signals

@@ -22,15 +22,14 @@ from aerobat.kernels.wind import GustNoise, WindParameters, WindState
 from aerobat.simulation.components import with_wind
 from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.random_source import RandomSource
-from aerobat.simulation.loop import Signals
+from aerobat.simulation.loop import Component, Signals
 
 
 @dataclass(frozen=True)
-class Wind:
+class Wind(Component):
     """The wind, held from one step to the next; the plant and the accelerometer feel it."""
 
     period: int = 1
-    feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: WindParameters, noise: GustNoise, signals: Signals) -> WindState:
         """See `Component.init`."""
@@ -53,11 +52,10 @@ def wind_source(draws: Draws, period: int) -> RandomSource:
 
 
 @dataclass(frozen=True)
-class BatterySag:
+class BatterySag(Component):
     """The battery, emptied by the rotors' thrusts; the plant's ceilings are what it leaves of them."""
 
     period: int = 1
-    feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: BatteryParameters, inputs: tuple[()], signals: Signals
@@ -78,11 +76,10 @@ class BatterySag:
 
 
 @dataclass(frozen=True)
-class ImuBias:
+class ImuBias(Component):
     """The biases of an IMU, held from one step to the next."""
 
     period: int = 1
-    feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: BiasParameters, noise: ImuSample, signals: Signals) -> ImuSample:
         """See `Component.init`."""
@@ -104,11 +101,10 @@ class FeltParameters(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ImuSensor:
+class ImuSensor(Component):
     """An IMU at the centre of mass, biased as `ImuBias` says; its sample ends at the tick of its step."""
 
     period: int = 1
-    feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: FeltParameters, noise: ImuSample, signals: Signals) -> ImuState:
         """See `Component.init`."""
@@ -154,7 +150,7 @@ class MocapState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MotionCaptureSensor:
+class MotionCaptureSensor(Component):
     """Motion capture: a pose is taken at every step, and arrives `latency` ticks later.
 
     It steps at exposures alone. Of tick t with `arrives([t])`, `MocapState.delivered` is the
@@ -164,7 +160,6 @@ class MotionCaptureSensor:
 
     period: int = 1
     latency: int = 0  # ticks
-    feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: MocapParameters, inputs: MocapInput, signals: Signals) -> MocapState:
         """See `Component.init`."""
