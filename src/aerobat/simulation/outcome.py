@@ -91,7 +91,7 @@ class Outcome(Enum):
 
 
 class FlightFailure(NamedTuple):
-    """What went wrong in one flight, and when."""
+    """A mistake of one flight, and when it happened."""
 
     time: float  # [s]
     outcome: Outcome

@@ -47,7 +47,7 @@ def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -
     --to crazyflie   pieces for the Crazyflie's memory, and the CSV that Crazyswarm reads (a folder)
     --to ros1-bag    messages for ROS 1, with markers for RViz; ros2-bag (a folder) and mcap for ROS 2
     --to px4         set-points of attitude, rates, thrust and path in PX4's axes (a folder)
-    --to blender     an animated scene, glTF, for Blender and other 3D programs
+    --to blender     an animated scene, glTF; for Blender and other 3D programs
     --to mujoco      a model for MuJoCo, with a keyframe a row
 
     Parameters

@@ -89,7 +89,7 @@ class Passage:
 
     @property
     def failure(self) -> FlightFailure | None:
-        """What one flight did wrong; None where nothing is wrong, or known."""
+        """The mistake of one flight; None where nothing is wrong, or known."""
         if np.isnan(self.planned):
             return None
         if np.isnan(self.time):

@@ -49,7 +49,7 @@ class StageAttitude:
 
     @property
     def failure(self) -> FlightFailure | None:
-        """What one flight did wrong; None where nothing is wrong, or known."""
+        """The mistake of one flight; None where nothing is wrong, or known."""
         if np.isnan(self.planned) or self.angle_deg <= self.tolerance_deg:
             return None
         angles = {"angle": self.angle_deg, "tolerance": self.tolerance_deg}

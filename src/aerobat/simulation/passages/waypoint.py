@@ -41,7 +41,7 @@ class WaypointPassage:
 
     @property
     def failure(self) -> FlightFailure | None:
-        """What one flight did wrong; None where nothing is wrong, or known."""
+        """The mistake of one flight; None where nothing is wrong, or known."""
         if np.isnan(self.planned) or self.miss <= self.radius + GRAZING:
             return None
         numbers = {"waypoint": self.waypoint, "miss": self.miss, "radius": self.radius}
