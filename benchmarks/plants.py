@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 import aerobat as ab
-from aerobat.interchange.flat_outputs import FlatOutputs
 from aerobat.simulation.plants.rotorpy import RotorPy, rotorpy_vehicle
+
+sys.path.append(str(Path(__file__).parents[1] / "examples"))
+from flat_outputs import FlatOutputs
 
 MANEUVERS = ("line", "flip-roll", "flip-pitch", "flip-roll-translation", "half-flip")
 VEHICLES = ("agile-quad", "hexarotor")

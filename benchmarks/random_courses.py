@@ -28,8 +28,8 @@ from aerobat.planning import Plan
 from aerobat.planning.planners import command_settings, planner_class
 from aerobat.problem import Gate, Line, PassGate
 from aerobat.reporting.report import Report
-from aerobat.studies.flights import FlightTask
-from aerobat.studies.trials import Trials, fly_trials
+from aerobat.studies.flights import FlightTask, fly_trials
+from aerobat.studies.share import Trials
 from aerobat.vehicle import Vehicle
 from random_problems import Case, random_vehicle, write_case
 

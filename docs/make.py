@@ -20,7 +20,7 @@ MADE: dict[str, tuple[list[str], ...]] = {  # of each name its commands, quick o
     "tutorial": ([PYTHON, "docs/make_tutorial.py"],),
     "pictures": ([PYTHON, "examples/readme_pictures.py", "docs"],),
     "replay": ([PYTHON, "docs/make_replay_picture.py"],),
-    "figures": ([PYTHON, "-m", "aerobat.reporting.paper", "--out", "docs/figures"],),
+    "figures": ([PYTHON, "examples/paper_figures.py", "docs/figures"],),
 }
 
 

@@ -2,7 +2,7 @@
 
 A hexarotor flies the half-flip at 8 m/s through gates at 90°, 75°, 60° and 45°, of three openings, in the
 paper's flight space. The authors name four causes of what it then was off its path by. Each is switched on
-alone, then all together, on the same flights. `python -m aerobat.reporting.paper 6` draws the figure alone.
+alone, then all together, on the same flights. `examples/paper_figures.py` draws the figure alone.
 """
 
 import sys
@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 import aerobat as ab
-from aerobat.reporting.paper.gates import hardware_figure
-from aerobat.studies.paper import OPENINGS, TILTS, hardware_causes
+from paper.gates import hardware_figure
+from paper.hardware import OPENINGS, TILTS, hardware_causes
 
 HEADINGS = (
     "",

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import aerobat as ab
+from paper.tracking import tracking_figure
 
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "section-v")
 out.mkdir(parents=True, exist_ok=True)
@@ -24,7 +25,7 @@ def tracked(planner: ab.MinSnap, picture: str) -> tuple[ab.Plan, ab.Flight]:
         print(f"{k:4d}  {attempt.duration:.1f} s  {attempt.outcome}")
     flight = ab.fly(plan)
     print(f"{plan.status}; {ab.score(flight, plan, vehicle)}\n")
-    ab.tracking_figure(plan, vehicle, flight).savefig(out / picture)
+    tracking_figure(plan, vehicle, flight).savefig(out / picture)
     return plan, flight
 
 

@@ -106,13 +106,12 @@ from .problem import (
     write_problem,
 )
 from .reporting.comparison import comparison_figure
-from .reporting.data_frames import to_dataframe
 from .reporting.feasibility.figure import map_figure
 from .reporting.figures import draw
 from .reporting.inspection import inspection_figure
 from .reporting.motion.video import write_video
+from .reporting.plain_data import to_dataframe
 from .reporting.sweeps.figure import sweep_figure
-from .reporting.tracking import tracking_figure
 from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
 from .simulation.autopilot import Recoveries, recoveries
 from .states import BodyState, FlatState, Setpoint, Wrench
@@ -289,7 +288,6 @@ __all__ = [
     "sweep_figure",
     "tilted_gate",
     "to_dataframe",
-    "tracking_figure",
     "tune",
     "vehicle_names",
     "view",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from importlib import import_module
 from typing import Any
 
 
@@ -102,3 +103,19 @@ class OwnCodeError(Exception):
 
 class BackendMissing(AerobatError):
     """A solver was asked for by name and is not installed: the message gives the install command."""
+
+
+def import_extra(module: str, needs: str, requirement: str, otherwise: str = "") -> Any:
+    """Return a module that comes with an extra. Raises BackendMissing, with its command, where it is missing.
+
+    Args:
+        module: The module's name, as "pyarrow.parquet".
+        needs: Who needs what, as "Parquet files need pyarrow".
+        requirement: What pip installs, as "aerobat[parquet]".
+        otherwise: What else is to be done, as "write CSV".
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        remedy = f'install it with pip install "{requirement}"' + (f", or {otherwise}" if otherwise else "")
+        raise BackendMissing(f"{needs}; {remedy}") from None

@@ -10,7 +10,7 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from command_lines import code, without_pictures
 from places import ROOT
 from shared_plans import shared_plan

@@ -8,16 +8,16 @@ from dataclasses import replace
 import pytest
 
 import aerobat as ab
+from aerobat.cli.runs.folder import trial_flights
 from aerobat.cli.runs.record import FlightSettings, RunRecord
-from aerobat.cli.trials import trial_flights
 from aerobat.environment import load_dispersion
 from aerobat.planning.tube import Tube
 from aerobat.reporting.facts import REPORT
 from aerobat.reporting.plain_data import to_json
 from aerobat.reporting.report import Report
 from aerobat.reporting.tables import print_table, table
+from aerobat.studies.share import Trials
 from aerobat.studies.sweep import Share
-from aerobat.studies.trials import Trials
 from shared_plans import shared_flight, shared_plan
 
 LAB = load_dispersion("lab")

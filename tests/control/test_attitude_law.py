@@ -12,9 +12,8 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.engines import choose
-from aerobat.engines.components import from_components
 from aerobat.engines.engine import first_row
-from aerobat.engines.pytree import tree_stack
+from aerobat.engines.pytree import from_components, tree_stack
 from aerobat.simulation.autopilot.braking import point_reference
 from aerobat.simulation.autopilot.loop import RATE, autopilot_inputs, autopilot_setup
 from aerobat.simulation.bodies import bodies

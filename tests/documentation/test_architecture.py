@@ -73,11 +73,11 @@ def test_the_way_of_a_plan_is_as_the_page_says(tmp_path: Path, monkeypatch: pyte
             if "src/aerobat/" in Path(frame.filename).as_posix()
         ]
         ways.append([frame for frame in frames if frame[0] not in DECORATORS])
-        return certified(*arguments)
+        raise SystemExit
 
-    certified = evidence.certify
     monkeypatch.setattr(evidence, "certify", certify)
-    cli.main(["plan", "flip-roll", "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit):
+        cli.main(["plan", "flip-roll", "--out", str(tmp_path / "out")])
     assert ways[0] == way_of_a("plan")
     assert len(ways[0]) <= 21
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aerobat.engines.array_functions import array_function, gradient
-from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.floats import ArrayOps
 from aerobat.engines.tracing import Trace, TraceOps
 from aerobat.kernels.ops import Ops, Scalar
 

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from aerobat.engines import FLOATS, choose, run_whole
 from aerobat.engines.duals import Dual, DualOps, differentiated, dual
-from aerobat.engines.floats import FloatOps
-from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.floats import ArrayOps, FloatOps
 from suites import examples
 
 jax = pytest.importorskip("jax")

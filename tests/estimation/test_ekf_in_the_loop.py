@@ -10,8 +10,7 @@ from scipy.stats import chi2
 import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.engines.components import from_components
-from aerobat.engines.pytree import tree_stack
+from aerobat.engines.pytree import from_components, tree_stack
 from aerobat.kernels.ekf.covariance import unpack
 from aerobat.kernels.imu import ImuSample
 from aerobat.simulation import prepare

@@ -17,7 +17,7 @@ from aerobat.engines.engine import first_row
 from aerobat.engines.floats import FloatOps
 from aerobat.engines.pytree import tree_leaves, tree_map
 from aerobat.engines.tracing import Trace, TraceOps
-from aerobat.estimation.filter_loop import filter_loop
+from aerobat.estimation.replay import filter_loop
 from aerobat.kernels import ekf
 from aerobat.kernels.ekf import EkfParameters, EkfState, ImuSample, NominalState, Pose
 from aerobat.kernels.ekf.covariance import ErrorState, error_state, pack, unpack

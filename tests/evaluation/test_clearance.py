@@ -235,7 +235,7 @@ def test_who_slides_along_the_plane_into_the_opening_has_hit_the_frame() -> None
     assert passage.closest_edge == "lower"
     assert passage.closest_time < CROSSING - 0.2
     assert passage.failure is not None
-    assert passage.failure[0] is Outcome.HIT_FRAME
+    assert passage.failure.outcome is Outcome.HIT_FRAME
 
 
 def test_a_start_in_a_gate_s_plane_three_metres_beside_it_is_no_hit_of_its_frame() -> None:
@@ -256,7 +256,7 @@ def test_how_far_beside_a_gate_a_body_came_into_its_plane_is_not_how_far_it_hit_
     along = np.interp(times, [0.0, CROSSING, 1.0], [-3.0, 0.0, 0.0])
     passage = upright_passage(gate, QUAD.bounding_ellipsoid, times, [beyond, 0.0 * times, along])
     assert passage.failure is not None
-    assert passage.failure[0] is Outcome.HIT_FRAME
+    assert passage.failure.outcome is Outcome.HIT_FRAME
     extent = QUAD.bounding_ellipsoid.semi_axes.max() + np.linalg.norm(QUAD.bounding_ellipsoid.centre)
     assert -passage.clearance < 2.0 * extent + np.hypot(gate.width, gate.height) / 2 - gate.height / 2
     assert passage.closest_time > 0.25

@@ -15,7 +15,7 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
-from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.floats import ArrayOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels.gates import progress
 from aerobat.problem.ball import Ball
@@ -142,7 +142,7 @@ def test_a_ball_straight_through_a_gate_is_nearest_to_its_frame_where_geometry_h
     depth, nearest = depth_in(opening, aside)
     assert (passage.lateral, passage.up) == pytest.approx(tuple(aside), abs=1e-9)
     assert passage.inside == (depth > 0.0)
-    outcome = passage.failure and passage.failure[0]
+    outcome = passage.failure and passage.failure.outcome
     if depth <= 0.0:
         assert outcome is Outcome.MISSED_GATE
         return
@@ -199,4 +199,4 @@ def test_a_waypoint_missed_by_more_than_what_grazes_it_is_missed() -> None:
     for beyond, failure in ((0.5 * GRAZING, None), (2.0 * GRAZING, Outcome.MISSED_WAYPOINT)):
         planned = PlannedWaypoint("point", Ball(np.array([SPEED, 0.0, 1.3]), 0.3 - beyond), 1.0)
         passage = waypoint_passage(flight, planned)
-        assert (passage.failure and passage.failure[0]) is failure
+        assert (passage.failure and passage.failure.outcome) is failure

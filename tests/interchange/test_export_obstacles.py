@@ -13,8 +13,8 @@ from pygltflib import GLTF2
 
 import aerobat as ab
 from aerobat.environment.obstacles import ConvexPiece
-from aerobat.interchange.flight_package import read_flight_package
 from export_readers import bag_messages
+from flight_package import read_flight_package
 from obstacle_cases import open_cruise, walled_cruise
 from places import ROOT
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 import aerobat as ab
+import flight_package
 from aerobat import so3
-from aerobat.interchange import flight_package
-from aerobat.interchange.flight_package import read_flight_package
 from aerobat.storage import digest_of
+from flight_package import read_flight_package
 from places import CASES, ROOT
 from shared_plans import shared_plan
 

@@ -6,10 +6,8 @@ from hypothesis import strategies as st
 
 from aerobat.control import Controller
 from aerobat.control.parameters import controller_parameters
-from aerobat.engines.components import components, from_components
-from aerobat.engines.floats import FloatOps
-from aerobat.engines.numpy import ArrayOps
-from aerobat.engines.pytree import tree_map
+from aerobat.engines.floats import ArrayOps, FloatOps
+from aerobat.engines.pytree import components, from_components, tree_map
 from aerobat.environment import Environment
 from aerobat.kernels import rigid_body
 from aerobat.kernels.allocation import Mixer, desaturate, mix, within_limits

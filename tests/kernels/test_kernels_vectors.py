@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerobat import so3
-from aerobat.engines.components import components, from_components
-from aerobat.engines.floats import FloatOps
-from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.floats import ArrayOps, FloatOps
+from aerobat.engines.pytree import components, from_components
 from aerobat.kernels import quaternions, vectors
 
 SEEDS = st.integers(0, 2**32 - 1)

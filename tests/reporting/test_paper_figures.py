@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
-from aerobat.errors import SpecError
-from aerobat.reporting.paper import PaperFigure, gates, paper_figure
-from aerobat.reporting.paper.__main__ import main
-from aerobat.reporting.paper.files import write_figures
-from aerobat.reporting.paper.time_search import PAPER_TIMES
-from aerobat.studies.paper import hardware_causes, maneuver_flights, printed_plan, time_search
+from paper import gates
+from paper.flights import maneuver_flights, printed_plan
+from paper.hardware import hardware_causes
+from paper.paper_figure import PaperFigure
+from paper.time_search import PAPER_TIMES, time_search
+from paper_figures import FIGURES, main
 from reporting_cases import require_legible
 
 FEW = 8  # flights that show the same in less time
@@ -27,8 +25,8 @@ def drawn(number: int) -> PaperFigure:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(gates, "TILTS", (45,))
             patch.setattr(gates, "hardware_causes", partial(hardware_causes, flights=FEW))
-            return paper_figure(number)
-    return paper_figure(number)
+            return FIGURES[number](print)
+    return FIGURES[number](print)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +40,7 @@ def test_no_text_lies_over_another_or_beyond_the_page(number: int, monkeypatch: 
 def test_the_same_runs_give_the_same_bytes() -> None:
     first = drawn(3)
     maneuver_flights.cache_clear()
-    again = paper_figure(3)
+    again = FIGURES[3](print)
     assert again.caption == first.caption
     assert again.png == first.png
     assert again.pdf == first.pdf
@@ -80,35 +78,13 @@ def test_errors_that_are_told_are_those_of_the_flights() -> None:
     assert flights.here.score.max_position_error_m < 1e-3 * flights.printed.score.max_position_error_m
 
 
-def test_a_figure_that_is_drawn_anew_leaves_the_others_on_the_page(tmp_path: Path) -> None:
-    page = tmp_path / "figures.md"
-    second = replace(drawn(2), figure=Figure())
-    third = replace(second, caption=replace(second.caption, number=3, title="Another"))
-    write_figures([third], tmp_path)
-    alone = page.read_text(encoding="utf-8")
-    write_figures([second], tmp_path)
-    both = page.read_text(encoding="utf-8")
-    assert both.replace(both[both.index("## Fig. 2 ") : both.index("## Fig. 3 ")], "") == alone
-    write_figures([second], tmp_path)
-    assert page.read_text(encoding="utf-8") == both
-
-
-def test_a_page_of_somebody_else_s_is_left_alone(tmp_path: Path) -> None:
-    page = tmp_path / "figures.md"
-    page.write_text("# Mine\n", encoding="utf-8")
-    with pytest.raises(SpecError, match=r"figures.md was not written by `python -m aerobat.reporting.paper`"):
-        write_figures([drawn(2)], tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["figures.md"]
-    assert page.read_text(encoding="utf-8") == "# Mine\n"
-
-
 @pytest.mark.parametrize(
     ("named", "written"), [("2 2", [2]), pytest.param("3 2 2", [2, 3], marks=pytest.mark.slow)]
 )
 def test_the_command_writes_what_it_names(
     named: str, written: list[int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    main([*named.split(), "--out", str(tmp_path / "deep" / "figures")])
+    main([str(tmp_path / "deep" / "figures"), *named.split()])
     names = {f"fig-{number}.{kind}" for number in written for kind in ("png", "pdf")}
     assert {path.name for path in (tmp_path / "deep" / "figures").iterdir()} == {*names, "figures.md"}
     assert drawn(2).caption.here in capsys.readouterr().out
@@ -121,7 +97,7 @@ def test_an_unknown_figure_is_refused_before_anything_is_drawn(
     number: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as stop:
-        main(["2", number, "--out", str(tmp_path / "figures")])
+        main([str(tmp_path / "figures"), "2", number])
     assert stop.value.code == 2
     out, err = capsys.readouterr()
     assert out == ""

@@ -11,7 +11,7 @@ from matplotlib.colors import to_hex
 from rich.console import Console
 
 import aerobat as ab
-from aerobat.reporting.feasibility.legend import kinds_of
+from aerobat.reporting.feasibility.figure import kinds_of
 from aerobat.reporting.notebooks import html, png
 from aerobat.reporting.plain_data import plain
 from aerobat.reporting.style import RED

@@ -10,7 +10,7 @@ from aerobat.environment.obstacles.surface import surface_of
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.motion.picture import MovingPicture, subject_of
 from aerobat.reporting.panels import path as path_panel
-from aerobat.reporting.panels.clearances import clearances
+from aerobat.reporting.panels.timelines import clearances
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.obstacles import obstacle_shapes
 from obstacle_cases import open_cruise, walled_cruise

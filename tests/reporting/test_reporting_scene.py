@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from aerobat import so3
 from aerobat.problem import tilted_gate
-from aerobat.reporting.panels.labels import spread_out
+from aerobat.reporting.page import spread_out
 from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
 from aerobat.reporting.scene.camera import Camera, best_view
 from aerobat.reporting.scene.glyphs import (

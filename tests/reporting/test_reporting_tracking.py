@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.reporting.panels.signals import at_limit, fit_to_limits, wrench_limits
+from aerobat.reporting.panels.timelines import fit_to_limits
 from aerobat.vehicle import wrench
+from paper.signals import at_limit, wrench_limits
+from paper.tracking import tracking_figure
 from reporting_cases import batch_of, require_legible, simulated
 from shared_plans import shared_plan
 
@@ -27,7 +29,7 @@ def section_v(stop_after=None):
 @lru_cache
 def page_of(stop_after=None):
     plan, flight = section_v(stop_after)
-    return ab.tracking_figure(plan, VEHICLE, flight), plan, flight
+    return tracking_figure(plan, VEHICLE, flight), plan, flight
 
 
 def panels(figure, label):
@@ -71,7 +73,7 @@ def test_no_text_of_section_v_lies_over_another_or_beyond_the_page(stop_after, m
 )
 def test_no_text_lies_over_another_or_beyond_the_page(problem, vehicle, monkeypatch):
     plan, flight = shared_plan(problem, vehicle), simulated(problem, vehicle)
-    require_legible(ab.tracking_figure(plan, ab.load_vehicle(vehicle), flight), monkeypatch)
+    require_legible(tracking_figure(plan, ab.load_vehicle(vehicle), flight), monkeypatch)
 
 
 @pytest.mark.parametrize("stop_after", [None, 6])
@@ -183,4 +185,4 @@ def test_an_axis_stretched_far_beyond_its_limits_is_cut_off_and_says_so():
 
 def test_a_batch_is_refused_in_a_sentence():
     with pytest.raises(ab.SpecError, match=r"flight\[k\]"):
-        ab.tracking_figure(shared_plan("line"), ab.load_vehicle("agile-quad"), batch_of("line", 2))
+        tracking_figure(shared_plan("line"), ab.load_vehicle("agile-quad"), batch_of("line", 2))

@@ -1,5 +1,6 @@
 """Conditions in the loop: the same numbers in every engine, chunk and batch; none where nothing is asked."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from aerobat.engines.engine import expanded
+from aerobat.engines.engine import Coded, expanded
 from aerobat.engines.pytree import tree_leaves
 from aerobat.environment import Battery, Dispersion, Gusts, HandOff, Imu, MotionCapture, load_dispersion
 from aerobat.kernels.battery import BatteryState
@@ -20,7 +21,7 @@ from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.wind import WindState
 from aerobat.simulation import Outcome, fly
 from aerobat.simulation.components import log_row
-from aerobat.simulation.conditions.draw import draw_flights
+from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.random_source import RandomSource
 from aerobat.simulation.conditions.sensors import MocapState
 from aerobat.simulation.setup import LoopPart
@@ -96,7 +97,7 @@ def test_engines_agree_with_floats_on_flights_under_conditions(engine: str) -> N
 
 
 def test_a_flight_of_a_batch_is_the_flight_alone() -> None:
-    batch, draws = rows("floats", 5), draw_flights(ALL, 6, 7, [3])
+    batch, draws = rows("floats", 5), Draws(ALL, 6, 7, [3])
     setup = dispersed_setup(loops(1.0), HEXA, ALL, draws, engine="floats")
     alone = tree_leaves(rows_of(setup, everything, TICKS))
     for one, other in zip(batch, alone, strict=True):
@@ -135,7 +136,11 @@ def test_wind_weak_rotors_and_an_empty_battery_each_change_a_flight() -> None:
 
 def numbers(source: RandomSource, begin: int, end: int) -> np.ndarray:
     """Those of every tick, (numbers, ticks, vehicles)."""
-    return np.array(expanded(source.inputs(begin, end, lambda normals, uniforms: (*normals, *uniforms))))
+    return np.array(expanded(source.chunk(begin, end)))
+
+
+def side_by_side(normals: Sequence[Coded], uniforms: np.ndarray, ticks: np.ndarray) -> tuple[Any, ...]:
+    return (*normals, *uniforms)
 
 
 @examples(30)
@@ -145,13 +150,14 @@ def test_random_numbers_are_the_same_however_they_are_asked_for(cuts: list[int],
     seeds = [np.random.SeedSequence(5, spawn_key=(k,)) for k in range(3)]
 
     def source() -> RandomSource:
-        return RandomSource(seeds, normals=2, uniforms=1, period=period, block=8)
+        return RandomSource(seeds, side_by_side, normals=2, uniforms=1, period=period, block=8)
 
     whole, cut = numbers(source(), 0, 302), source()
     for begin, end in pairwise(cuts):
         begin, end = min(begin, end), max(begin, end) + 1
         np.testing.assert_array_equal(numbers(cut, begin, end), whole[:, begin:end])
-    alone = numbers(RandomSource(seeds[1:2], normals=2, uniforms=1, period=period, block=8), 0, 302)
+    one = RandomSource(seeds[1:2], side_by_side, normals=2, uniforms=1, period=period, block=8)
+    alone = numbers(one, 0, 302)
     np.testing.assert_array_equal(alone[..., 0], whole[..., 1])
     samples = whole[:, ::period]
     np.testing.assert_array_equal(whole, np.repeat(samples, period, axis=1)[:, :302])
@@ -160,7 +166,7 @@ def test_random_numbers_are_the_same_however_they_are_asked_for(cuts: list[int],
 
 def test_random_numbers_are_normal_and_uniform() -> None:
     seeds = [np.random.SeedSequence(5, spawn_key=(k,)) for k in range(70)]
-    normal, other, uniform = numbers(RandomSource(seeds, normals=2, uniforms=1), 0, 500)
+    normal, other, uniform = numbers(RandomSource(seeds, side_by_side, normals=2, uniforms=1), 0, 500)
     for values, law in ((normal, "norm"), (other, "norm"), (uniform, "uniform")):
         assert stats.kstest(values.ravel(), law).pvalue > 1e-3
     assert abs(np.corrcoef(normal.ravel(), other.ravel())[0, 1]) < 0.02

@@ -1,16 +1,16 @@
 """Draws: each flight's own, whatever flies beside it; means and spreads as the conditions state them."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from aerobat import so3
-from aerobat.environment import Battery, Dispersion, Gusts, load_dispersion
-from aerobat.simulation.conditions.draw import STREAMS, Draw, Draws, dispersed_fleet, draw_flights
+from aerobat.environment import Dispersion, load_dispersion
+from aerobat.simulation.conditions.draw import STREAMS, Draws, dispersed_fleet
 from aerobat.states import BodyState
-from aerobat.vehicle import load_vehicle, vehicle_names
+from aerobat.vehicle import Vehicle, load_vehicle, vehicle_names
 from aerobat.vehicle.fleet import Fleet
 
 FLIGHTS = 3000
@@ -21,22 +21,27 @@ ROTORS = 6
 
 @pytest.fixture(scope="module")
 def draws() -> Draws:
-    return draw_flights(LAB, ROTORS, 11, range(FLIGHTS))
+    return Draws(LAB, ROTORS, 11, range(FLIGHTS))
 
 
 def column(draws: Draws, name: str) -> np.ndarray:
-    return draws.column(name)
+    return draws.columns[name]
 
 
-def differing(one: Draw, other: Draw) -> set[str]:
-    names = (field.name for field in fields(Draw))
-    return {name for name in names if not np.array_equal(getattr(one, name), getattr(other, name))}
+def of_flight(draws: Draws, k: int) -> dict[str, np.ndarray]:
+    return {name: values[k] for name, values in draws.columns.items()}
+
+
+def differing(one: Draws, other: Draws) -> set[str]:
+    return {name for name in one.columns if not np.array_equal(one.columns[name], other.columns[name])}
 
 
 def test_a_flight_draws_the_same_whatever_flies_beside_it(draws: Draws) -> None:
-    assert tuple(draw_flights(LAB, ROTORS, 11, [2, 40, 7])) == (draws[2], draws[40], draws[7])
-    assert draw_flights(LAB, ROTORS, 12, [2])[0] != draws[2]
-    assert len({draw.mass for draw in draws}) == FLIGHTS
+    some = Draws(LAB, ROTORS, 11, [2, 40, 7])
+    for k, flight in enumerate((2, 40, 7)):
+        np.testing.assert_equal(of_flight(some, k), of_flight(draws, flight))
+    assert not np.isin(Draws(LAB, ROTORS, 12, [2]).columns["mass"], draws.columns["mass"]).any()
+    assert len(np.unique(draws.columns["mass"])) == FLIGHTS
 
 
 @pytest.mark.parametrize(
@@ -101,22 +106,35 @@ def test_a_cause_that_is_switched_off_leaves_the_draws_of_others_alone() -> None
             {"hand_off_translation", "hand_off_rotation", "warp"},
         ),
     }
-    [whole] = draw_flights(LAB, ROTORS, 3, [5])
+    whole = Draws(LAB, ROTORS, 3, [5])
     for changes, own in causes.values():
-        [other] = draw_flights(replace(LAB, **changes), ROTORS, 3, [5])
+        other = Draws(replace(LAB, **changes), ROTORS, 3, [5])
         assert differing(whole, other) == own
 
 
 def test_a_vehicle_with_other_rotors_draws_all_else_alike() -> None:
-    [six], [four] = (draw_flights(LAB, rotors, 3, [5]) for rotors in (6, 4))
+    six, four = (Draws(LAB, rotors, 3, [5]) for rotors in (6, 4))
     assert differing(six, four) == {"effectiveness", "lags"}
+
+
+def flown(nominal: Vehicle, draw: dict[str, np.ndarray]) -> Vehicle:
+    """The vehicle that really flies, its rotors' effectiveness apart."""
+    lags = zip(nominal.rotors, draw["lags"].tolist(), strict=True)
+    return replace(
+        nominal,
+        mass=float(draw["mass"]) * nominal.mass,
+        inertia=draw["inertia"] * nominal.inertia,
+        drag_body=nominal.drag_body + draw["drag"] * nominal.mass,
+        rotors=tuple(replace(rotor, lag=factor * rotor.lag) for rotor, factor in lags),
+    )
 
 
 @pytest.mark.parametrize("name", vehicle_names())
 def test_vehicles_drawn_one_by_one_and_all_at_once_are_the_same(name: str) -> None:
     nominal = load_vehicle(name)
-    draws = draw_flights(LAB, len(nominal.rotors), 3, range(20))
-    at_once, one_by_one = dispersed_fleet(nominal, draws), Fleet.of([d.vehicle(nominal) for d in draws])
+    draws = Draws(LAB, len(nominal.rotors), 3, range(20))
+    each = [of_flight(draws, k) for k in range(len(draws))]
+    at_once, one_by_one = dispersed_fleet(nominal, draws), Fleet.of([flown(nominal, draw) for draw in each])
     for field, value in vars(one_by_one).items():
         np.testing.assert_array_equal(getattr(at_once, field), value)
 
@@ -124,43 +142,26 @@ def test_vehicles_drawn_one_by_one_and_all_at_once_are_the_same(name: str) -> No
 def test_where_nothing_varies_the_nominal_vehicle_starts_at_the_reference() -> None:
     nominal = load_vehicle("hexarotor")
     reference = BodyState(np.ones(3), np.zeros(3), np.array([0.6, 0.0, 0.8, 0.0]), np.zeros(3))
-    [draw] = draw_flights(Dispersion(), ROTORS, 3, [4])
-    assert draw.vehicle(nominal) == nominal
-    assert draw.start(reference) == reference
-    assert draw.charge == 1.0
-    np.testing.assert_array_equal(draw.effectiveness, 1.0)
+    draws = Draws(Dispersion(), ROTORS, 3, [4])
+    assert flown(nominal, of_flight(draws, 0)) == nominal
+    for name, part in vars(draws.starts(reference)).items():
+        np.testing.assert_array_equal(part[0], getattr(reference, name))
+    assert draws.columns["charge"] == 1.0
+    np.testing.assert_array_equal(draws.columns["effectiveness"], 1.0)
 
 
 def test_a_flight_starts_off_the_reference_by_what_it_draws() -> None:
     reference = BodyState(np.ones(3), np.zeros(3), np.array([0.6, 0.0, 0.8, 0.0]), np.ones(3))
-    [draw] = draw_flights(LAB, ROTORS, 3, [2])
-    start = draw.start(reference)
-    np.testing.assert_array_equal(start.position, 1.0 + draw.start_position)
-    np.testing.assert_array_equal(start.velocity, draw.start_velocity)
+    draws = Draws(LAB, ROTORS, 3, [2])
+    start = draws.starts(reference)
+    np.testing.assert_array_equal(start.position, 1.0 + draws.columns["start_position"])
+    np.testing.assert_array_equal(start.velocity, draws.columns["start_velocity"])
     turned = so3.box_minus(start.q_world_body, reference.q_world_body)
-    np.testing.assert_allclose(turned, draw.start_attitude, atol=1e-14)
+    np.testing.assert_allclose(turned, draws.columns["start_attitude"], atol=1e-14)
     np.testing.assert_array_equal(start.omega_body, 1.0)
 
 
 def test_streams_of_random_numbers_are_each_their_own() -> None:
-    draws = draw_flights(LAB, ROTORS, 3, range(20))
+    draws = Draws(LAB, ROTORS, 3, range(20))
     first = {tuple(seed.generate_state(2).tolist()) for name in STREAMS for seed in draws.stream(name)}
     assert len(first) == len(draws) * len(STREAMS)
-
-
-def test_a_row_of_a_table_holds_every_number_of_a_draw() -> None:
-    [draw] = draw_flights(LAB, ROTORS, 3, [5])
-    row = draw.row()
-    assert (row["flight"], row["lags_5"], row["warp_2"]) == (5, draw.lags[5], draw.warp[2])
-    assert all(isinstance(value, int | float) for value in row.values())
-    assert len(row) == 7 + 2 * ROTORS + 11 * 3 + 5
-
-
-def test_turbulence_starts_as_it_goes_on() -> None:
-    """Stationary covariance of the filters: 1 along; (1/2, 1/4; 1/4, 1/4) across."""
-    gusty = Dispersion(gusts=Gusts(intensity=1.0), battery=Battery(endurance=1.0))
-    states = column(draw_flights(gusty, ROTORS, 5, range(FLIGHTS)), "gust")
-    expected = np.zeros((5, 5))
-    expected[0, 0] = 1.0
-    expected[1:3, 1:3] = expected[3:, 3:] = [[0.5, 0.25], [0.25, 0.25]]
-    np.testing.assert_allclose(np.cov(states.T), expected, atol=5.0 / np.sqrt(FLIGHTS))

@@ -9,12 +9,11 @@ import pytest
 
 import aerobat as ab
 from aerobat.environment.obstacles import OBSTACLES
-from aerobat.interchange.flat_outputs import FlatOutputs
-from aerobat.simulation.contact import Contact
-from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.outcome import Contact, Outcome
 from aerobat.simulation.plants import PLANTS
 from aerobat.simulation.plants.mujoco import Mujoco
 from aerobat.simulation.plants.rotorpy import RotorPy, rotorpy_vehicle
+from flat_outputs import FlatOutputs
 from shared_plans import shared_plan
 
 ORDER_4 = ab.Miqp(order=4)

@@ -8,14 +8,14 @@ import pytest
 
 import aerobat as ab
 from aerobat import so3
-from aerobat.engines.components import from_components
 from aerobat.engines.engine import expanded
-from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.floats import ArrayOps
+from aerobat.engines.pytree import from_components
 from aerobat.environment import Dispersion, Imu, MotionCapture
 from aerobat.kernels import imu
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
-from aerobat.simulation.conditions.draw import draw_flights
-from aerobat.simulation.conditions.sensors import ImuSource
+from aerobat.simulation.conditions.draw import Draws
+from aerobat.simulation.conditions.sensors import imu_source
 from dispersed_loops import RATE, dispersed_setup, drawn, rows_of
 
 QUAD = ab.load_vehicle("agile-quad")
@@ -75,8 +75,8 @@ def measured(parameters: ImuParameters, felt: ImuSample, noise: ImuSample) -> Im
 
 
 def noise_of(ticks: int, vehicles: int, stream: str = "imu") -> ImuSample:
-    draws = draw_flights(Dispersion(), 4, 1, range(vehicles))
-    noise: ImuSample = expanded(ImuSource(draws, stream, 1).chunk(0, ticks))
+    draws = Draws(Dispersion(), 4, 1, range(vehicles))
+    noise: ImuSample = expanded(imu_source(draws, stream, 1).chunk(0, ticks))
     return noise
 
 
@@ -122,9 +122,11 @@ def test_a_gyro_of_too_small_a_range_saturates_in_a_flip_and_one_of_2000_deg_doe
 
 def test_the_bias_of_the_draw_is_in_every_sample() -> None:
     dispersion = with_imu(gyro_bias=0.02, accelerometer_bias=0.1)
-    [draw] = drawn(dispersion, QUAD, 1)
+    columns = drawn(dispersion, QUAD, 1).columns
     biased, exact = flip(dispersion), flip(with_imu())
-    np.testing.assert_allclose(biased[0] - exact[0], np.tile(draw.gyro_bias, (len(exact[0]), 1)), atol=1e-12)
     np.testing.assert_allclose(
-        biased[1] - exact[1], np.tile(draw.accelerometer_bias, (len(exact[1]), 1)), atol=1e-12
+        biased[0] - exact[0], np.broadcast_to(columns["gyro_bias"][0], exact[0].shape), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        biased[1] - exact[1], np.broadcast_to(columns["accelerometer_bias"][0], exact[1].shape), atol=1e-12
     )

@@ -11,8 +11,8 @@ from scipy import stats
 
 import aerobat as ab
 from aerobat import so3
-from aerobat.engines.components import components, from_components
-from aerobat.engines.numpy import ArrayOps
+from aerobat.engines.floats import ArrayOps
+from aerobat.engines.pytree import components, from_components
 from aerobat.environment import Dispersion, HandOff, Imu, MotionCapture, Outage
 from aerobat.errors import SpecError
 from aerobat.kernels import mocap
@@ -133,11 +133,11 @@ def as_seen(seam: Any, position: np.ndarray, q: np.ndarray) -> tuple[np.ndarray,
 def test_beyond_the_plane_poses_are_turned_and_moved_exactly_before_it_not_at_all(
     position: np.ndarray, turn: np.ndarray
 ) -> None:
-    [draw] = drawn(with_capture(hand_off=WALL), QUAD, 1)
+    columns = drawn(with_capture(hand_off=WALL), QUAD, 1).columns
     q = so3.exp(turn)
     seen, seen_q = as_seen(seam_of(WALL), position[None], q[None])
-    point, rotation = np.array([0.3, 0.0, 0.0]), so3.exp(draw.hand_off_rotation)
-    moved = point + so3.rotate(rotation, position - point) + draw.hand_off_translation
+    point, rotation = np.array([0.3, 0.0, 0.0]), so3.exp(columns["hand_off_rotation"][0])
+    moved = point + so3.rotate(rotation, position - point) + columns["hand_off_translation"][0]
     is_beyond = position[0] > 0.3
     np.testing.assert_allclose(seen[0], moved if is_beyond else position, atol=1e-12)
     np.testing.assert_allclose(seen_q[0], so3.multiply(rotation, q) if is_beyond else q, atol=1e-12)

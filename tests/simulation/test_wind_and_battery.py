@@ -14,9 +14,9 @@ from aerobat.environment import Battery, Dispersion, Environment, Gusts
 from aerobat.kernels import wind
 from aerobat.kernels.battery import BatteryState
 from aerobat.kernels.wind import GustFilter, GustNoise
-from aerobat.simulation.conditions.disturbances import WindSource
-from aerobat.simulation.conditions.draw import dispersed_fleet, draw_flights
+from aerobat.simulation.conditions.draw import Draws, dispersed_fleet
 from aerobat.simulation.conditions.parts import DispersedFlights, gust_filter, wind_part
+from aerobat.simulation.conditions.sensors import wind_source
 from aerobat.trajectory import Trajectory
 from dispersed_loops import dispersed_setup, drawn, rows_of
 
@@ -29,11 +29,11 @@ STATIONARY = np.array([[0.5, 0.25], [0.25, 0.25]])  # of the two filters of a co
 def gusts_of(rate: float, steps: int, **changes: float) -> np.ndarray:
     """Gusts at so many ticks a second, along, across and vertical, (3, steps, flights)."""
     dispersion = Dispersion(gusts=Gusts(intensity=INTENSITY, length=LENGTH, airspeed=AIRSPEED, **changes))
-    draws = draw_flights(dispersion, 6, 3, range(FLIGHTS))
+    draws = Draws(dispersion, 6, 3, range(FLIGHTS))
     flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, Environment(), rate, hover(1.0))
     part = wind_part(dispersion.gusts, flights)
     state = wind.init(part.parameters)
-    noise = expanded(WindSource(draws, 1).chunk(0, steps))
+    noise = expanded(wind_source(draws, 1).chunk(0, steps))
     rows = []
     for k in range(steps):
         along, across, vertical = noise.along[k], *(tuple(x[k] for x in pair) for pair in noise[1:])
@@ -86,11 +86,11 @@ def test_two_steps_are_one_of_twice_the_length(step: float) -> None:
 
 def test_the_mean_wind_is_that_of_the_place_and_the_flight_s_own() -> None:
     dispersion = Dispersion(gusts=Gusts(mean_wind=1.0))
-    draws = draw_flights(dispersion, 6, 3, range(3))
+    draws = Draws(dispersion, 6, 3, range(3))
     windy = Environment(wind=(0.0, 2.0, 0.5))
     flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, windy, 1000.0, hover(1.0))
     state = wind.init(wind_part(dispersion.gusts, flights).parameters)
-    expected = np.array([windy.wind + draw.mean_wind for draw in draws])
+    expected = windy.wind + draws.columns["mean_wind"]
     np.testing.assert_allclose(np.transpose(state.velocity), expected, atol=1e-15)
 
 

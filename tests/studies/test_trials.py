@@ -7,10 +7,10 @@ import pytest
 
 import aerobat as ab
 from aerobat.environment import load_dispersion
-from aerobat.studies import trials
-from aerobat.studies.flights import FlightTask
+from aerobat.studies import flights as trials
+from aerobat.studies.flights import LOOKS, FlightTask, fly_trials
+from aerobat.studies.share import Trials
 from aerobat.studies.sweep import Share
-from aerobat.studies.trials import LOOKS, Trials, fly_trials
 from shared_plans import shared_plan
 
 LAB = load_dispersion("lab")

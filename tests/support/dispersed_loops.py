@@ -8,7 +8,7 @@ from aerobat.engines.pytree import Tree
 from aerobat.environment import Dispersion
 from aerobat.problem import Problem
 from aerobat.simulation import FlightConfig, prepare
-from aerobat.simulation.conditions.draw import Draws, dispersed_fleet, draw_flights
+from aerobat.simulation.conditions.draw import Draws, dispersed_fleet
 from aerobat.simulation.conditions.parts import DispersedFlights, condition_parts
 from aerobat.simulation.setup import FlightSetup
 from aerobat.trajectory import as_trajectory
@@ -18,7 +18,7 @@ RATE = 1000.0  # [1/s]
 
 
 def drawn(dispersion: Dispersion, vehicle: Vehicle, flights: int, seed: int = 7) -> Draws:
-    return draw_flights(dispersion, len(vehicle.rotors), seed, range(flights))
+    return Draws(dispersion, len(vehicle.rotors), seed, range(flights))
 
 
 def dispersed_setup(

@@ -11,11 +11,11 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.engines import choose
-from aerobat.engines.components import components, from_components
 from aerobat.engines.engine import first_row
+from aerobat.engines.pytree import components, from_components
 from aerobat.environment import Environment
 from aerobat.estimation import Ekf, FilterInput, FilterParameters, ekf_parameters, filter_loop
-from aerobat.estimation.filter_loop import NO_SLOT
+from aerobat.estimation.replay import NO_SLOT
 from aerobat.kernels.ekf import EkfState, ImuSample, Pose
 from aerobat.kernels.ekf.covariance import unpack
 from aerobat.simulation import fly

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.mavlink import connection
 from aerobat.links.mavlink.client import Client, ClientStage

@@ -33,7 +33,6 @@ from aerobat.environment.files import write_dispersion
 from aerobat.errors import SpecError
 from aerobat.interchange import read_csv, read_flight_log, read_table, write_columns, write_table
 from aerobat.interchange.csv import write_csv
-from aerobat.interchange.flight_package import read_flight_package
 from aerobat.interchange.robots import import_vehicle, read_robot_description
 from aerobat.problem.files import write_problem
 from aerobat.simulation import load_flight
@@ -45,6 +44,7 @@ from aerobat.studies.sweep.kept import KeptChunks
 from aerobat.trajectory import load_trajectory, save_trajectory
 from aerobat.vehicle.files import write_vehicle
 from damaged_files import csv_files, damaged_bytes, documents, lying_array, mutated_table
+from flight_package import read_flight_package
 from places import CASES
 from shared_plans import shared_flight, shared_plan
 

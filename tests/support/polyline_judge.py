@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
-from aerobat.engines.components import components
-from aerobat.engines.numpy import ArrayOps
-from aerobat.engines.pytree import tree_map
+from aerobat.engines.floats import ArrayOps
+from aerobat.engines.pytree import components, tree_map
 from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.progress import GateProgress
 from aerobat.kernels.gates.section import extent, gap, section

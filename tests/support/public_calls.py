@@ -293,7 +293,6 @@ def _calls(folder: Path) -> dict[str, dict[str, Any]]:
         },
         "smallest_opening": _wide_enough(),
         "to_dataframe": {"result": plan()},
-        "tracking_figure": {"plan": plan(), "vehicle": agile, "flight": flight()},
         "view": {"shown": flight(), "plan": plan(), "vehicle": agile},
         "view_live": {
             "shown": plan(),

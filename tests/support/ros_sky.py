@@ -16,7 +16,7 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
-from aerobat.interchange.exports.stored_types import StoredTypes
+from aerobat.interchange.exports.bags import StoredTypes
 from aerobat.interchange.ros import Messages
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.commander import Doing

@@ -17,7 +17,6 @@ import tomli_w
 
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
-from aerobat.interchange.flight_package import read_flight_package
 from aerobat.interchange.rows import MAX_ROWS
 from aerobat.planning import Plan, load_plan
 from aerobat.problem import load_problem
@@ -25,6 +24,7 @@ from aerobat.simulation import load_flight
 from aerobat.trajectory import Trajectory, load_trajectory
 from aerobat.vehicle import load_vehicle
 from damaged_files import checking_lines, plan_files
+from flight_package import read_flight_package
 from mutated_files import READERS, Trial
 from random_command_lines import faults
 

@@ -24,7 +24,6 @@ LONG = (
     "recoveries",
     "smallest_opening",
     "sweep_figure",
-    "tracking_figure",
     "tune",
     "write_video",
 )  # right, and studies or pictures

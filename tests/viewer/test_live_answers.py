@@ -15,8 +15,7 @@ from dataclasses import replace
 import pytest
 
 import aerobat as ab
-from aerobat.viewer.live.desk import MAX_PAGES, Desk
-from aerobat.viewer.live.replan import FLIGHTS, Answer, LiveVerdict, Overtaken, Replanner
+from aerobat.viewer.live.replan import FLIGHTS, MAX_PAGES, Answer, Desk, LiveVerdict, Overtaken, Replanner
 from aerobat.viewer.live.server import GRACE
 from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.live.view_live import LiveView

@@ -7,12 +7,11 @@ from itertools import pairwise
 
 from cyclopts import App, CycloptsError, Group
 
-from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.failures import IMPORT_FLAG
+from aerobat.cli.failures import IMPORT_FLAG, ExitCode
 from aerobat.errors import SpecError
 
 # each command is one file and one function of this name, imported when it is asked for
-# those of `link` share one file
+# those of `link` are two a file
 COMMANDS: dict[str, dict[str, str | dict[str, str]]] = {
     "Plan and fly": {
         "fly": "Plan a maneuver, fly it in simulation, and report.",
@@ -75,8 +74,8 @@ for title, commands in COMMANDS.items():
         inner = App(name=name, help=LINK, group=group)
         app.command(inner)
         for each, its_help in help.items():
-            place = each.replace("-", "_")
-            inner.command(f"aerobat.cli.commands.{name}:{place}", name=each, help=its_help)
+            file, place = each.partition("-")[0], each.replace("-", "_")
+            inner.command(f"aerobat.cli.commands.{file}:{place}", name=each, help=its_help)
 
 
 START = """Plan, fly and prove aggressive maneuvers for multirotors. To begin with, type:

@@ -11,8 +11,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from aerobat.cli.exit_code import ExitCode
-from aerobat.cli.failures import TRACEBACK_FLAG, foreseen, of_plugins, stopped_by
+from aerobat.cli.failures import TRACEBACK_FLAG, ExitCode, foreseen, of_plugins, stopped_by
 from aerobat.cli.interrupts import REPORTED, interrupted_by, interruptible, is_interrupted
 from aerobat.cli.terminal import discard, is_broken, provide_streams, say
 from aerobat.errors import AerobatError, Infeasible

@@ -7,8 +7,8 @@ import re
 import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from enum import IntEnum
 
-from aerobat.cli.exit_code import ExitCode
 from aerobat.cli.terminal import print_json, say
 from aerobat.errors import AerobatError, BackendMissing, Infeasible, OwnCodeError, SpecError
 
@@ -18,6 +18,18 @@ JSON_FLAG = "--json"
 TRACEBACK_FLAG = "--traceback"
 
 _FLAG = re.compile(r"(?<![\w-])--[a-z][\w-]*")
+
+
+class ExitCode(IntEnum):
+    """Outcome of a run, as an exit code for scripts."""
+
+    WELL = 0
+    NOT_WELL = 1  # not certified, or not flown as it should be
+    BAD_INPUT = 2
+    NO_PLAN = 3
+    INTERRUPTED = 130  # as shells say it, and the next two
+    BROKEN_PIPE = 141
+    TERMINATED = 143
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from functools import partial
 from types import FrameType
 
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 REPORTED = "reported"  # of an interrupt whose command has written its report: nothing else is JSON then

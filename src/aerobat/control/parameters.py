@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.engines.components import components, matrix_components
+from aerobat.engines.pytree import components, matrix_components
 from aerobat.environment import Environment
 from aerobat.kernels.allocation import Mixer
 from aerobat.kernels.control import ControllerModel

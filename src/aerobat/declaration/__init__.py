@@ -4,8 +4,7 @@ A class is declared once, with `@declared` and a type for each field; calling it
 then run through the same checks, and whatever is wrong becomes one sentence that names the field.
 """
 
-from aerobat.declaration.angles import in_degrees, in_radians
-from aerobat.declaration.declared import declared
+from aerobat.declaration.declared import declared, from_table, to_table
 from aerobat.declaration.field_types import (
     AS_IT_IS,
     Angle,
@@ -31,10 +30,11 @@ from aerobat.declaration.field_types import (
     Vector3,
     VectorLike,
     finite,
+    in_degrees,
+    in_radians,
     number,
     unit,
 )
-from aerobat.declaration.notebooks import in_notebooks
 from aerobat.declaration.registry import Registry, import_plugin, placed
 from aerobat.declaration.sentences import (
     FieldError,
@@ -44,9 +44,8 @@ from aerobat.declaration.sentences import (
     unknown_name,
     within_field,
 )
-from aerobat.declaration.tables import from_table, to_table
 from aerobat.declaration.validated import suggest_for, validated
-from aerobat.declaration.values import by_value, short
+from aerobat.declaration.values import by_value, in_notebooks, short
 
 __all__ = [
     "AS_IT_IS",

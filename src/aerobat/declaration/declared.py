@@ -1,9 +1,10 @@
-"""The decorator that makes a class a value: frozen, checked by pydantic, compared by content."""
+"""The decorator that makes a class a value: frozen, checked by pydantic; such values as tables, and back."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from enum import Enum
 from functools import wraps
 from typing import Any, TypeVar, dataclass_transform
 
@@ -12,11 +13,12 @@ from pydantic import ConfigDict, Field, ValidationError
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from pydantic_core import CoreSchema, core_schema
 
-from aerobat.declaration.sentences import FieldError, first_complaint, shown, unknown_key
-from aerobat.declaration.tables import from_table
-from aerobat.declaration.values import by_value
+from aerobat.arrays import Array
+from aerobat.declaration.sentences import FieldError, UnknownKey, first_complaint, one_of, shown, unknown_key
+from aerobat.declaration.values import by_value, is_default
 from aerobat.errors import SpecError
 
+PAPER_THRUST = ("eps", "ε")  # begins names of least specific thrusts, as the paper has them
 T = TypeVar("T")
 
 CONFIG = ConfigDict(
@@ -25,6 +27,67 @@ CONFIG = ConfigDict(
     arbitrary_types_allowed=True,
     validate_default=True,
 )
+
+
+def from_table(cls: type[T], table: Mapping[str, Any]) -> T:
+    """The value of the declared class `cls` that a table describes, whose keys are its fields and shorthands.
+
+    Raises FieldError, one sentence that names the field from here on, when the table does not fit.
+    """
+    if not isinstance(table, Mapping):
+        raise FieldError("", f"must be a table, got {shown(table)}")
+    declaration: Any = cls
+    known = [*(field.name for field in dataclasses.fields(declaration)), *getattr(cls, "SHORTHANDS", ())]
+    for key in table:
+        if key not in known:
+            raise _unknown(str(key), known)
+    values = dict(table)
+    value = cls.__new__(cls)
+    declaration.__checked_init__(value, declaration.expand(values) if hasattr(cls, "expand") else values)
+    return value
+
+
+def _unknown(key: str, known: Sequence[str]) -> UnknownKey:
+    """The error about a key that no field has; the paper's ε is told by its names here."""
+    thrusts = [name for name in known if name.startswith("min_") and name.endswith("thrust")]
+    if thrusts and key.lower().startswith(PAPER_THRUST):
+        return UnknownKey(key, f"is not a known key; the paper's ε is {one_of(thrusts)} here")
+    return unknown_key(key, known)
+
+
+def to_table(value: Any) -> dict[str, Any]:
+    """The table from which `from_table` makes exactly this value; fields at their defaults are left out.
+
+    Raises SpecError for a value that no file can hold.
+    """
+    if not hasattr(value, "__checked_init__"):
+        raise SpecError(f"{type(value).__name__} has no place in a file: it is not declared")
+    table = {
+        field.name: _plain(getattr(value, field.name))
+        for field in dataclasses.fields(value)
+        if not is_default(value, field)
+    }
+    kind = {"kind": value.kind} if hasattr(value, "kind") else {}
+    if kind and "kind" not in vars(type(value)):
+        raise SpecError(f"{type(value).__name__} has no place in a file: it is not registered")
+    return kind | (value.abbreviate(table) if hasattr(value, "abbreviate") else table)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return _components(value)
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, Enum):
+        return value.value
+    return to_table(value) if dataclasses.is_dataclass(value) else value
+
+
+def _components(array: Array) -> Any:
+    """Lists of numbers; a table of the components that are given where some are left free."""
+    if not np.isnan(array).any():
+        return array.tolist()
+    return {axis: x for axis, x in zip("xyz", array.tolist(), strict=True) if not np.isnan(x)}
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
-from math import hypot, inf, isfinite, nan, radians, tau
+from math import degrees, hypot, inf, isfinite, nan, radians, tau
 from types import ModuleType
 from typing import Annotated, Any
 
@@ -16,12 +16,34 @@ from pydantic_core import CoreSchema, core_schema
 
 from aerobat.arrays import AXES, Array
 from aerobat.declaration.sentences import FieldError, shown, unknown_key, within_field
+from aerobat.errors import SpecError
 
 _ROUND_OFF = 1e-12  # [-] components of a unit vector that are zero but for it
 _UNIT = 1e-15  # [-] how far from one a norm may be by round-off
 _CONTROL = {*map(chr, range(32)), "\x7f"}  # letters that no path needs and no terminal shows
 _MAX_MAGNITUDE = 1e15  # in SI units, and one over it the least: powers of more overflow
 _TWO_TURNS = 2.0 * tau * (1.0 + _ROUND_OFF)  # [rad] sums of angles stay within; more is hardly in radians
+
+
+def in_radians(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """The table with an angle's shorthand in degrees replaced. Raises SpecError where both are given."""
+    shorthand = f"{name}_deg"
+    if shorthand not in table:
+        return table
+    if name in table:
+        raise SpecError(f"{name} and {shorthand} are both given; give one of them")
+    table[name] = radians(number(table.pop(shorthand), shorthand))
+    return table
+
+
+def in_degrees(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """The table with an angle in degrees where those say exactly the same."""
+    angle = table.get(name, 0.0)
+    for angle_deg in (round(degrees(angle), 9), degrees(angle)):
+        if name in table and radians(angle_deg) == angle:
+            del table[name]
+            return {f"{name}_deg": angle_deg} | table
+    return table
 
 
 def unit(direction: ArrayLike) -> Array:

@@ -13,10 +13,9 @@ from traceback import extract_tb
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
-from aerobat.declaration.declared import declared
+from aerobat.declaration.declared import declared, from_table
 from aerobat.declaration.field_types import PathName
 from aerobat.declaration.sentences import FieldError, shown, unknown_name
-from aerobat.declaration.tables import from_table
 from aerobat.declaration.validated import validated
 from aerobat.errors import SpecError
 

@@ -5,14 +5,36 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from enum import Enum
+from importlib import import_module
 from typing import Any, TypeVar
 
 import numpy as np
 
+_REPORTER = "aerobat.reporting.notebooks"
 T = TypeVar("T")
 
 _NAN = "nan"  # in place of what is not equal to itself
 _FEW = 9  # entries: a longer list is told by its length
+
+
+def in_notebooks(cls: type[T]) -> type[T]:
+    """Give a class a table for notebooks and, where there is one of its values, a picture."""
+    made: Any = cls
+    made._repr_html_ = _repr_html_
+    made._repr_png_ = _repr_png_
+    return cls
+
+
+def _repr_html_(self: Any) -> str:
+    """HTML of the value: a table, and its picture."""
+    html: str = import_module(_REPORTER).html(self)
+    return html
+
+
+def _repr_png_(self: Any) -> bytes | None:
+    """The picture as PNG; None where there is none."""
+    png: bytes | None = import_module(_REPORTER).png(self)
+    return png
 
 
 def by_value(cls: type[T]) -> type[T]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -167,3 +168,10 @@ def read_only(array: Any) -> Any:
     """The same array, write-protected."""
     array.flags.writeable = False
     return array
+
+
+def available_cores() -> int:
+    """The processors that this process may use; where the system does not say, all there are."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

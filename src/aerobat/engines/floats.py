@@ -1,4 +1,4 @@
-"""Kernels on Python floats as they stand, one vehicle after another: the reference for all engines."""
+"""Arithmetic of floats and of arrays, and kernels on Python floats as they stand: the reference."""
 
 from __future__ import annotations
 
@@ -19,6 +19,16 @@ from aerobat.engines.engine import (
     told_at_every_tick,
 )
 from aerobat.engines.pytree import Tree, tree_map, tree_rows, tree_stack
+
+
+class ArrayOps:
+    """Arithmetic of NumPy arrays."""
+
+    sqrt = staticmethod(np.sqrt)
+    exp = staticmethod(np.exp)
+    minimum = staticmethod(np.minimum)
+    maximum = staticmethod(np.maximum)
+    select = staticmethod(np.where)
 
 
 class FloatOps:

@@ -1,4 +1,4 @@
-"""Pytrees: (named) tuples of (named) tuples whose leaves are arrays or numbers."""
+"""Pytrees: (named) tuples of (named) tuples whose leaves are arrays or numbers; vectors among them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,27 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import repeat
 from typing import Any, TypeAlias
 
+import numpy as np
+
+from aerobat.arrays import Array
+
 Tree: TypeAlias = Any
+
+
+def components(array: Array) -> Tree:
+    """(..., n) -> a tuple of n leaves of shape (...)."""
+    last = array.ndim - 1
+    return tuple(np.ascontiguousarray(array.transpose(last, *range(last))))
+
+
+def matrix_components(matrices: Array) -> Tree:
+    """(..., rows, columns) -> rows of columns of leaves (...)."""
+    return tuple(components(matrices[..., k, :]) for k in range(matrices.shape[-2]))
+
+
+def from_components(leaves: Tree) -> Array:
+    """n leaves of shape (...) -> (..., n)."""
+    return np.stack(leaves, axis=-1)
 
 
 def tree_leaves(tree: Tree) -> list[Any]:

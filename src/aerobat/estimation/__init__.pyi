@@ -1,5 +1,4 @@
-from .filter_loop import FilterInput, FilterParameters, filter_loop
-from .replay import Estimates, estimate
+from .replay import Estimates, FilterInput, FilterParameters, estimate, filter_loop
 from .sensor_log import SensorLog
 from .settings import Ekf, ekf_parameters
 

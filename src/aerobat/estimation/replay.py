@@ -5,27 +5,172 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from aerobat.arrays import Array, Mask
+from aerobat.arrays import Array, Indices, Mask
 from aerobat.declaration import Positive, VectorLike, by_value, short, validated
 from aerobat.engines import choose
-from aerobat.engines.components import components, from_components
-from aerobat.engines.engine import first_row
-from aerobat.engines.pytree import tree_map
+from aerobat.engines.engine import Init, Step, first_row
+from aerobat.engines.pytree import components, from_components, tree_map
 from aerobat.environment import Environment
-from aerobat.estimation.filter_loop import FilterParameters, filter_loop
-from aerobat.estimation.schedule import Schedule, schedule
+from aerobat.errors import SpecError
 from aerobat.estimation.sensor_log import SensorLog
 from aerobat.estimation.settings import Ekf, ekf_parameters
 from aerobat.flatness import TimeInterval
-from aerobat.kernels.ekf import EkfState, Pose
+from aerobat.kernels import ekf
+from aerobat.kernels.ekf import EkfParameters, EkfState, ImuSample, Pose
 from aerobat.kernels.ekf.covariance import SIZE
+from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
 
+NO_SLOT = -1.0
+_SAMPLE, _EXPOSURE, _ARRIVAL = range(3)  # in this order where they are at the same time
 _ROWS = 10_000  # of the loop at once: their covariances take 10 MB
 _DIAGONAL = [row * SIZE - row * (row - 1) // 2 for row in range(SIZE)]  # in the upper triangle, row by row
+
+
+class FilterParameters(NamedTuple):
+    """Parameters of one filter."""
+
+    ekf: EkfParameters
+    first_pose: Pose
+    first_velocity: Vector  # [m/s] world
+
+
+class FilterInput(NamedTuple):
+    """Inputs of one row, which ends at its instant."""
+
+    elapsed: Scalar  # [s] since the row before
+    sample: ImuSample  # of that while
+    exposed: Scalar  # slot of the pose that is exposed now, NO_SLOT for none
+    arrived: Scalar  # slot of the pose that arrives now, NO_SLOT for none
+    measured: Pose  # that pose
+
+
+class Exposure(NamedTuple):
+    """Pose whose measurement has yet to arrive."""
+
+    past: Pose  # the filter's own then, as it is known now
+    age: Scalar  # [s]
+
+
+@lru_cache(maxsize=8)
+def filter_loop(slots: int) -> tuple[Init, Step]:
+    """The loop for as many poses on their way at once; its rows are the states (see `engines.Compile`)."""
+
+    def init(
+        ops: Ops, parameters: FilterParameters, inputs: FilterInput
+    ) -> tuple[EkfState, tuple[Exposure, ...]]:
+        state = ekf.init(parameters.ekf, parameters.first_pose, parameters.first_velocity)
+        return state, (Exposure(parameters.first_pose, 0.0),) * slots
+
+    def step(
+        ops: Ops,
+        parameters: FilterParameters,
+        carry: tuple[EkfState, tuple[Exposure, ...]],
+        inputs: FilterInput,
+    ) -> tuple[tuple[EkfState, tuple[Exposure, ...]], EkfState]:
+        state = ekf.propagate(ops, parameters.ekf, carry[0], inputs.sample, inputs.elapsed)
+        predicted = ekf.predict_covariance(ops, parameters.ekf, state)
+        exposures = [e._replace(age=e.age + inputs.elapsed) for e in carry[1]]
+        past, age = _picked(ops, exposures, inputs.arrived)
+        state = ekf.fuse(ops, parameters.ekf, predicted, inputs.measured, past, age, inputs.arrived > NO_SLOT)
+        fresh = Exposure(ekf.pose_of(state), 0.0)
+        kept = []
+        for slot, exposure in enumerate(exposures):
+            back = ekf.carried_back(predicted, state, exposure.past, exposure.age)
+            kept.append(select_tree(ops, _is_slot(inputs.exposed, slot), fresh, exposure._replace(past=back)))
+        return (state, tuple(kept)), state
+
+    return init, step
+
+
+def _picked(ops: Ops, exposures: list[Exposure], wanted: Scalar) -> Exposure:
+    picked = exposures[0]
+    for slot, exposure in enumerate(exposures[1:], start=1):
+        picked = select_tree(ops, _is_slot(wanted, slot), exposure, picked)
+    return picked
+
+
+def _is_slot(wanted: Scalar, slot: int) -> Scalar:
+    """True where a slot is the one that is wanted."""
+    return (wanted > slot - 0.5) & (wanted < slot + 0.5)
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Rows of a filter that begins at a log's first pose within its samples, and what they belong to."""
+
+    first_pose: int
+    inputs: FilterInput  # leaves (rows,)
+    slots: int  # poses on their way at once, at most, 1 or more
+    sample_rows: Indices  # the last row at the end of each sample that ends after the first pose
+    sample_times: Array  # [s] of those ends
+    arrival_rows: Indices  # of each pose, -1 for those that are not fused
+
+
+def schedule(log: SensorLog) -> Schedule:
+    """The rows of a log. Raises SpecError where it has no pose within its samples."""
+    first = _first_pose(log)
+    begin, end = log.pose_times[first], log.imu_times[-1]
+    poses = np.arange(first + 1, len(log.pose_times))
+    poses = poses[log.arrivals[poses] <= end]
+    samples = np.flatnonzero(log.imu_times > begin)
+    slots = _slots(log, poses)
+    # kind, time, and index of the sample or pose
+    kinds = np.repeat([_SAMPLE, _EXPOSURE, _ARRIVAL], [len(samples), len(poses), len(poses)])
+    times = np.concatenate([log.imu_times[samples], log.pose_times[poses], log.arrivals[poses]])
+    which = np.concatenate([samples, poses, poses])
+    order = np.lexsort((kinds, times))
+    kinds, times, which = kinds[order], times[order], which[order]
+    slot = slots[np.where(kinds == _SAMPLE, 0, which)]
+    measured = np.where(kinds == _ARRIVAL, which, first)
+    during = np.minimum(np.searchsorted(log.imu_times, times), len(log.imu_times) - 1)
+    arrival_rows = np.full(len(log.pose_times), -1)
+    arrival_rows[which[kinds == _ARRIVAL]] = np.flatnonzero(kinds == _ARRIVAL)
+    return Schedule(
+        first_pose=first,
+        inputs=FilterInput(
+            elapsed=np.diff(times, prepend=begin),
+            sample=ImuSample(components(log.omega[during]), components(log.specific_force[during])),
+            exposed=np.where(kinds == _EXPOSURE, slot, NO_SLOT),
+            arrived=np.where(kinds == _ARRIVAL, slot, NO_SLOT),
+            measured=Pose(components(log.position[measured]), components(log.q_world_body[measured])),
+        ),
+        slots=int(slots.max()) + 1,
+        sample_rows=np.searchsorted(times, log.imu_times[samples], side="right") - 1,
+        sample_times=log.imu_times[samples],
+        arrival_rows=arrival_rows,
+    )
+
+
+def _first_pose(log: SensorLog) -> int:
+    """The first pose in the interval of a sample."""
+    begin = 2.0 * log.imu_times[0] - log.imu_times[1]
+    within = np.flatnonzero((log.pose_times >= begin) & (log.pose_times < log.imu_times[-1]))
+    if not within.size:
+        raise SpecError(
+            f"pose_times has none from {begin:.6g} to {log.imu_times[-1]:.6g} s, where the IMU's samples "
+            "are; set both to one clock"
+        )
+    return int(within[0])
+
+
+def _slots(log: SensorLog, poses: Indices) -> Indices:
+    """A slot for each pose, free again once its measurement has arrived, 0 for those that are not fused."""
+    slots = np.zeros(len(log.pose_times), dtype=np.intp)
+    taken_until: list[float] = []
+    for pose, exposure, arrival in zip(
+        poses.tolist(), log.pose_times[poses].tolist(), log.arrivals[poses].tolist(), strict=True
+    ):
+        free = [slot for slot, until in enumerate(taken_until) if until < exposure]
+        slot = free[0] if free else len(taken_until)
+        taken_until[slot : slot + 1] = [arrival]
+        slots[pose] = slot
+    return slots
 
 
 @short

@@ -24,7 +24,8 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.simulation.metrics import Criteria
 from aerobat.simulation.outcome import length
-from aerobat.simulation.passages import PASSAGE_WINDOW, PlannedAttitude
+from aerobat.simulation.passages.passage import PASSAGE_WINDOW
+from aerobat.simulation.passages.stage_attitude import PlannedAttitude
 from aerobat.so3 import thrust_axis
 
 GOAL = "the goal"  # the name of a path's end among what is come to

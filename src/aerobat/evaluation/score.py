@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from math import inf, isfinite, isinf
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,9 @@ from aerobat.evaluation.criteria import SampledPath, criteria_of
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
-from aerobat.simulation.contact import Contact
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.metrics import Criteria, metrics_of_log
-from aerobat.simulation.outcome import Outcome, counted, length
+from aerobat.simulation.outcome import Contact, FlightFailure, Outcome, counted, length
 from aerobat.simulation.passages import (
     NearestObstacle,
     Passage,
@@ -35,8 +34,12 @@ from aerobat.simulation.passages import (
 )
 from aerobat.vehicle import Vehicle, as_vehicle
 
-Event: TypeAlias = tuple[float, Outcome, dict[str, object]]  # when [s], what, and its numbers
 COASTING = 0.1  # [s] without a pose: several periods of any motion capture
+_FELT = {  # by the plant
+    Contact.GROUND: Outcome.TOUCHED_GROUND,
+    Contact.GATE: Outcome.TOUCHED_GATE,
+    Contact.OBSTACLE: Outcome.HIT_OBSTACLE,
+}
 
 
 @dataclass(frozen=True)
@@ -182,13 +185,14 @@ class Score:
         if self.is_batch:
             raise SpecError("outcome is asked of one flight; of a batch, ask score[k].outcome or outcomes")
         passed = self.passages
-        found = [*self._endings(), *_failures(passed, self.waypoints)] or [
-            *_failures((), (*self.places, *self.attitudes)),
+        found = [*self._endings(), *_failures((*passed, *self.waypoints))] or [
+            *_failures((*self.places, *self.attitudes)),
             *self._departure(),
         ]
         if found:
-            time, outcome, numbers = min(found, key=lambda event: event[0])
-            return outcome, outcome.sentence(time=time, **numbers)
+            first = min(found, key=lambda failure: failure.time)
+            label = {"gate": "the gate"} if len(passed) == 1 else {}
+            return first.outcome, first.sentence(**label)
         error = length(self.max_position_error_m)
         if not passed:
             allowed = "" if isinf(self.path_radius_m) else f", {length(self.path_radius_m)} allowed"
@@ -199,31 +203,23 @@ class Score:
         numbers = {"gate": gates, "speed": worst.speed, "miss": length(worst.miss), "error": error}
         return Outcome.THROUGH_GATES, Outcome.THROUGH_GATES.sentence(**numbers)
 
-    def _endings(self) -> Iterator[Event]:
+    def _endings(self) -> Iterator[FlightFailure]:
         """The divergence of a flight, and what it touched."""
         if isfinite(self.stop):
-            yield self.stop, Outcome.DIVERGED if self.is_finite else Outcome.STATE_NOT_FINITE, {}
+            yield FlightFailure(self.stop, Outcome.DIVERGED if self.is_finite else Outcome.STATE_NOT_FINITE)
         if isfinite(self.ground_time):
-            yield self.ground_time, Outcome.HIT_GROUND, {}
+            yield FlightFailure(self.ground_time, Outcome.HIT_GROUND)
         if self.nearest is not None and self.nearest.failure is not None:
-            outcome, time, numbers = self.nearest.failure
-            yield time, outcome, numbers
+            yield self.nearest.failure
         if isfinite(self.contact_time):
-            yield self.contact_time, *self._felt()
+            obstacle = self.nearest.obstacle if self.nearest else "an obstacle"
+            yield FlightFailure(self.contact_time, _FELT[self.contact], {"obstacle": obstacle})
 
-    def _felt(self) -> tuple[Outcome, dict[str, object]]:
-        """What the plant felt."""
-        if self.contact == Contact.OBSTACLE:
-            return Outcome.HIT_OBSTACLE, {
-                "obstacle": self.nearest.obstacle if self.nearest else "an obstacle"
-            }
-        return Outcome.TOUCHED_GATE if self.contact == Contact.GATE else Outcome.TOUCHED_GROUND, {}
-
-    def _departure(self) -> Iterator[Event]:
+    def _departure(self) -> Iterator[FlightFailure]:
         """When a flight left its path, if it did."""
         if isfinite(self.off_path_time):
             error, allowed = length(self.max_position_error_m), length(self.path_radius_m)
-            yield self.off_path_time, Outcome.OFF_PATH, {"allowed": allowed, "error": error}
+            yield FlightFailure(self.off_path_time, Outcome.OFF_PATH, {"allowed": allowed, "error": error})
 
 
 def _of_flight(value: Any, k: int) -> Any:
@@ -235,19 +231,9 @@ def _of_flight(value: Any, k: int) -> Any:
     return value[k].item() if isinstance(value, np.ndarray) else value
 
 
-def _failures(
-    passed: tuple[Passage, ...], others: tuple[WaypointPassage | StageAttitude, ...]
-) -> Iterator[Event]:
-    """What went wrong at gates, and at waypoints and other stages."""
-    for passage in passed:
-        label = "the gate" if len(passed) == 1 else f"gate '{passage.gate}'"
-        if passage.failure is not None:
-            outcome, time, numbers = passage.failure
-            yield time, outcome, {"gate": label, **numbers}
-    for other in others:
-        if other.failure is not None:
-            outcome, time, numbers = other.failure
-            yield time, outcome, numbers
+def _failures(judged: Iterable[Passage | WaypointPassage | StageAttitude]) -> Iterator[FlightFailure]:
+    """What went wrong at gates, waypoints and other stages."""
+    yield from (each.failure for each in judged if each.failure is not None)
 
 
 @validated

@@ -12,8 +12,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.declaration import validated
 from aerobat.engines import logged_ticks
-from aerobat.engines.components import from_components
-from aerobat.engines.pytree import Tree, tree_map, tree_stack
+from aerobat.engines.pytree import Tree, from_components, tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.evaluation.criteria import SampledPath, criteria_of

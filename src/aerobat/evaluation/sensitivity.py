@@ -15,11 +15,10 @@ from aerobat.arrays import Array
 from aerobat.control import Controller
 from aerobat.control.parameters import max_bandwidth
 from aerobat.declaration import by_value, short, unknown_name, validated
-from aerobat.engines.components import components, matrix_components
 from aerobat.engines.duals import Dual, DualOps, differentiated, dual
 from aerobat.engines.engine import Init, Step, first_row
-from aerobat.engines.numpy import ArrayOps
-from aerobat.engines.pytree import Tree, tree_leaves, tree_map
+from aerobat.engines.floats import ArrayOps
+from aerobat.engines.pytree import Tree, components, matrix_components, tree_leaves, tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import Planned

@@ -10,7 +10,8 @@ from aerobat.declaration import AS_IT_IS
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.trajectory import HasTrajectory, Trajectory
-from aerobat.vehicle import Vehicle, as_vehicle
+from aerobat.vehicle.files import as_vehicle
+from aerobat.vehicle.vehicle import Vehicle
 
 
 @runtime_checkable
@@ -45,5 +46,7 @@ def vehicle_of(flown: Flyable | Trajectory, vehicle: Vehicle | str | None) -> Ve
         return as_vehicle(vehicle)
     own = None if isinstance(flown, Trajectory) else flown.vehicle
     if own is None:
-        raise SpecError("vehicle is missing: a trajectory, or a plan without one, says not what flies it")
+        raise SpecError(
+            "vehicle is missing: a path, or a plan without one, says not what flies it; give vehicle="
+        )
     return own

@@ -24,7 +24,7 @@ from aerobat.so3 import UP
 from aerobat.states import FlatState
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
-from aerobat.vehicle import Vehicle
+from aerobat.vehicle.vehicle import Vehicle
 
 NODES = 20  # of a piece
 RESOLVED = 1e-10  # of its size, the last terms of what is singular where no attitude is determined

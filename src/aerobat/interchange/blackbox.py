@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.util import find_spec
 from math import pi
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import PathName, by_value, validated
-from aerobat.errors import BackendMissing, SpecError
+from aerobat.errors import SpecError, import_extra
 from aerobat.storage import read_whole
 
 MAX_LOG = 2**27  # bytes
@@ -86,13 +85,9 @@ def _three(columns: dict[str, Array], name: str) -> Array:
 
 def _decoded(raw: bytes) -> tuple[list[str], Array, dict[str, Any]]:
     """Names and rows of the last flight's frames, and the settings before them."""
-    if find_spec("betaflight_chirp_core") is None:
-        raise BackendMissing(
-            "blackbox logs need betaflight-chirp-core; install it with `pip install betaflight-chirp-core`"
-        )
-    from betaflight_chirp_core.decoder import FlightLogParser, split_sessions
-
-    parser = FlightLogParser(raw, *split_sessions(raw)[-1])
+    package = "betaflight-chirp-core"
+    decoder = import_extra("betaflight_chirp_core.decoder", f"blackbox logs need {package}", package)
+    parser = decoder.FlightLogParser(raw, *decoder.split_sessions(raw)[-1])
     parser.parse_header()
     parser.parse_data()
     names = parser.frame_defs["I"]["name"]

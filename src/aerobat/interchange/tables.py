@@ -6,7 +6,6 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from aerobat.declaration import PathName, validated
 from aerobat.documents import in_document, read_text
-from aerobat.errors import BackendMissing, SpecError
+from aerobat.errors import SpecError, import_extra
 from aerobat.storage import whole_file, write_whole
 
 CSV, PARQUET = ".csv", ".parquet"
@@ -82,14 +81,8 @@ def _columns(table: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     return columns
 
 
-def _parquet() -> ModuleType:
-    try:
-        import pyarrow.parquet
-    except ImportError:
-        remedy = 'pip install "aerobat[parquet]"'
-        raise BackendMissing(f"Parquet files need pyarrow; install it with {remedy}, or write CSV") from None
-    module: ModuleType = pyarrow.parquet
-    return module
+def _parquet() -> Any:
+    return import_extra("pyarrow.parquet", "Parquet files need pyarrow", "aerobat[parquet]", "write CSV")
 
 
 def _storable(column: NDArray[Any]) -> Any:

@@ -12,7 +12,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.errors import Reason
-from aerobat.flatness import force_balance
+from aerobat.flatness.references import force_balance
 from aerobat.limits.quantity import PathQuantity
 from aerobat.problem import Condition, Limits
 from aerobat.problem.condition import ForceBalance

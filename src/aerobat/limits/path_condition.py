@@ -12,7 +12,7 @@ from math import inf
 
 import numpy as np
 
-from aerobat.flatness import has_unequal_drag
+from aerobat.flatness.references import has_unequal_drag
 from aerobat.limits.limit import SMALLEST_SIZE, Asked, Limit
 from aerobat.limits.quantity import PATH_SHAPE, UPRIGHT, PathQuantity
 from aerobat.problem.condition import Condition, ForceBalance, Quantity

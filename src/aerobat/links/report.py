@@ -36,14 +36,8 @@ class LinkReport:
     @property
     def failures(self) -> tuple[str, ...]:
         """All that went wrong, in words."""
-        missed = []
-        if self.nearest is not None and self.nearest.failure is not None:
-            outcome, time, numbers = self.nearest.failure
-            missed.append(outcome.sentence(time=time, **numbers))
-        for passage in self.passages:
-            if passage.failure is not None:
-                outcome, time, numbers = passage.failure
-                missed.append(outcome.sentence(time=time, gate=f"gate '{passage.gate}'", **numbers))
+        judged = (*((self.nearest,) if self.nearest else ()), *self.passages)
+        missed = [each.failure.sentence() for each in judged if each.failure is not None]
         return (*((f"aborted: {self.aborted}",) if self.aborted else ()), *missed)
 
     @property

@@ -18,9 +18,13 @@ from math import isinf, isnan, radians
 from aerobat.environment import Environment
 from aerobat.planning.passages import PlacedStage, planned_passages
 from aerobat.planning.task import Task
-from aerobat.simulation import Flight, FlightConfig, Outcome, fly
-from aerobat.simulation.outcome import DIVERGENCE_RADIUS, length
-from aerobat.simulation.passages import NearestObstacle, Passage, log_rows, nearest_in_log, passages_in_log
+from aerobat.simulation.config import FlightConfig
+from aerobat.simulation.flight import Flight
+from aerobat.simulation.fly import fly
+from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
+from aerobat.simulation.passages.log import log_rows, passages_in_log
+from aerobat.simulation.passages.obstacles import NearestObstacle, nearest_in_log
+from aerobat.simulation.passages.passage import Passage
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -76,8 +80,7 @@ class OwnFlight:
         """All that it does wrong, in words."""
         failed = tuple(passage.failure for passage in self.passages if passage.failure)
         if self.nearest is not None and self.nearest.failure is not None:
-            outcome, time, numbers = self.nearest.failure
-            failed = (*failed, outcome.sentence(time=time, **numbers))
+            failed = (*failed, self.nearest.failure.sentence())
         if self.error <= FLYABLE_ERROR:
             return failed
         allowed = f"{100 * FLYABLE_ERROR:g} cm at most allowed"
@@ -140,15 +143,11 @@ def own_flight(task: Task, trajectory: Trajectory, stages: Sequence[PlacedStage]
 
 def _flown(passage: Passage) -> FlownPassage:
     error, tolerance = radians(passage.attitude_error_deg), radians(passage.attitude_tolerance_deg)
-    failure = ""
-    if passage.failure is not None:
-        outcome, time, numbers = passage.failure
-        failure = outcome.sentence(time=time, gate=f"gate '{passage.gate}'", **numbers)
     return FlownPassage(
         gate=passage.gate,
         attitude_error=None if isnan(error) else error,
         attitude_tolerance=None if isinf(tolerance) else tolerance,
-        failure=failure,
+        failure="" if passage.failure is None else passage.failure.sentence(),
         clearance=None if isnan(passage.clearance) else passage.clearance,
     )
 

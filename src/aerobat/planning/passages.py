@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage, PlannedWaypoint
+from aerobat.certification.envelope import PlannedPassage, PlannedWaypoint
 from aerobat.errors import Reason, SpecError
 from aerobat.flatness import force_balance
 from aerobat.limits.clearance import Clearance

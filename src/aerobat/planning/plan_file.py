@@ -9,7 +9,7 @@ Aerobat that wrote the file. `digest` is the SHA-256 of all of that.
 A file proves nothing: a plan that is read has its certificate, flyability and assessment worked out anew.
 Results that take seconds are taken from the file only where the digest says that nothing was changed.
 
-Schema and version rules are in docs/flight-package.md. `interchange.flight_package` reads it by NumPy alone.
+Schema and version rules are in docs/flight-package.md. `examples/flight_package.py` reads it by NumPy alone.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from aerobat.certification import Envelope
+from aerobat.certification.envelope import Envelope
 from aerobat.environment import Environment
 from aerobat.flatness import force_balance
 from aerobat.limits import Limit, limits_along

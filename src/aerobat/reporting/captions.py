@@ -40,7 +40,8 @@ def score_caption(score: Score) -> str:
 
 def error_caption(flight: Flight) -> str:
     """The largest errors of a flight, or of a batch."""
+    many = f"{len(flight.vehicles)} flights: " if flight.is_batch else ""
     return (
-        f"position error at most {length(float(flight.position_error.max()))}, "
+        f"{many}position error at most {length(float(flight.position_error.max()))}, "
         f"attitude error at most {np.rad2deg(flight.attitude_error.max()):.2f}°"
     )

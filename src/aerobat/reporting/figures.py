@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from aerobat.declaration import validated
-from aerobat.errors import SpecError
 from aerobat.evaluation.score import Score
-from aerobat.planning import Plan
+from aerobat.flatness import vehicle_of
+from aerobat.planning import Plan, Tube
 from aerobat.reporting.captions import error_caption, plan_captions, score_caption
 from aerobat.reporting.page import AXIS, COLUMNS, TITLES, Place, blank_page, heading, house_style, panel
 from aerobat.reporting.panels import timelines
-from aerobat.reporting.panels.clearances import draw_clearance
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
 from aerobat.reporting.panels.stages import draw_stages
+from aerobat.reporting.panels.timelines import draw_clearance
 from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle, as_vehicle
 
@@ -42,31 +42,7 @@ PICTURES_SIDE_BY_SIDE = PictureLayout((0.3, 0.05, 6.1, 6.1), (7.0, 0.5, 4.3, 5.6
 PICTURES_STACKED = PictureLayout((0.3, 3.5, 11.0, 4.0), (0.74, 0.5, 10.53, 2.2), 8.05)
 
 
-@dataclass(frozen=True)
-class FlightLayout:
-    """The places of a flight's picture and its three timelines on a page of their own."""
-
-    path: Place
-    position: Place
-    attitude: Place
-    rotors: Place
-    height: float  # [in] without the head
-
-
-TIMELINES_BESIDE = FlightLayout(
-    path=(0.3, 0.2, 6.1, 6.0),
-    position=(7.1, AXIS + 4.0, 4.2, 1.75),
-    attitude=(7.1, AXIS + 2.0, 4.2, 1.75),
-    rotors=(7.1, AXIS, 4.2, 1.75),
-    height=6.85,
-)
-TIMELINES_BELOW = FlightLayout(
-    path=(0.3, 2.7, 11.0, 4.0),
-    position=(0.68, AXIS, 3.05, 1.6),
-    attitude=(4.5, AXIS, 3.05, 1.6),
-    rotors=(8.3, AXIS, 3.05, 1.6),
-    height=7.3,
-)
+PATH_ALONE = 5.2  # [in] the height of the path of a flight whose plan is not known
 
 
 @validated
@@ -81,33 +57,37 @@ def draw(flight: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str
         plan: What was flown.
         vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
     """
-    if vehicle is None and isinstance(own := plan or flight, Plan):
-        vehicle = own.vehicle
     if isinstance(flight, Plan):
-        if vehicle is None:
-            raise SpecError("vehicle is missing: a plan without one says not what to draw; give vehicle=...")
-        return report_figure(flight, as_vehicle(vehicle))
-    vehicle = as_vehicle(flight.vehicles[0] if vehicle is None else vehicle)
-    actual = actual_poses(flight)
-    reference = reference_poses(flight if plan is None else plan_reference(plan, vehicle))
-    layout = TIMELINES_BELOW if reference.is_flat else TIMELINES_BESIDE
-    title = f"{'flight' if len(actual) == 1 else f'{len(actual)} flights'} of {vehicle.name}"
+        return report_figure(flight, vehicle_of(flight, vehicle))
+    flown_by = as_vehicle(vehicle or (plan and plan.vehicle) or flight.vehicles[0])
     if plan is not None:
-        title = f"{plan.problem.name} · {title}"
-    gates, stages = ((), ()) if plan is None else (plan.problem.gates, plan.stages)
-    pieces = (flight.environment if plan is None else plan.problem.surroundings).pieces.pieces
+        return report_figure(plan, flown_by, flight)
     with house_style():
-        figure = blank_page(layout.height, title, [error_caption(flight)])
-        path = panel(figure, *layout.path)
-        note = draw_path(path, reference, actual, vehicle, gates, stages, pieces=pieces)
-        heading(path, "Path and attitude", note)
-        lines = [panel(figure, *place) for place in (layout.position, layout.attitude, layout.rotors)]
-        timelines.draw_position_error(lines[0], flight)
-        timelines.draw_attitude_error(lines[1], flight)
-        timelines.draw_rotor_thrusts(lines[2], flight.times, flight.thrusts, vehicle)
-        for column in [lines] if layout is TIMELINES_BESIDE else [[axes] for axes in lines]:
-            timelines.finish_column(column, "", stages, float(reference.times[-1]))
+        return _bare_page(flight, flown_by)
+
+
+def _bare_page(flight: Flight, vehicle: Vehicle) -> Figure:
+    """A page on a flight whose plan is not known: path and attitude, errors, rotor thrusts."""
+    foot = AXIS + PITCH + ROW + TITLES
+    many = f"{len(flight.vehicles)} flights" if flight.is_batch else "flight"
+    height = foot + PATH_ALONE + TITLES
+    figure = blank_page(height, f"{many} of {vehicle.name}", [error_caption(flight)])
+    path, pieces = panel(figure, 0.3, foot, 11.0, PATH_ALONE), flight.environment.pieces.pieces
+    reference = reference_poses(flight)
+    note = draw_path(path, reference, actual_poses(flight), vehicle, (), pieces=pieces)
+    heading(path, "Path and attitude", note)
+    errors = [panel(figure, COLUMNS[0], y, WIDTH, ROW) for y in (AXIS + PITCH, AXIS)]
+    _draw_errors(errors, flight)
+    thrusts = panel(figure, COLUMNS[1], AXIS + PITCH, WIDTH, ROW)
+    timelines.draw_rotor_thrusts(thrusts, flight.times, flight.thrusts, vehicle)
+    for column, title in ((errors, "Tracking error"), ([thrusts], "Thrust of each rotor")):
+        timelines.finish_column(column, title, (), float(reference.times[-1]))
     return figure
+
+
+def _draw_errors(panels: Sequence[Axes], flight: Flight, tube: Tube | None = None) -> None:
+    timelines.draw_position_error(panels[0], flight, tube)
+    timelines.draw_attitude_error(panels[1], flight, tube)
 
 
 def report_figure(
@@ -132,8 +112,7 @@ def _flight_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | No
     reference = reference_poses(plan_reference(plan, vehicle))
     figure, rows = _pictures(plan, vehicle, reference, actual_poses(flight), 2, facts)
     errors, thrusts = ([panel(figure, x, y, WIDTH, ROW) for y in rows[:2]] for x in COLUMNS)
-    timelines.draw_position_error(errors[0], flight, plan.tube)
-    timelines.draw_attitude_error(errors[1], flight, plan.tube)
+    _draw_errors(errors, flight, plan.tube)
     timelines.draw_specific_thrust(thrusts[0], plan, vehicle)
     timelines.draw_rotor_thrusts(thrusts[1], flight.times, flight.thrusts, vehicle)
     errors += _clearance_panel(figure, rows[2:], plan, vehicle, reference)

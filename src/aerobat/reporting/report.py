@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 from aerobat.reporting.facts import REPORT, Fact, Facts, facts, kept, said
+from aerobat.studies.share import Trials
 from aerobat.vehicle import implausibilities
-
-if TYPE_CHECKING:  # which takes long to import
-    from aerobat.studies.trials import Trials
 
 PAGES = {  # that explain the lines of a report, by their labels
     "docs/theory.md": (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerobat.engines.components import components, from_components
+from aerobat.engines.pytree import components, from_components
 from aerobat.kernels.rigid_body import Body
 from aerobat.states import BodyState
 

@@ -21,17 +21,16 @@ from aerobat.kernels.rate_loop import RateLoopModel, RateLoopState, RateSetpoint
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.kernels.vectors import subtract
 from aerobat.kernels.wind import WindState
-from aerobat.simulation.loop import Controlling, Estimate, Signals
+from aerobat.simulation.loop import Component, Controlling, Estimate, Signals
 
 MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
 
 
 @dataclass(frozen=True)
-class StateObserver:
+class StateObserver(Component):
     """The true state, as if it were known."""
 
     period: int = 1
-    feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: tuple[()], inputs: tuple[()], signals: Signals) -> Estimate:
         """See `Component.init`."""
@@ -52,7 +51,7 @@ class ControllerParameters(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TrackingController:
+class TrackingController(Component):
     """The tracking controller, told of the body by the observer.
 
     Its reference is an input of its own where its commands come late, else that of the tick.
@@ -60,7 +59,6 @@ class TrackingController:
 
     flags: FeatureFlags
     period: int = 1
-    feedthrough: bool = True
 
     def init(
         self,
@@ -154,14 +152,11 @@ class CommandsOnTheirWay(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ComputationDelay:
+class ComputationDelay(Component):
     """The controller's commands, which take effect a while after they are asked for.
 
     Its input is 1 at the ticks at which the latest ones do, which may be those of the controller's next.
     """
-
-    period: int = 1
-    feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: tuple[()], takes_effect: Scalar, signals: Signals
@@ -207,11 +202,10 @@ class PlantParameters(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RigidBodyPlant:
+class RigidBodyPlant(Component):
     """Rigid body and rotors under held commands, each tick in so many steps of RK4."""
 
     substeps: int
-    period: int = 1
     feedthrough: bool = False
 
     @classmethod
@@ -239,11 +233,8 @@ class RigidBodyPlant:
 
 
 @dataclass(frozen=True)
-class RateLoop:
+class RateLoop(Component):
     """The inner loop of a flight controller, on its own gyro, behind a law that gives it rates and thrust."""
-
-    period: int = 1
-    feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: RateLoopModel, inputs: tuple[()], signals: Signals) -> RateLoopState:
         """See `Component.init`."""

@@ -28,8 +28,7 @@ from aerobat.environment import Environment
 from aerobat.environment.obstacles import OBSTACLES, Obstacle
 from aerobat.errors import OutOfRange, SpecError
 from aerobat.problem.gate import Gate, GateWall
-from aerobat.simulation.contact import Contact
-from aerobat.simulation.outcome import Outcome, counted
+from aerobat.simulation.outcome import Contact, Outcome, counted
 from aerobat.states import BodyState, FlatState, Setpoint, Wrench
 from aerobat.storage import format_of, read_arrays, whole_file
 

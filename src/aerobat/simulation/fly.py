@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array
 from aerobat.declaration import validated
 from aerobat.engines import logged_ticks
-from aerobat.engines.components import from_components
-from aerobat.engines.pytree import tree_map, tree_stack
+from aerobat.engines.pytree import from_components, tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.flatness import Planned
 from aerobat.problem.gate import Gate

@@ -38,13 +38,12 @@ class LawState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LawController:
+class LawController(Component):
     """A control law, told of the body by the observer; its input is as that of the tracking controller."""
 
     law: ControlLaw
     flags: FeatureFlags  # of the way from its force and moment to the rotors
     period: int = 1
-    feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals

@@ -124,10 +124,12 @@ class Component(Protocol):
     @property
     def period(self) -> int:
         """The ticks from one step to the next."""
+        return 1
 
     @property
     def feedthrough(self) -> bool:
         """True if its new state is seen at the tick of its step, false if at the next."""
+        return True
 
     def init(self, ops: Ops, parameters: Tree, inputs: Tree, signals: Signals) -> Tree:
         """The state before the first tick; of the components, signals hold those before it in order."""

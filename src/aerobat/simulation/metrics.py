@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage, PlannedWaypoint
-from aerobat.engines.components import components
-from aerobat.engines.numpy import ArrayOps
-from aerobat.engines.pytree import Tree, tree_leaves, tree_map
+from aerobat.engines.floats import ArrayOps
+from aerobat.engines.pytree import Tree, components, tree_leaves, tree_map
 from aerobat.environment import Environment
 from aerobat.kernels import running_metrics
 from aerobat.kernels.gates import approach, pointing, progress
@@ -30,17 +29,12 @@ from aerobat.kernels.running_metrics import (
 )
 from aerobat.simulation.components import rotor_commands
 from aerobat.simulation.flight import Flight
-from aerobat.simulation.loop import Signals
+from aerobat.simulation.loop import Component, Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, LANDING_DEPTH, LANDING_SPEED, TOUCHDOWN, Outcome
-from aerobat.simulation.passages import (
-    PlannedAttitude,
-    attitude_direction,
-    bounding_ellipsoid,
-    gate_places,
-    log_rows,
-    scan_log,
-    waypoint_target,
-)
+from aerobat.simulation.passages.log import log_rows, scan_log
+from aerobat.simulation.passages.passage import bounding_ellipsoid, gate_places
+from aerobat.simulation.passages.stage_attitude import PlannedAttitude, attitude_direction
+from aerobat.simulation.passages.waypoint import waypoint_target
 from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle import Ellipsoid
 
@@ -57,11 +51,8 @@ class Criteria(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MetricsMonitor:
+class MetricsMonitor(Component):
     """The loop's component that adds up a flight's metrics."""
-
-    period: int = 1
-    feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: MetricsParameters, inputs: MetricsInput, signals: Signals

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
-from enum import Enum
+from collections.abc import Iterable, Mapping
+from enum import Enum, IntEnum
+from types import MappingProxyType
+from typing import NamedTuple
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
 TOUCHDOWN = 1e-3  # [m] below the ground that is no hit: paths that land end on it
@@ -14,6 +16,15 @@ LANDING_SPEED = 2.0  # [m/s] that of a fall from 20 cm, which a landing gear tak
 LANDING_DEPTH = 0.1  # [m] the tolerance of places
 NO_LENGTH = 1e-6  # [m] less is rounding
 FEW_DECIMALS = 0.095  # what rounds to less than 0.10 has no two digits in two decimals
+
+
+class Contact(IntEnum):
+    """The object that a vehicle touches: of several, an obstacle before a gate before the ground."""
+
+    NOTHING = 0
+    GROUND = 1
+    GATE = 2
+    OBSTACLE = 3
 
 
 def length(metres: float) -> str:
@@ -74,17 +85,18 @@ class Outcome(Enum):
         """True where nothing went wrong."""
         return self in (Outcome.COMPLETE, Outcome.THROUGH_GATES)
 
-    @property
-    def is_miss(self) -> bool:
-        """True where a gate was not passed."""
-        return self in (
-            Outcome.MISSED_GATE,
-            Outcome.BACKWARDS,
-            Outcome.SHORT_OF_GATE,
-            Outcome.STOPPED_IN_GATE,
-            Outcome.EARLY,
-        )
-
     def sentence(self, **numbers: object) -> str:
         """The sentence with its numbers."""
         return self.value.format(**{"radius": DIVERGENCE_RADIUS, **numbers})
+
+
+class FlightFailure(NamedTuple):
+    """A mistake of one flight, and when it happened."""
+
+    time: float  # [s]
+    outcome: Outcome
+    numbers: Mapping[str, object] = MappingProxyType({})  # of its sentence
+
+    def sentence(self, **others: object) -> str:
+        """The outcome with its numbers."""
+        return self.outcome.sentence(**{"time": self.time, **self.numbers, **others})

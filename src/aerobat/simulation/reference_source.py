@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.engines.components import components
 from aerobat.engines.engine import read_only
-from aerobat.engines.pytree import Tree, tree_map
+from aerobat.engines.pytree import Tree, components, tree_map
 from aerobat.environment import Environment
-from aerobat.flatness import axial_drag, force_balance, has_unequal_drag, reference
+from aerobat.flatness.references import axial_drag, force_balance, has_unequal_drag, reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.simulation.flight import setpoint_rows
 from aerobat.simulation.loop import Due, StepClock

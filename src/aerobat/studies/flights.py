@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
@@ -10,14 +11,20 @@ import numpy as np
 from aerobat.control import ControlLaw, Controller
 from aerobat.engines import choose
 from aerobat.environment import Dispersion
-from aerobat.evaluation import Score, score_flights
+from aerobat.evaluation.score import Score
+from aerobat.evaluation.score_flights import score_flights
 from aerobat.planning import Plan
 from aerobat.simulation import FlightConfig
-from aerobat.studies.workers import Pool
+from aerobat.studies.share import Share, Trials
+from aerobat.studies.workers import Pool, pool
 from aerobat.vehicle import Vehicle
 
 CHUNK = 50  # flights that are flown, kept and resumed as one, whatever the batches and the workers
 TOGETHER = 10  # chunks at most that a worker is handed at once: a quarter of a second of flying
+# after so many flights their share is looked at, and as soon as it decides no more are flown. Each look errs
+# with 2.5 % at most, all of them together with 4 % where 95 % succeed, with 0.6 % where 94 % do; where 98 %
+# succeed, 340 flights are flown on average, and 3 of 1000 plans stay undecided
+LOOKS = (100, 200, 400, 800)
 
 
 @dataclass(frozen=True)
@@ -46,17 +53,37 @@ def cut(flights: range, size: int = CHUNK) -> list[range]:
     return [flights[first : first + size] for first in range(0, len(flights), size)]
 
 
-def fly_scores(pool: Pool, tasks: tuple[FlightTask, ...], flights: range) -> list[Score]:
+def fly_scores(flying: Pool, tasks: tuple[FlightTask, ...], flights: range) -> list[Score]:
     """Score the same flights of each task.
 
     Args:
-        pool: What flies them.
+        flying: What flies them.
         tasks: What is flown.
         flights: Their numbers.
     """
     parts = [(k, numbers) for k in range(len(tasks)) for numbers in cut(flights)]
-    found = dict(pool.results(_score_chunk, tasks, parts, together=TOGETHER, compiles=True))
+    found = dict(flying.results(_score_chunk, tasks, parts, together=TOGETHER, compiles=True))
     return [_joined([found[k, numbers] for numbers in cut(flights)]) for k in range(len(tasks))]
+
+
+def fly_trials(task: FlightTask, progress: Callable[[int, int], None] | None = None) -> Trials:
+    """Fly until it is decided whether enough of all flights succeed, or the flights of all LOOKS are flown.
+
+    Args:
+        task: What is flown, and under which conditions.
+        progress: Called with the flights done, and of them those that succeeded.
+    """
+    flown = succeeded = 0
+    with pool(1, None, 1) as flying:  # hundreds of flights are over before another process has begun
+        for look in LOOKS:
+            (scores,) = fly_scores(flying, (task,), range(flown, look))
+            flown, succeeded = look, succeeded + int(scores.succeeded.sum())
+            if progress is not None:
+                progress(flown, succeeded)
+            trials = Trials(task.conditions, task.seed, Share(succeeded, flown))
+            if trials.proven or trials.refuted:
+                break
+    return trials
 
 
 def _score_chunk(tasks: tuple[FlightTask, ...], part: tuple[int, range]) -> Score:

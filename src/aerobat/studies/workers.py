@@ -22,7 +22,6 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from importlib import import_module
 from multiprocessing.connection import Connection
 from typing import Annotated, Any, TypeVar
 
@@ -30,8 +29,8 @@ from pydantic import Field, PlainValidator
 
 from aerobat.declaration import FieldError, shown
 from aerobat.declaration.registry import import_plugin, imported_plugins
-from aerobat.engines.cores import available_cores
-from aerobat.errors import BackendMissing, SpecError
+from aerobat.engines.engine import available_cores
+from aerobat.errors import SpecError, import_extra
 from aerobat.provenance import installed_versions
 
 MAX_WORKERS = 4096
@@ -206,11 +205,7 @@ def pool(
 @contextmanager
 def _dask_pool(address: str) -> Iterator[Pool]:
     """The workers of a scheduler."""
-    try:
-        dask: Any = import_module("distributed")
-    except ImportError:
-        remedy = 'pip install "aerobat[cluster]"'
-        raise BackendMissing(f"workers {address} need dask.distributed; install it with {remedy}") from None
+    dask = import_extra("distributed", f"workers {address} need dask.distributed", "aerobat[cluster]")
     try:
         client = dask.Client(address.replace("dask://", "tcp://"), timeout=_CONNECTING, set_as_default=False)
     except OSError:

@@ -1,9 +1,8 @@
 """Position over time: piecewise polynomials, their extrema, and those of minimum effort."""
 
-from aerobat.trajectory.carrier import Carrier, HasTrajectory, as_trajectory
 from aerobat.trajectory.files import load_trajectory, save_trajectory
 from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
-from aerobat.trajectory.piecewise import Extremum, Trajectory
+from aerobat.trajectory.piecewise import Carrier, Extremum, HasTrajectory, Trajectory, as_trajectory
 
 __all__ = [
     "Carrier",

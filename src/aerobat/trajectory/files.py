@@ -7,8 +7,7 @@ import numpy as np
 from aerobat.declaration import PathName, validated
 from aerobat.errors import SpecError
 from aerobat.storage import format_of, read_arrays, whole_file
-from aerobat.trajectory.carrier import Carrier, as_trajectory
-from aerobat.trajectory.piecewise import Trajectory
+from aerobat.trajectory.piecewise import Carrier, Trajectory, as_trajectory
 
 _FORMAT = "aerobat-trajectory-2"
 _WITHOUT_HEADING = "aerobat-trajectory-1"  # read with heading 0

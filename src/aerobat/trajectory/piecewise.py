@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from aerobat.arrays import Array, frozen, numbers
-from aerobat.declaration import Angle, FieldError, Positive, by_value, short, shown, validated
+from aerobat.declaration import AS_IT_IS, Angle, FieldError, Positive, by_value, short, shown, validated
 from aerobat.errors import SpecError
 from aerobat.states import FlatState
 from aerobat.trajectory import polynomial
@@ -23,6 +23,23 @@ MAX_MAGNITUDE = 1e30  # [m/s^k] of a derivative up to snap: products of several 
 MAX_DURATION = 1e6  # [s], eleven days
 MAX_SAMPLES = 10_000_000
 KNOT_TOLERANCE = 1e-12  # [s], a time that misses a knot by rounding is meant to be on it
+
+
+@runtime_checkable
+class HasTrajectory(Protocol):
+    """A plan as far as its path goes."""
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The trajectory."""
+
+
+Carrier = Annotated[HasTrajectory, AS_IT_IS, Field(description="plan")]
+
+
+def as_trajectory(flown: Trajectory | HasTrajectory) -> Trajectory:
+    """The trajectory, of itself or of a plan."""
+    return flown if isinstance(flown, Trajectory) else flown.trajectory
 
 
 @dataclass(frozen=True)

@@ -10,18 +10,9 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from aerobat.arrays import Array
-from aerobat.declaration import (
-    FieldError,
-    Finite,
-    NonNegative,
-    Positive,
-    Vector3,
-    declared,
-    finite,
-    number,
-    shown,
-    within_field,
-)
+from aerobat.declaration.declared import declared
+from aerobat.declaration.field_types import Finite, NonNegative, Positive, Vector3, finite, number
+from aerobat.declaration.sentences import FieldError, shown, within_field
 
 RAD_PER_S = 2 * pi / 60  # one revolution a minute
 WITH_TORQUE = 3  # columns of a thrust curve that has them

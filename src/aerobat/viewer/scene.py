@@ -15,7 +15,7 @@ from aerobat.environment.obstacles.shown import surfaces_around
 from aerobat.environment.obstacles.surface import Surface
 from aerobat.errors import SpecError
 from aerobat.evaluation.score import score
-from aerobat.flatness import reference
+from aerobat.flatness import reference, vehicle_of
 from aerobat.planning import PlacedStage, Plan
 from aerobat.problem.gate import Gate
 from aerobat.simulation import Flight
@@ -100,19 +100,14 @@ def scene_of(
         poses: How many are shown at most, of all flights together.
     """
     if isinstance(shown, Plan):
-        own = shown.vehicle if vehicle is None else as_vehicle(vehicle)
-        if own is None:
-            raise SpecError("vehicle is missing: a plan without one says not what to show; give vehicle=...")
-        return _plan_scene(shown, own)
+        return _plan_scene(shown, vehicle_of(shown, vehicle))
     if not shown.vehicles:
         raise SpecError(
             "the batch holds no flights, so that there is nothing to show; fly one vehicle or more"
         )
     if len(shown.times) < 2:
         raise SpecError("the flight has one row, so that nothing moves; show one of two rows or more")
-    if vehicle is None and plan is not None:
-        vehicle = plan.vehicle
-    own = as_vehicle(shown.vehicles[0] if vehicle is None else vehicle)
+    own = as_vehicle(vehicle or (plan and plan.vehicle) or shown.vehicles[0])
     if shown.thrusts.shape[-1] != len(own.rotors):
         rotors = f"{shown.thrusts.shape[-1]} rotors, {own.name} has {len(own.rotors)}"
         raise SpecError(f"vehicle: the flight is one of {rotors}; name the vehicle that flew")

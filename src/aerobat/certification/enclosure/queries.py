@@ -11,7 +11,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Finding, Side, Verdict
 from aerobat.certification.enclosure.extrema import SeriesBatch, enclose_maximum
-from aerobat.limits import Limit
+from aerobat.limits.limit import Limit
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.subintervals import Subintervals
 

@@ -10,7 +10,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.certification import Certificate, Envelope, certify
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import POSITIVE, VehicleOptions, limiting
 from aerobat.cli.runs.record import default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle

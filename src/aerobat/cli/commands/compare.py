@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import OutputOptions, TaskOptions, Workers, planning
+from aerobat.cli.options import TaskOptions, Workers, planning
 from aerobat.cli.progress import planning_progress
-from aerobat.cli.runs.folder import written
+from aerobat.cli.runs.folder import finish_study
 from aerobat.cli.runs.record import RunRecord
 from aerobat.cli.tasks import read_task
-from aerobat.reporting.comparison import comparison_figure
-from aerobat.reporting.page import png
-from aerobat.reporting.plain_data import to_json
-from aerobat.reporting.tables import table
 from aerobat.studies.compare import Comparison
 from aerobat.studies.compare import compare as compare_planners
 
-COMPARISON = "compare.json"
 WORKERS = (
     "The number of processes that plan side by side, or a Dask scheduler as dask://HOST:PORT. By default "
     "one, where no planner slows another down."
@@ -57,7 +51,7 @@ def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")
         time_limit=options.time_limit,
         plugins=tuple(map(str, options.plugins)),
     )
-    finish_comparison(comparison_of(record, options.workers), record, options)
+    finish_study(comparison_of(record, options.workers), record, options)
 
 
 def comparison_of(record: RunRecord, workers: str = "1") -> Comparison:
@@ -76,15 +70,3 @@ def comparison_of(record: RunRecord, workers: str = "1") -> Comparison:
             time_limit=record.time_limit,
             workers=workers,
         )
-
-
-def finish_comparison(comparison: Comparison, record: RunRecord, options: OutputOptions) -> None:
-    """Write a comparison, then show it."""
-    facts = to_json(comparison)
-    picture = png(comparison_figure(comparison))
-
-    def write(staging: Path) -> None:
-        (staging / COMPARISON).write_text(facts + "\n", encoding="utf-8")
-        (staging / "compare.png").write_bytes(picture)
-
-    written(record, options, write, facts, table(comparison))

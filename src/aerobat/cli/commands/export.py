@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import POSITIVE, RunOptions, output
 from aerobat.cli.terminal import print_json, say
 from aerobat.errors import SpecError
@@ -47,7 +47,7 @@ def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -
     --to crazyflie   pieces for the Crazyflie's memory, and the CSV that Crazyswarm reads (a folder)
     --to ros1-bag    messages for ROS 1, with markers for RViz; ros2-bag (a folder) and mcap for ROS 2
     --to px4         set-points of attitude, rates, thrust and path in PX4's axes (a folder)
-    --to blender     an animated scene, glTF, for Blender and other 3D programs
+    --to blender     an animated scene, glTF; for Blender and other 3D programs
     --to mujoco      a model for MuJoCo, with a keyframe a row
 
     Parameters

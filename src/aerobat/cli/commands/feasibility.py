@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import prod
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
-from aerobat.cli.feasibility_options import FeasibilityOptions
-from aerobat.cli.options import OutputOptions
+from aerobat.cli.options import OutputOptions, PlannerOptions, Workers, output, planning
 from aerobat.cli.progress import Progress, showing
-from aerobat.cli.runs.folder import is_of_a_run, written
-from aerobat.cli.runs.record import FlightSettings, RunRecord
+from aerobat.cli.runs.folder import finish_study, is_of_a_run
+from aerobat.cli.runs.record import DEFAULT_TOLERANCE, FlightSettings, RunRecord
 from aerobat.cli.tasks import make_planner, read_task
 from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.reporting.feasibility.facts import requirements
-from aerobat.reporting.feasibility.figure import map_figure
-from aerobat.reporting.page import png
-from aerobat.reporting.plain_data import to_json
-from aerobat.reporting.tables import table
 from aerobat.storage import require_replaceable
 from aerobat.studies.feasibility import (
     Axis,
@@ -32,7 +28,41 @@ from aerobat.studies.feasibility import (
 )
 from aerobat.studies.feasibility.probe import TIME_LIMIT
 
-NEED = "need.json"
+
+@dataclass(frozen=True, kw_only=True)
+class FeasibilityOptions(PlannerOptions):
+    """Options of a map of what is feasible, and of a search for the least."""
+
+    over: Annotated[tuple[str, ...], Parameter(group=planning, negative="", show_default=False)] = ()
+    """A field and its values, FIRST:LAST:STEP or values between commas, as angle=0:90:10; once or twice.
+    Fields have the names of files, as limits.velocity, gate.width, vehicle.mass, or speed where no other
+    field ends so; angle is the tilt of a half-flip's gate."""
+
+    least: Annotated[
+        tuple[Literal["thrust-to-weight", "ceiling", "gate", "gate-height"], ...],
+        Parameter(group=planning, negative="", show_default=False),
+    ] = ()
+    """The quantity whose least value is sought, once or more often. Default: all that the problem has, but
+    gate-height, which makes slits of openings."""
+
+    tolerance: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=1e-4, lte=0.5))] = (
+        DEFAULT_TOLERANCE
+    )
+    """Between the least and the refusal beside it, as a part of the least."""
+
+    workers: Annotated[str | None, Workers(group=planning)] = None
+
+    table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
+    """The form of a map's table, map.csv or map.parquet; the latter needs aerobat[parquet]."""
+
+    def require_one(self) -> None:
+        """Raise SpecError for options of a map and of a search for the least together."""
+        of_least = {"--least": bool(self.least), "--tolerance": self.tolerance != DEFAULT_TOLERANCE}
+        for flag, is_given in of_least.items():
+            if self.over and is_given:
+                raise SpecError(f"{flag} finds the least, --over maps; leave one of them out")
+        if self.table != "csv" and not self.over:
+            raise SpecError("--table is for a map; add --over, or leave it out")
 
 
 def feasibility(
@@ -107,15 +137,8 @@ def map_of(record: RunRecord, workers: str | None = None) -> FeasibilityMap:
 
 def finish_map(found: FeasibilityMap, record: RunRecord, options: OutputOptions) -> None:
     """Write a map, then show it."""
-    facts = to_json(found)
-    picture = png(map_figure(found))
-
-    def write(staging: Path) -> None:
-        write_table(found.table, staging / f"map.{record.flight.table}")
-        (staging / "map.json").write_text(facts + "\n", encoding="utf-8")
-        (staging / "map.png").write_bytes(picture)
-
-    written(record, options, write, facts, table(found))
+    name = f"map.{record.flight.table}"
+    finish_study(found, record, options, lambda staging: write_table(found.table, staging / name))
 
 
 def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement, ...]:
@@ -143,14 +166,11 @@ def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement,
 
 
 def finish_need(found: Sequence[Requirement], record: RunRecord, options: OutputOptions) -> None:
-    """Write what is needed, then show it."""
-    told = requirements(record.problem.name, record.vehicle.name, found)
-    facts = to_json(told)
+    """Write what is needed with its plans, then show it."""
 
-    def write(staging: Path) -> None:
-        (staging / NEED).write_text(facts + "\n", encoding="utf-8")
+    def write_plans(staging: Path) -> None:
         for each in found:
             if each.plan is not None:
                 each.plan.save(staging / f"{record.problem.name}-{each.quantity}.plan")
 
-    written(record, options, write, facts, table(told))
+    finish_study(requirements(record.problem.name, record.vehicle.name, found), record, options, write_plans)

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ExplainingOptions, FlyingOptions, PlanningOptions
 from aerobat.cli.runs.folder import BLACKBOX, Flown, finish
 from aerobat.cli.runs.record import FlightSettings

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from aerobat.cli.inspect_options import InspectOptions
+from aerobat.cli.options import VehicleOptions, output
 from aerobat.cli.runs.folder import FLIGHT, INSPECTION
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import print_json
@@ -24,6 +25,17 @@ from aerobat.storage import write_whole
 from aerobat.studies.inspection import inspect_flight
 
 CSV = ".csv"  # a log of another system
+
+
+@dataclass(frozen=True, kw_only=True)
+class InspectOptions(VehicleOptions):
+    """Options of an inspection: what a log is held against, and where its picture goes."""
+
+    plan: Annotated[Path | None, Parameter(group=output)] = None
+    """The flight's plan, a .plan file or its folder. Default: the one beside the log."""
+
+    figure: Annotated[Path | None, Parameter(group=output)] = None
+    """The picture's file. Default: inspect.png in the log's folder."""
 
 
 def inspect(log: Path, options: Annotated[InspectOptions, Parameter(name="*")] = InspectOptions()) -> None:

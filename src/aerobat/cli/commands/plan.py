@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ConditionsOptions, ExplainingOptions, PlanningOptions
 from aerobat.cli.runs.folder import finish
 from aerobat.cli.runs.record import FlightSettings

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
-from numpy.typing import NDArray
 
-from aerobat.cli.commands.compare import COMPARISON, comparison_of, finish_comparison
-from aerobat.cli.commands.feasibility import NEED, finish_map, finish_need, map_of, need_of
+from aerobat.cli.commands.compare import comparison_of
+from aerobat.cli.commands.feasibility import finish_map, finish_need, map_of, need_of
 from aerobat.cli.commands.fly import flown
 from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ExplainingOptions, OutputOptions, output
-from aerobat.cli.runs.folder import FLIGHT, finish
+from aerobat.cli.runs.folder import FLIGHT, finish, finish_study
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
@@ -27,8 +27,6 @@ from aerobat.planning import Plan, with_explanation
 from aerobat.reporting.feasibility.facts import requirements
 from aerobat.reporting.plain_data import plain
 from aerobat.simulation import Flight, load_flight
-
-SAME = ("planner", "duration_s")  # of a comparison's rows: times of the clock are not
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,62 +55,77 @@ def repeat(
     record = read_record(folder)
     out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")
     options = replace(options, out=out)
-    if record.command == "compare":
-        return _repeat_comparison(folder, record, options)
-    if record.command == "sweep":
-        return _repeat_sweep(folder, record, options)
-    if record.command == "map":
-        return _repeat_map(folder, record, options)
-    if record.command == "need":
-        return _repeat_need(folder, record, options)
-    old = _Run.read(folder, record)
+    if record.command in STUDIES:
+        old, again = STUDIES[record.command](folder, record, options)
+        names = [name for name, value in again.items() if not _same(value, old.get(name))]
+        return _told(folder, record, f"{', '.join(names)} differ" if names else "", ExitCode.WELL)
+    run = _Run.read(folder, record)
     if record.planner is not None:
         plan = plan_of(record, options.explain)
     else:
-        plan = with_explanation(old.plan) if options.explain else old.plan
-    again = flown(plan, record.flight) if record.command == "fly" else None
-    code = finish(plan, record, options, again, options.explain)
-    return _told(folder, record, old.difference(_Run(plan, again.flight if again else None)), code)
+        plan = with_explanation(run.plan) if options.explain else run.plan
+    flight = flown(plan, record.flight) if record.command == "fly" else None
+    code = finish(plan, record, options, flight, options.explain)
+    return _told(folder, record, run.difference(_Run(plan, flight.flight if flight else None)), code)
 
 
-def _repeat_comparison(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
-    try:
-        old = [[row[name] for name in SAME] for row in read_json(folder / COMPARISON)["planners"]]
-    except (SpecError, TypeError, KeyError):
-        raise SpecError(f"{folder}/ has no {COMPARISON} that can be read; compare anew") from None
+Compared = tuple[Mapping[str, Any], Mapping[str, Any]]  # what lies in a folder, and what came again, by names
+
+
+def _repeat_comparison(folder: Path, record: RunRecord, options: RepeatOptions) -> Compared:
+    old = _there(folder / "compare.json")
     comparison = comparison_of(record)
-    rows = [[row[name] for name in SAME] for row in plain(comparison)["planners"]]
-    finish_comparison(comparison, record, options)
-    return _told(folder, record, "" if rows == old else "durations are others", ExitCode.WELL)
+    finish_study(comparison, record, options)
+    return _durations(old), _durations(plain(comparison))
 
 
-def _repeat_sweep(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
+def _repeat_sweep(folder: Path, record: RunRecord, options: RepeatOptions) -> Compared:
     old = read_table(folder / table_name(record.flight))
     plan = _Run.read(folder, record).plan if record.planner is None else plan_of(record)
     swept = sweep_of(plan, record, options)
-    names = [name for name, column in swept.table.items() if not _same(column, old.get(name, np.zeros(0)))]
     finish_sweep(swept, record, options)
-    return _told(folder, record, f"flights differ in {', '.join(names)}" if names else "", ExitCode.WELL)
+    return old, swept.table
 
 
-def _repeat_map(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
+def _repeat_map(folder: Path, record: RunRecord, options: RepeatOptions) -> Compared:
     old = read_table(folder / f"map.{record.flight.table}")
     found = map_of(record)
-    names = [name for name, column in found.table.items() if not _same(column, old.get(name, np.zeros(0)))]
     finish_map(found, record, options)
-    return _told(folder, record, f"cells differ in {', '.join(names)}" if names else "", ExitCode.WELL)
+    return old, found.table
 
 
-def _repeat_need(folder: Path, record: RunRecord, options: RepeatOptions) -> ExitCode:
-    try:
-        old = read_json(folder / NEED)
-    except SpecError:
-        raise SpecError(f"{folder}/ has no {NEED} that can be read; search anew") from None
+def _repeat_need(folder: Path, record: RunRecord, options: RepeatOptions) -> Compared:
+    old = _there(folder / "need.json")
     found = need_of(record)
     finish_need(found, record, options)
-    again = plain(requirements(record.problem.name, record.vehicle.name, found))
-    difference = "" if again == old else "what is needed is another"
-    return _told(folder, record, difference, ExitCode.WELL)
+    return old, plain(requirements(record.problem.name, record.vehicle.name, found))
+
+
+STUDIES = {
+    "compare": _repeat_comparison,
+    "sweep": _repeat_sweep,
+    "map": _repeat_map,
+    "need": _repeat_need,
+}
+
+
+def _there(file: Path) -> Any:
+    """Read a study's facts. Raises SpecError where none are there."""
+    try:
+        return read_json(file)
+    except SpecError:
+        raise SpecError(f"{file.parent}/ has no {file.name} that can be read; run anew") from None
+
+
+def _durations(told: Any) -> Mapping[str, Any]:
+    """The durations of a comparison's plans: times of the clock are others whenever it is repeated."""
+    try:
+        return {
+            f"the duration by {row['planner']} {k}": row["duration_s"]
+            for k, row in enumerate(told["planners"])
+        }
+    except (TypeError, KeyError):
+        raise SpecError("compare.json is no comparison; compare anew") from None
 
 
 def _told(folder: Path, record: RunRecord, difference: str, code: ExitCode) -> ExitCode:
@@ -154,5 +167,7 @@ class _Run:
         return f"the plan is the same, the flight's {', '.join(names)} are not" if names else ""
 
 
-def _same(a: NDArray[Any], b: NDArray[Any]) -> bool:
-    return a.shape == b.shape and a.tobytes() == b.tobytes()
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray):
+        return isinstance(b, np.ndarray) and a.shape == b.shape and a.tobytes() == b.tobytes()
+    return bool(a == b)

@@ -10,7 +10,6 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from aerobat.cli.options import output
-from aerobat.cli.runs.new_file import write_new
 from aerobat.cli.runs.saved_plans import named_vehicle
 from aerobat.cli.terminal import say
 from aerobat.declaration import unknown_name
@@ -21,6 +20,7 @@ from aerobat.problem import Problem, load_problem, problem_names, problem_text
 from aerobat.reporting.facts import Fact, Facts
 from aerobat.reporting.tables import print_table, table
 from aerobat.reporting.vehicles import vehicle_row
+from aerobat.storage import write_whole
 from aerobat.vehicle import Vehicle, load_vehicle, vehicle_names, vehicle_text
 
 OF_VEHICLES, OF_PROBLEMS = (
@@ -99,3 +99,10 @@ def _text(name: str) -> str:
     else:
         named_vehicle(name)
     return found.toml()
+
+
+def write_new(text: str, out: Path) -> None:
+    """Write a text to a file that is not there yet. Raises SpecError where there is one."""
+    if out.exists():
+        raise SpecError(f"--out {out} is there already; name a new file")
+    write_whole(out, text)

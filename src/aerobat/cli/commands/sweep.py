@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,23 +13,75 @@ from cyclopts import Parameter
 
 from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, Workers, flying, output
 from aerobat.cli.progress import Progress, showing
-from aerobat.cli.runs.folder import is_of_a_run, written
-from aerobat.cli.runs.record import FlightSettings, RunRecord
-from aerobat.cli.runs.unfinished import Unfinished
+from aerobat.cli.runs.folder import finish_study, is_of_a_run
+from aerobat.cli.runs.record import RECORD, FlightSettings, RunRecord, read_record, write_record
 from aerobat.cli.tasks import plan_of, planned
 from aerobat.cli.terminal import say
 from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
+from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
-from aerobat.planning import Plan
-from aerobat.reporting.page import png
-from aerobat.reporting.plain_data import to_json
-from aerobat.reporting.sweeps.figure import sweep_figure
-from aerobat.reporting.tables import table
+from aerobat.planning import Plan, load_plan
 from aerobat.storage import require_replaceable
-from aerobat.studies.sweep import Sweep
-from aerobat.studies.sweep import sweep as sweep_plan
+from aerobat.studies.sweep.kept import finished_flights
+from aerobat.studies.sweep.result import Sweep
+from aerobat.studies.sweep.sweep import sweep as sweep_plan
 from aerobat.studies.workers import WorkerEnded
+
+PLAN = "sweep.plan"
+
+
+@dataclass(frozen=True)
+class Unfinished:
+    """The folder of an unfinished sweep, beside the one that it is for."""
+
+    folder: Path
+
+    @classmethod
+    def beside(cls, folder: Path) -> Unfinished:
+        """Return the unfinished sweep beside the folder that the sweep is to be written to."""
+        return cls(folder.with_name(f"{folder.name}-unfinished"))
+
+    @property
+    def flights(self) -> Path:
+        """The folder of the finished flights."""
+        return self.folder / "flights"
+
+    @property
+    def finished(self) -> int:
+        """The number of finished flights that are kept."""
+        return finished_flights(self.flights)
+
+    def plan(self, record: RunRecord, make: Callable[[RunRecord], Plan]) -> Plan:
+        """The plan of a sweep, kept or new; new ones are kept.
+
+        Args:
+            record: Of the sweep.
+            make: Plans.
+
+        Raises SpecError where the flights are those of another sweep.
+        """
+        if all(os.path.exists(self.folder / name) for name in (RECORD, PLAN)):
+            if _without_runs(read_record(self.folder)) != _without_runs(record):
+                raise SpecError(
+                    f"{self.folder}/ keeps the flights of an unfinished sweep with other settings; repeat "
+                    "those to finish it, remove it, or give another --out"
+                )
+            return load_plan(self.folder / PLAN)
+        found = make(record)
+        found.save(self.folder / PLAN)
+        write_record(record, self.folder)
+        return found
+
+    def remove(self) -> None:
+        """Remove what a sweep needs no longer."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _without_runs(record: RunRecord) -> RunRecord:
+    """The record without what changes no flight."""
+    flight = replace(record.flight, runs=1, table="csv")
+    return replace(record, flight=flight, versions={})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,15 +176,11 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: str
 
 
 def finish_sweep(sweep: Sweep, record: RunRecord, options: OutputOptions) -> None:
-    """Write a sweep, then show it."""
-    facts = to_json(sweep)
-    picture = png(sweep_figure(sweep))
+    """Write a sweep with its plan and its table, then show it."""
 
-    def write(staging: Path) -> None:
+    def write_others(staging: Path) -> None:
         sweep.plan.save(staging / f"{sweep.plan.problem.name}.plan")
         write_table(sweep.table, staging / table_name(record.flight))
-        (staging / "sweep.json").write_text(facts + "\n", encoding="utf-8")
-        (staging / "sweep.png").write_bytes(picture)
 
-    written(record, options, write, facts, table(sweep))
+    finish_study(sweep, record, options, write_others)
     Unfinished.beside(options.out or record.folder).remove()

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.interrupts import end_interrupts
 from aerobat.cli.options import (
     FlightsOptions,

@@ -7,19 +7,23 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from rich.console import Group
 
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.interrupts import end_interrupts
 from aerobat.cli.options import OutputOptions
-from aerobat.cli.runs.record import RECORD, RunRecord, write_record
+from aerobat.cli.progress import Progress, showing
+from aerobat.cli.runs.record import RECORD, USUAL_CONDITIONS, RunRecord, write_record
 from aerobat.cli.terminal import print_json
+from aerobat.control import named_controller
+from aerobat.environment import load_dispersion
+from aerobat.errors import SpecError
 from aerobat.evaluation import Score
 from aerobat.interchange.columns import write_columns
 from aerobat.planning import Plan
-from aerobat.reporting.facts import EXPLAIN, REPORT
+from aerobat.reporting.facts import EXPLAIN, REPORT, picture
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.page import import_undocumented, png
 from aerobat.reporting.plain_data import to_json
@@ -27,9 +31,7 @@ from aerobat.reporting.report import Report
 from aerobat.reporting.tables import print_table, table
 from aerobat.simulation import Flight
 from aerobat.storage import whole_folder
-
-if TYPE_CHECKING:  # which takes long to import
-    from aerobat.studies.trials import Trials
+from aerobat.studies.share import Share, Trials
 
 FLIGHT = "flight.npz"
 AUTOPILOT = "autopilot.txt"  # the settings of the firmware that flew
@@ -109,6 +111,30 @@ def written(
     print(f"\n{hint}written to {folder}/" + (", in the place of an earlier run" if replaced else ""))
 
 
+def finish_study(
+    result: Any, record: RunRecord, options: OutputOptions, write_others: Callable[[Path], None] | None = None
+) -> None:
+    """Write a study's facts and its picture, where it has one, as COMMAND.json and COMMAND.png, then show it.
+
+    Args:
+        result: What the study came to.
+        record: What it takes to do it again.
+        options: Where to write, and in what form to say it.
+        write_others: Writes what else there is to a folder.
+    """
+    told, drawn = to_json(result), picture(result)
+    pixels = None if drawn is None else png(drawn)
+
+    def write(staging: Path) -> None:
+        (staging / f"{record.command}.json").write_text(told + "\n", encoding="utf-8")
+        if pixels is not None:
+            (staging / f"{record.command}.png").write_bytes(pixels)
+        if write_others is not None:
+            write_others(staging)
+
+    written(record, options, write, told, table(result))
+
+
 @dataclass(frozen=True)
 class Flown:
     """A plan's flight, its score, and the names of what flew it."""
@@ -136,11 +162,11 @@ def finish(
     assert plan.vehicle is not None, "a command plans for a vehicle"
     flight, score = (flown.flight, flown.score) if flown else (None, None)
     controller, plant = (flown.controller, flown.plant) if flown else (None, None)
-    trials = _trials(plan, record) if flown or explain else None
+    trials = trial_flights(plan, record) if flown or explain else None
     report = Report(plan, score, controller, plant, trials)
     facts = to_json(report)
     import_undocumented()
-    picture = png(report_figure(plan, plan.vehicle, flight, score))
+    pixels = png(report_figure(plan, plan.vehicle, flight, score))
 
     def write(staging: Path) -> None:
         plan.save(staging / f"{plan.problem.name}.plan")
@@ -152,7 +178,7 @@ def finish(
         if flown is not None and flown.own_log:
             (staging / BLACKBOX).write_bytes(flown.own_log)
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
-        (staging / "report.png").write_bytes(picture)
+        (staging / "report.png").write_bytes(pixels)
 
     tables = [table(report, most=REPORT)]
     if explain:
@@ -162,8 +188,33 @@ def finish(
     return ExitCode.WELL if report.is_well else ExitCode.NOT_WELL
 
 
-def _trials(plan: Plan, record: RunRecord) -> Trials | None:
-    """Flights under random conditions, of which a plain run imports nothing."""
-    from aerobat.cli.trials import trial_flights
+def trial_flights(plan: Plan, record: RunRecord) -> Trials | None:
+    """Fly a plan under the run's conditions, or a lab's.
 
-    return trial_flights(plan, record)
+    Of a plan made with --pass the flights that proved it are taken. None is returned where nothing varies,
+    for the paper's plans, which leave nothing to the controller, for another simulator's physics, which take
+    minutes, and for a vehicle that cannot hover.
+
+    Args:
+        plan: The plan, for a vehicle.
+        record: The run, whose controller and seed are taken.
+    """
+    from aerobat.studies.flights import FlightTask, fly_trials  # which take long to import, for nothing else
+
+    assert plan.vehicle is not None, "a command plans for a vehicle"
+    flight = record.flight
+    if flight.conditions is None and record.paper:
+        return None
+    conditions = load_dispersion(USUAL_CONDITIONS) if flight.conditions is None else flight.conditions
+    if flight.plant is not None or conditions == load_dispersion("none"):
+        return None
+    if flight.probability is not None and plan.tube is not None:
+        return Trials(conditions, flight.seed, Share(plan.tube.passed, plan.tube.flights))
+    try:
+        plan.vehicle.require_hover(plan.problem.environment.gravity)
+    except SpecError:
+        return None
+    controller = named_controller(flight.controller, plan.vehicle.controller)
+    with showing(Progress("flown")) as progress:
+        task = FlightTask(plan, plan.vehicle, conditions, flight.seed, controller)
+        return fly_trials(task, progress.counting("went well"))

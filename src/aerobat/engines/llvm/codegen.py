@@ -19,8 +19,7 @@ from typing import Any
 from llvmlite import ir
 
 from aerobat.engines.llvm.arithmetic import CODE, INTEGER, LOGICAL, NUMBER, exponential, filled, shaped
-from aerobat.engines.llvm.layout import ARRAYS, COUNTS, Layout
-from aerobat.engines.llvm.packing import InputKind
+from aerobat.engines.llvm.packing import ARRAYS, COUNTS, InputKind, Layout
 from aerobat.engines.traced_loop import TracedLoop
 from aerobat.engines.tracing import Operation
 

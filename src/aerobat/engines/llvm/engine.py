@@ -15,12 +15,12 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.engines.cores import available_cores
 from aerobat.engines.engine import (
     CompiledLoop,
     Engine,
     Init,
     Step,
+    available_cores,
     expanded,
     logged_ticks,
     read_only,
@@ -28,8 +28,7 @@ from aerobat.engines.engine import (
 )
 from aerobat.engines.llvm.codegen import module
 from aerobat.engines.llvm.kept_code import kept_code
-from aerobat.engines.llvm.layout import ARRAYS, COUNTS, Layout
-from aerobat.engines.llvm.packing import PackedInputs, Packing
+from aerobat.engines.llvm.packing import ARRAYS, COUNTS, Layout, PackedInputs, Packing
 from aerobat.engines.pytree import Tree, piecewise_constant_leaves, tree_leaves, tree_map, tree_unflatten
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
 

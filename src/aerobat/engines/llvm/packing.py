@@ -1,4 +1,4 @@
-"""Arrays as machine code reads them: vehicles in blocks of lanes, side by side."""
+"""The arrays that machine code reads and writes: vehicles in blocks of lanes, side by side."""
 
 from __future__ import annotations
 
@@ -15,8 +15,53 @@ from aerobat.arrays import Array
 from aerobat.engines.engine import Coded, Held
 from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_replace
 
+ARRAYS = (
+    "shared parameters",
+    "parameters",
+    "shared inputs",
+    "inputs",
+    "held inputs",
+    "codes",
+    "held codes",
+    "table",
+    "carry",
+    "next carry",
+    "outputs",
+)
+COUNTS = ("lanes", "ticks", "held inputs rows", "held codes rows", "log_stride", "begin", "end")
 _NO_TABLE = np.zeros(0)
 _DTYPES = {False: np.float64, True: np.uint16}  # of inputs, by whether they are coded
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Vehicles side by side, and which parameters and inputs are one number for all.
+
+    Both functions take arrays of float64: shared parameters (s,) and parameters (blocks, p, width); shared
+    inputs (ticks, r + h), inputs (blocks, ticks, i, width) and held inputs (blocks, held rows, width); a
+    table; carry and next carry (blocks, c, width), and outputs (logged ticks, o, lanes). Arrays of uint16
+    hold the codes of what is `Coded`, shaped as inputs and held inputs are. The last h columns of the shared
+    inputs say where in a block of the held inputs or codes the values of each kind of `Held` begin at a tick.
+
+    `scan` logs the first tick, each `log_stride` ticks after it, and the last; `init` reads the inputs of one
+    tick and writes the next carry. The lanes `begin` to `end` are run, multiples of the width.
+    """
+
+    width: int
+    shared_parameters: tuple[bool, ...]
+    inputs: tuple[InputKind, ...]
+    held_kinds: tuple[InputKind, ...]
+    piecewise_constant: tuple[bool, ...]  # inputs that are shared, and at most ticks the same as before
+
+    @cached_property
+    def shared_inputs(self) -> tuple[bool, ...]:
+        """True for inputs that are one number for all vehicles."""
+        return tuple(kind.shared for kind in self.inputs)
+
+    @property
+    def shared_columns(self) -> int:
+        """Of the shared inputs."""
+        return sum(self.shared_inputs) + len(self.held_kinds)
 
 
 class PackedInputs(NamedTuple):

@@ -4,23 +4,47 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from aerobat.errors import BackendMissing
+from aerobat.errors import import_extra
 from aerobat.flatness import reference
 from aerobat.interchange.exports.loss import Content, ExportRows
-from aerobat.interchange.exports.stored_types import StoredTypes
 from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, Stamped
 from aerobat.interchange.solids import flattened
 from aerobat.planning import Plan
 
+_BLANK: Mapping[str, Any] = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}  # others are whole
 NAME = "plan"
 ROS2_BAG = ("metadata.yaml", f"{NAME}.db3")
+
+
+@dataclass(frozen=True)
+class StoredTypes:
+    """A maker of one distribution's messages; see `Make`."""
+
+    store: Any  # of types, a Typestore of `rosbags`
+
+    def __call__(self, kind: str, /, **given: Any) -> Any:
+        """See `Make.__call__`."""
+        fields = dict(self.store.fielddefs[kind][1])
+        return self.store.types[kind](
+            **{name: given[name] if name in given else self._blank(node) for name, node in fields.items()}
+        )
+
+    def _blank(self, node: Any) -> Any:
+        form, content = node
+        if form.name == "NAME":
+            return self(content)
+        if form.name == "BASE":
+            return _BLANK.get(content[0], 0)
+        (_, element), count = content
+        numeric = isinstance(element, tuple) and element[0] != "string"
+        return np.zeros(count if form.name == "ARRAY" else 0, dtype=element[0]) if numeric else []
 
 
 def _bag(container: str, plan: Plan, rate: float) -> Content:
@@ -28,7 +52,7 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
 
     Lost is what lies between them. Raises BackendMissing without rosbags.
     """
-    _require_rosbags()
+    import_extra("rosbags", "bags need rosbags", "aerobat[ros]", "export to csv")
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if container == "ros1" else Stores.ROS2_HUMBLE)
@@ -45,14 +69,6 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
 ros1_bag = partial(_bag, "ros1")
 ros2_bag = partial(_bag, "ros2")
 mcap = partial(_bag, "mcap")
-
-
-def _require_rosbags() -> None:
-    try:
-        import rosbags  # noqa: F401
-    except ImportError:
-        remedy = 'pip install "aerobat[ros]"'
-        raise BackendMissing(f"bags need rosbags; install it with {remedy}, or export to csv") from None
 
 
 def _write_ros1(store: Any, messages: Sequence[Stamped], path: Path) -> Mapping[str, bytes]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from aerobat import so3
 from aerobat.arrays import Array
@@ -23,11 +24,8 @@ POWERS = DEGREE + 1
 SAMPLES = 257  # of a piece
 FIRST_GUESSES = 64  # constants among which the fit begins
 ROUNDS = 40  # of Levenberg-Marquardt: more gain nothing
-DAMPING = 1e-3  # at its first step,
-MIN_DAMPING = 1e-9  # and at any later one, which keeps its equations regular
 MAX_SLOPE = 1e3  # of attitude over yaw: beyond, where the heading is along the thrust, no yaw is of use
 REGULARIZATION = 1e-2  # [-] of coefficients: where attitude hardly depends on yaw, that fits no rounding
-EXACT = 1e-6  # [rad] of attitude: what rounding makes of it
 DEFINED = 1e-9  # [m/s²] of thrust, or the sine of its angle to the heading: less defines no attitude
 
 
@@ -78,20 +76,14 @@ def _fitted(z: Array, axes: Array, powers: Array) -> Array:
     best[0] = guesses[np.argmin(cost)]
     weights = np.full(POWERS, REGULARIZATION)
     weights[0] = 0.0  # a constant yaw is as good as any
-    damping = DAMPING
-    residual = np.concatenate([_turn(z, axes, powers @ best), weights * best])
-    for _ in range(ROUNDS):
-        if np.abs(residual).max() < EXACT:
-            break
-        slopes = np.concatenate([_slope(z, powers @ best)[:, None] * powers, np.diag(weights)])
-        normal = slopes.T @ slopes
-        step = np.linalg.solve(normal + damping * np.eye(POWERS), -slopes.T @ residual)
-        tried = np.concatenate([_turn(z, axes, powers @ (best + step)), weights * (best + step)])
-        if tried @ tried < residual @ residual:
-            best, residual, damping = best + step, tried, max(damping / 10.0, MIN_DAMPING)
-        else:
-            damping *= 10.0
-    return best
+
+    def residual(fit: Array) -> Array:
+        return np.concatenate([_turn(z, axes, powers @ fit), weights * fit])
+
+    def slopes(fit: Array) -> Array:
+        return np.concatenate([_slope(z, powers @ fit)[:, None] * powers, np.diag(weights)])
+
+    return np.asarray(least_squares(residual, best, slopes, method="lm", max_nfev=ROUNDS).x)
 
 
 def _slope(z: Array, yaw: Array) -> Array:

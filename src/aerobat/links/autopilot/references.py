@@ -10,7 +10,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.engines.components import components
+from aerobat.engines.pytree import components
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.links.goals import AttitudeGoal, PathPiece, PositionGoal
 from aerobat.simulation.autopilot.braking import point_reference

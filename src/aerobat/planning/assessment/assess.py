@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import Certificate, Side
+from aerobat.certification.certificate import Certificate, Side
 from aerobat.planning.assessment.assessment import Assessment, Point, PositionRange
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.task import Task

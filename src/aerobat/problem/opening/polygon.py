@@ -11,7 +11,8 @@ import numpy as np
 from pydantic import Field, PlainValidator
 
 from aerobat.arrays import Array
-from aerobat.declaration import FieldError, finite, shown
+from aerobat.declaration.field_types import finite
+from aerobat.declaration.sentences import FieldError, shown
 from aerobat.problem.opening.shape import Edge, EdgeProbe, LinearBounds, OpeningShape
 
 STRAIGHT = 1e-6  # [-] the sine of a turn that is none

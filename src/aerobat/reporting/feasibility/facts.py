@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 from aerobat.reporting.facts import NONE, Columns, Fact, Facts, facts, kept, picture
-from aerobat.reporting.feasibility.legend import Kind, kinds_of, letter_of
+from aerobat.reporting.feasibility.figure import Kind, kinds_of, letter_of, map_figure
 from aerobat.studies.feasibility import Cell, Feasibility, FeasibilityMap, Requirement
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 WIDE = 14  # values across: of more, letters alone fit
 
@@ -35,11 +31,7 @@ def _(found: FeasibilityMap) -> Iterator[Fact]:
         yield from (Fact("", text=_legend(found, kind)) for kind in kinds_of(found).values())
 
 
-@picture.register(FeasibilityMap)
-def _(found: FeasibilityMap) -> Figure:
-    from aerobat.reporting.feasibility.figure import map_figure
-
-    return map_figure(found)
+picture.register(FeasibilityMap, map_figure)
 
 
 def requirements(problem: str, vehicle: str, found: Iterable[Requirement]) -> Facts:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array
 from aerobat.environment.obstacles import ConvexPiece
 from aerobat.errors import SpecError
+from aerobat.flatness import vehicle_of
 from aerobat.planning import PlacedStage, Plan
 from aerobat.problem.gate import Gate
 from aerobat.reporting.page import AXIS, Place, house_style, panel, write
@@ -80,12 +81,8 @@ def subject_of(shown: Flight | Plan, plan: Plan | None, vehicle: Vehicle | str |
     Raises SpecError where the vehicle is not known, and where nothing moves.
     """
     given = plan if isinstance(shown, Flight) else shown
-    if vehicle is None and given is not None:
-        vehicle = given.vehicle
     if isinstance(shown, Plan):
-        if vehicle is None:
-            raise SpecError("vehicle is missing: a plan without one says not what to draw; give vehicle=...")
-        own = as_vehicle(vehicle)
+        own = vehicle_of(shown, vehicle)
         asked = plan_reference(shown, own)
         poses, thrusts, actual = reference_poses(asked), asked.rotor_thrusts, []
     else:
@@ -93,7 +90,7 @@ def subject_of(shown: Flight | Plan, plan: Plan | None, vehicle: Vehicle | str |
             raise SpecError(
                 "the flight holds nothing that moves; show one vehicle or more, of two rows or more"
             )
-        own = as_vehicle(shown.vehicles[0] if vehicle is None else vehicle)
+        own = as_vehicle(vehicle or (plan and plan.vehicle) or shown.vehicles[0])
         poses, thrusts, actual = reference_poses(shown), shown.thrusts, actual_poses(shown)
     surroundings = None if given is None else given.problem.surroundings
     if isinstance(shown, Flight) and surroundings is None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.declaration import PathName, Positive, validated
-from aerobat.errors import BackendMissing, SpecError
+from aerobat.errors import SpecError, import_extra
 from aerobat.planning import Plan
 from aerobat.reporting.motion.picture import MovingPicture, subject_of
 from aerobat.simulation import Flight
@@ -56,12 +56,12 @@ def write_video(
     suffix = Path(path).suffix.lower()
     if suffix not in ENCODING:
         raise SpecError(f"video: {path} is neither .mp4 nor .gif; name a file of one of them")
-    ffmpeg = _ffmpeg()
+    extra = import_extra("imageio_ffmpeg", "a video needs imageio-ffmpeg", "aerobat[viewer]")
     subject = subject_of(shown, plan, vehicle)
     times = frame_times(subject.duration, speed)
     picture = MovingPicture(subject, DPI[suffix])
     with whole_file(path) as temporary:
-        _encode(ffmpeg, picture.size, temporary, suffix, _frames(picture, times, progress))
+        _encode(extra.get_ffmpeg_exe(), picture.size, temporary, suffix, _frames(picture, times, progress))
 
 
 def frame_times(duration: float, speed: float) -> NDArray[np.float64]:
@@ -106,13 +106,3 @@ def _encode(
             lines = said.read().decode(errors="replace").splitlines()
             reason = lines[-1].rpartition("] ")[2] if lines else f"status {process.returncode}"
             raise OSError(f"FFmpeg failed: {reason}")
-
-
-def _ffmpeg() -> str:
-    try:
-        from imageio_ffmpeg import get_ffmpeg_exe
-    except ImportError:
-        remedy = 'pip install "aerobat[viewer]"'
-        raise BackendMissing(f"a video needs imageio-ffmpeg; install it with {remedy}") from None
-    found: str = get_ffmpeg_exe()
-    return found

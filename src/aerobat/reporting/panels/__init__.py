@@ -1,1 +1,1 @@
-"""The parts of a page: paths, stages, timelines and signals, each drawn into its own axes."""
+"""The parts of a page: paths, stages and timelines, each drawn into its own axes."""

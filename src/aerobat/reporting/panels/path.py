@@ -53,7 +53,6 @@ def draw_path(
     vehicle: Vehicle,
     gates: Sequence[Gate],
     stages: Sequence[PlacedStage] = (),
-    size: float = SIZE,
     pieces: Sequence[ConvexPiece] = (),
 ) -> str:
     """Draw paths, the first vehicle along its path, the gates, obstacles, other stages, start and end.
@@ -65,13 +64,12 @@ def draw_path(
         vehicle: Whose glyph is drawn.
         gates: All gates of the problem; the picture holds each of them.
         stages: Of which those without a gate are marked by diamonds.
-        size: Of the vehicle as drawn, relative to the path's extent.
         pieces: Of obstacles, which are drawn where they are near.
 
     Returns:
         A note on how the vehicle is drawn.
     """
-    scale = enlargement(vehicle, size * reference.extent)
+    scale = enlargement(vehicle, SIZE * reference.extent)
     reach = scale * span(vehicle)
     paths = [poses.path for poses in (reference, *actual)]
     surfaces, points = surfaces_beside(pieces, [*paths, gate_corners(gates)])

@@ -12,7 +12,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.planning import Plan
 from aerobat.problem.gate import Gate
-from aerobat.reporting.page import size_of
+from aerobat.reporting.page import size_of, spread_out
 from aerobat.reporting.panels.keyframes import (
     Keyframe,
     Keyframes,
@@ -20,7 +20,6 @@ from aerobat.reporting.panels.keyframes import (
     maneuver_plane,
     plan_keyframes,
 )
-from aerobat.reporting.panels.labels import spread_out
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.glyphs import enlargement, gate_section, span, vehicle_shapes
 from aerobat.reporting.scene.shapes import draw_depth_sorted

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.environment.obstacles import Pieces
 from aerobat.flatness import force_balance
 from aerobat.planning import PlacedStage, Plan, Tube
-from aerobat.reporting.page import HEADING, heading, legend, size_of
+from aerobat.reporting.page import HEADING, heading, legend, size_of, spread_out
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
-from aerobat.reporting.panels.labels import spread_out
+from aerobat.reporting.panels.poses import PoseHistory
 from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, SKY, SMALL, YELLOW
 from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle
@@ -21,10 +22,47 @@ from aerobat.vehicle import Vehicle
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+ROWS = 200  # instants, at most, whose clearance is drawn
+DEEPEST = -0.25  # [m] that an overlap is shown
+NEAR, FAR = 0.5, 1e4  # [m] within which obstacles are looked for first, and at last
 SPIN_RAMPS = {1: ("#00315f", "#6fa3d4"), -1: ("#1c2b39", "#8b97a3")}  # dark to light, by the sense of turning
+LIMIT: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
+REACH = 1.0  # by how many times the limits' distance an axis extends beyond them, at most
 LENGTHS = (("m", 1.0), ("cm", 1e-2))
 FEW_ROTORS = 4  # whose names a legend has room for
 NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and by the letter
+
+
+def draw_clearance(axes: Axes, poses: PoseHistory, vehicle: Vehicle, pieces: Pieces) -> None:
+    """Draw the distance of the body from the nearest obstacle over time, below zero where they overlap."""
+    rows = np.unique(np.linspace(0, len(poses.times) - 1, ROWS).round().astype(int))
+    distances = clearances(poses.position[rows], poses.q_world_body[rows], vehicle, pieces)
+    draw_series(axes, poses.times[rows], distances, INK)
+    axes.axhline(0.0, color=FAINT, linewidth=0.8)
+    lowest = max(1.1 * float(distances.min()), DEEPEST)
+    axes.set(ylabel="clearance [m]", ylim=(min(0.0, lowest), None))
+
+
+def clearances(position: Array, q_world_body: Array, vehicle: Vehicle, pieces: Pieces) -> Array:
+    """Return the distances [m] of the body from the nearest of pieces, negative where they overlap, (T,).
+
+    Args:
+        position: Of the centre of mass [m], (T, 3).
+        q_world_body: The attitudes, (T, 4).
+        vehicle: Whose body it is.
+        pieces: Of which there is one at least.
+    """
+    body = vehicle.bounding_ellipsoid
+    offsets, shapes = body.turned(q_world_body)
+    centres, reach = position + offsets, float(body.semi_axes.max())
+    found, pending, within = np.full(len(position), np.inf), np.arange(len(position)), NEAR
+    while len(pending) and within < FAR:
+        bodies, numbers = pieces.near(centres[pending], reach, within)
+        rows = pending[bodies]
+        np.minimum.at(found, rows, pieces.separated(numbers, centres[rows], shapes[rows]).gaps)
+        pending = pending[found[pending] > within]  # of others, none that is farther is nearer
+        within *= 2.0
+    return found
 
 
 def draw_position_error(axes: Axes, flight: Flight, tube: Tube | None = None) -> None:
@@ -65,12 +103,33 @@ def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicl
         label = f"rotor {i}" if i == 0 or len(colours) <= FEW_ROTORS else f"{i}"
         draw_series(axes, times, thrusts[..., i], colour, width=1.0, label=label)
     limits = sorted({*vehicle.min_thrusts.tolist(), *vehicle.max_thrusts.tolist()})
-    for limit in limits:
-        label = "limits" if limit == limits[-1] else ""
-        axes.axhline(limit, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), label=label)
-    low = min(float(thrusts.min()), float(vehicle.min_thrusts.min()))
-    high = max(float(thrusts.max()), float(vehicle.max_thrusts.max()))
+    draw_limits(axes, limits, "limits")
+    low, high = min(float(thrusts.min()), limits[0]), max(float(thrusts.max()), limits[-1])
     axes.set(ylabel="rotor thrust [N]", ylim=(low - 0.08 * (high - low), high + 0.08 * (high - low)))
+
+
+def draw_limits(axes: Axes, limits: Sequence[float], label: str = "") -> None:
+    """Draw dashed lines across axes, the last of them with a name."""
+    for limit in limits:
+        axes.axhline(limit, **LIMIT, label=label if limit == limits[-1] else "")
+
+
+def fit_to_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
+    """Make the upright axis show limits and values (...), cut off, and saying so, far beyond the limits."""
+    low, high = min(limits), max(limits)
+    lowest = min(float(values.min()), low)
+    highest = max(float(values.max()), high)
+    bottom = max(lowest, low - REACH * (high - low))
+    top = min(highest, high + REACH * (high - low))
+    pad = 0.08 * (top - bottom)
+    axes.set_ylim(bottom - pad, top + pad)
+    if lowest < bottom or highest > top:
+        x, y = 1.0 - 0.06 / size_of(axes)
+        note = f"cut off: {lowest:.4g} to {highest:.4g}".replace("-", "−")
+        axes.text(
+            x, y, note, size=SMALL, color=MUTED, ha="right", va="top", transform=axes.transAxes,
+            bbox={"fc": "white", "ec": "none", "pad": 1.5}, zorder=4.0,
+        )  # fmt: skip
 
 
 def rotor_colours(vehicle: Vehicle) -> list[str]:

@@ -6,21 +6,17 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import starmap
 from math import isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aerobat.evaluation.criteria import criterion
 from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture, said
-from aerobat.reporting.sweeps.words import known_opening, outcome_name
+from aerobat.reporting.sweeps.figure import known_opening, outcome_name, sweep_figure
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
 from aerobat.studies.sweep import Share, Sweep
 from aerobat.studies.sweep.flights import CLEARANCE, NEAREST
 from aerobat.studies.sweep.result import LEVELS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 ERRORS = (  # columns of the table, and what people call them
     ("max_position_error_m", "position, max"),
@@ -56,11 +52,7 @@ def _(share: Share) -> Iterator[Fact]:
     yield from kept(count=share.count, fraction=share.fraction, low=low, high=high)
 
 
-@picture.register(Sweep)
-def _(sweep: Sweep) -> Figure:
-    from aerobat.reporting.sweeps.figure import sweep_figure
-
-    return sweep_figure(sweep)
+picture.register(Sweep, sweep_figure)
 
 
 def _outcome(outcome: Outcome, share: Share) -> Fact:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from itertools import cycle
+from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import validated
+from aerobat.errors import SpecError
+from aerobat.evaluation import Opening
 from aerobat.reporting.page import (
     AXIS,
     COLUMNS,
@@ -23,12 +26,11 @@ from aerobat.reporting.page import (
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.crossings import Crossings, draw_opening, draw_scatter
 from aerobat.reporting.style import BAND, BLUE, INK, MUTED, RED, SKY, SMALL
-from aerobat.reporting.sweeps.words import known_opening, outcome_name, success_sentence
+from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
-from aerobat.studies.sweep import Sweep
+from aerobat.studies.share import percent
 from aerobat.studies.sweep.flights import PASSED
-from aerobat.studies.sweep.result import ErrorBand
-from aerobat.studies.sweep.share import percent
+from aerobat.studies.sweep.result import ErrorBand, Sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -147,3 +149,22 @@ def _draw_distributions(figure: Figure, sweep: Sweep, left: float, bottom: float
     axes.set_yticks([0, 50, 95], ["0", "50", "95"])
     legend(axes, above=HEADING)
     heading(axes, "Errors")
+
+
+def success_sentence(sweep: Sweep) -> str:
+    """Return a sentence with the share of flights that went well, its interval and the seed."""
+    return f"{sweep.success} of the flights went well, at 95 % confidence; seed {sweep.seed}"
+
+
+def known_opening(sweep: Sweep, passage: str) -> Opening | None:
+    """The smallest opening that 99 % pass; None where the flights are too few to say, or too many miss."""
+    try:
+        found = sweep.smallest_opening(passage)
+    except SpecError:
+        return None
+    return found if isfinite(found.scale) else None
+
+
+def outcome_name(outcome: Outcome) -> str:
+    """An outcome in two or three words."""
+    return outcome.name.lower().replace("_", " ")

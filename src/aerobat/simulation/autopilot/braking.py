@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.engines.components import components
+from aerobat.engines.pytree import components
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle

@@ -20,7 +20,7 @@ from aerobat.kernels.ops import Ops, Scalar, Vector, clip, magnitude, select_tre
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.vectors import add, dot, norm, subtract
 from aerobat.simulation.autopilot.attitude_law import Authority, slope_limited_error
-from aerobat.simulation.loop import Signals
+from aerobat.simulation.loop import Component, Signals
 
 _MIN_LIFT = 0.2  # [-] of gravity: towards a point it never thrusts less upwards, so that it stays upright
 _MAX_SIDEWAYS = 1.0  # [-] of gravity: nor more than this to a side
@@ -43,12 +43,10 @@ class Guidance(NamedTuple):
 
 
 @dataclass(frozen=True)
-class AutopilotController:
+class AutopilotController(Component):
     """The tracking controller of a vehicle that takes attitudes, points, and points of a path."""
 
     flags: FeatureFlags
-    period: int = 1
-    feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: AutopilotModel, inputs: Guidance, signals: Signals

@@ -16,9 +16,8 @@ from aerobat import so3
 from aerobat.arrays import Array, frozen
 from aerobat.declaration import Finite, NonNegative, Series, by_value, short, validated
 from aerobat.engines import choose
-from aerobat.engines.components import components, from_components
 from aerobat.engines.engine import first_row
-from aerobat.engines.pytree import Tree
+from aerobat.engines.pytree import Tree, components, from_components
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness import Planned, TimeInterval, environment_of, reference, vehicle_of

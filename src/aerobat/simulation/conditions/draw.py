@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Mapping
 from math import sqrt, tau
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.random.bit_generator import ISeedSequence
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.declaration import by_value
 from aerobat.environment import Dispersion, Gusts, HandOff, Imu, MotionCapture
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
@@ -43,74 +41,25 @@ _GUST_FIRST, _GUST_SECOND = sqrt(0.5), sqrt(0.125)
 _SEED_WORDS = 3  # of 64 bits, in the state of a generator
 
 
-@by_value
-@dataclass(frozen=True, eq=False)
-class Draw:
-    """One flight's share of its conditions: flight k of a seed, whatever others fly beside it.
+class Draws:
+    """Columns of what flights draw of their conditions: flight k of a seed, whatever others fly beside it.
 
     A cause that is switched off leaves what is drawn of the others as it was, so that flights under other
     conditions can be compared pair by pair.
     """
 
-    seed: int
-    flight: int
-    mass: float  # [-] over the nominal one
-    inertia: float  # [-] over the nominal one
-    drag: float  # [1/s] unmodelled, over the nominal mass
-    effectiveness: Array  # [-] of each rotor: its thrust over what was commanded, (n,)
-    lags: Array  # [-] of each rotor, over the nominal one, (n,)
-    start_position: Array  # [m] off the reference's start, (3,)
-    start_velocity: Array  # [m/s] likewise, (3,)
-    start_attitude: Array  # [rad] likewise, a rotation vector in body axes, (3,)
-    gyro_bias: Array  # [rad/s] at the start, (3,)
-    accelerometer_bias: Array  # [m/s²] at the start, (3,)
-    first_position_error: Array  # [m] of the pose known before the flight, (3,)
-    first_attitude_error: Array  # [rad] likewise, (3,)
-    hand_off_translation: Array  # [m] of the second camera system, (3,)
-    hand_off_rotation: Array  # [rad] likewise, a rotation vector in world axes, (3,)
-    warp: Array  # [m] displacement of poses at the hand-off, (3,)
-    charge: float  # [-] of the battery at the start
-    mean_wind: Array  # [m/s] beyond the environment's, (3,)
-    gust: Array  # [-] states of the gusts' filters at the start, (5,)
-    gust_heading: float  # [rad] of the turbulence where there is no mean wind
+    columns: Mapping[str, Array]  # (flights,) or (flights, n), by names that the functions below explain
 
-    def vehicle(self, nominal: Vehicle) -> Vehicle:
-        """The vehicle that really flies, its rotors' effectiveness apart."""
-        rotors = (
-            replace(rotor, lag=factor * rotor.lag)
-            for rotor, factor in zip(nominal.rotors, self.lags.tolist(), strict=True)
-        )
-        return replace(
-            nominal,
-            mass=self.mass * nominal.mass,
-            inertia=self.inertia * nominal.inertia,
-            drag_body=nominal.drag_body + self.drag * nominal.mass,
-            rotors=tuple(rotors),
-        )
+    def __init__(self, dispersion: Dispersion, rotors: int, seed: int, flights: Iterable[int]) -> None:
+        """Draw what varies.
 
-    def start(self, reference: BodyState) -> BodyState:
-        """The true state at the start of a flight whose reference starts so."""
-        return _start(reference, self.start_position, self.start_velocity, self.start_attitude)
-
-    def row(self) -> dict[str, float]:
-        """All of it as numbers by name, those of arrays by an index behind: a row of a table."""
-        columns: dict[str, float] = {}
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, np.ndarray):
-                columns |= {f"{field.name}_{i}": x for i, x in enumerate(value.tolist())}
-            else:
-                columns[field.name] = value
-        return columns
-
-
-class Draws(Sequence[Draw]):
-    """Draws of some flights: arrays of all of them, and each by itself where it is asked for."""
-
-    def __init__(self, dispersion: Dispersion, rotors: int, seed: int, flights: Sequence[int]) -> None:
-        """Draw, for a vehicle of so many rotors; see `draw_flights`."""
-        self._seed = seed
-        self.flights = flights
+        Args:
+            dispersion: what varies.
+            rotors: how many the vehicle has.
+            seed: of all flights.
+            flights: their numbers, from 0.
+        """
+        flights = self.flights = tuple(flights)
         count = sum(count for _, count in _NORMALS)
         normals, uniforms = np.empty((len(flights), count + 2 * rotors)), np.empty((len(flights), 2))
         words = np.empty((len(flights), 1 + len(STREAMS), _SEED_WORDS), dtype=np.uint64)
@@ -124,40 +73,26 @@ class Draws(Sequence[Draw]):
             name: normals[:, end - count : end] for (name, count), end in zip(_NORMALS, _ENDS, strict=True)
         }
         each_rotor = normals[:, count:].reshape(-1, 2, rotors).swapaxes(0, 1)
-        self._columns = {
+        self.columns = {
             **_of_vehicle(dispersion, normal, each_rotor),
             **_of_sensors(dispersion, normal),
             **_of_surroundings(dispersion, normal, uniforms),
         }
         self._words = words
-        for values in self._columns.values():
+        for values in self.columns.values():
             values.flags.writeable = False
 
     def __len__(self) -> int:
         return len(self.flights)
 
-    @overload
-    def __getitem__(self, index: int) -> Draw: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Draw, ...]: ...
-
-    def __getitem__(self, index: int | slice) -> Draw | tuple[Draw, ...]:
-        if isinstance(index, slice):
-            return tuple(self[k] for k in range(*index.indices(len(self))))
-        values = {name: column[index] for name, column in self._columns.items()}
-        numbers = {name: float(value) for name, value in values.items() if value.ndim == 0}
-        return Draw(self._seed, self.flights[index], **{**values, **numbers})
-
-    def column(self, name: str) -> Array:
-        """A field of all draws, (flights,) or (flights, n)."""
-        return self._columns[name]
-
     def starts(self, reference: BodyState) -> BodyState:
         """The true states at the start of flights whose reference starts so."""
-        return _start(
-            reference, *(self.column(f"start_{name}") for name in ("position", "velocity", "attitude"))
+        position, velocity, turn = (
+            self.columns[f"start_{name}"] for name in ("position", "velocity", "attitude")
         )
+        q = so3.normalize(so3.multiply(reference.q_world_body, so3.exp(turn)))
+        omega = np.broadcast_to(reference.omega_body, position.shape)
+        return BodyState(reference.position + position, reference.velocity + velocity, q, omega)
 
     def stream(self, name: str) -> list[ISeedSequence]:
         """The seeds of the random numbers of one of STREAMS along each flight."""
@@ -175,19 +110,8 @@ class _Seed(ISeedSequence):
         return self._words[:n_words]
 
 
-def draw_flights(dispersion: Dispersion, rotors: int, seed: int, flights: Iterable[int]) -> Draws:
-    """The draws of some flights, each the same whichever others are asked for.
-
-    Args:
-        dispersion: what varies.
-        rotors: how many the vehicle has.
-        seed: of all flights.
-        flights: their numbers, from 0.
-    """
-    return Draws(dispersion, rotors, seed, tuple(flights))
-
-
 def _of_vehicle(conditions: Dispersion, normal: Mapping[str, Array], each_rotor: Array) -> dict[str, Array]:
+    """Factors over the nominal vehicle, unmodelled drag over its mass [1/s], offsets of the start [SI]."""
     return {
         "mass": _factors(conditions.mass, normal["mass"][:, 0]),
         "inertia": _factors(conditions.inertia, normal["inertia"][:, 0]),
@@ -201,6 +125,7 @@ def _of_vehicle(conditions: Dispersion, normal: Mapping[str, Array], each_rotor:
 
 
 def _of_sensors(conditions: Dispersion, normal: Mapping[str, Array]) -> dict[str, Array]:
+    """Biases at the start, errors of the pose known before, misfits of the second camera system [SI]."""
     imu = conditions.imu or Imu()
     capture = conditions.motion_capture or MotionCapture()
     hand_off = capture.hand_off or HandOff()
@@ -218,6 +143,7 @@ def _of_sensors(conditions: Dispersion, normal: Mapping[str, Array]) -> dict[str
 def _of_surroundings(
     conditions: Dispersion, normal: Mapping[str, Array], uniforms: Array
 ) -> dict[str, Array]:
+    """The charge [-], wind beyond the environment's [m/s], states of gusts [-] and their heading [rad]."""
     gusts = conditions.gusts or Gusts()
     used, turn = uniforms.T
     along, *across = normal["gust"].T
@@ -229,13 +155,6 @@ def _of_surroundings(
         "gust": np.stack([along, *(state for both in filters for state in both)], axis=-1),
         "gust_heading": tau * turn,
     }
-
-
-def _start(reference: BodyState, position: Array, velocity: Array, attitude: Array) -> BodyState:
-    """A state by its offsets, (3,) or (flights, 3); a rotation vector in body axes."""
-    q = so3.normalize(so3.multiply(reference.q_world_body, so3.exp(attitude)))
-    omega = np.broadcast_to(reference.omega_body, position.shape)
-    return BodyState(reference.position + position, reference.velocity + velocity, q, omega)
 
 
 def _factors(spread: float, normals: Array) -> Array:
@@ -252,22 +171,22 @@ def _directions(normals: Array) -> Array:
 def dispersed_fleet(nominal: Vehicle, draws: Draws) -> Fleet:
     """The vehicles that really fly, as arrays: `Fleet.of` of each draw's vehicle, without making those."""
     one, shape = Fleet.of([nominal]), (len(draws),)
-    drag = draws.column("drag") * nominal.mass
+    drag = draws.columns["drag"] * nominal.mass
 
     def alike(array: Array) -> Array:
         return np.broadcast_to(array[0], shape + array.shape[1:]).copy()
 
     return Fleet(
         names=one.names * len(draws),
-        mass=draws.column("mass") * nominal.mass,
-        inertia=draws.column("inertia")[:, None, None] * nominal.inertia,
+        mass=draws.columns["mass"] * nominal.mass,
+        inertia=draws.columns["inertia"][:, None, None] * nominal.inertia,
         drag_body=nominal.drag_body + drag[:, None],
         rotor_positions=alike(one.rotor_positions),
         spins=alike(one.spins),
         min_thrusts=alike(one.min_thrusts),
         max_thrusts=alike(one.max_thrusts),
         torque_coefficients=alike(one.torque_coefficients),
-        lags=draws.column("lags") * one.lags,
+        lags=draws.columns["lags"] * one.lags,
         body_centres=alike(one.body_centres),
         semi_axes=alike(one.semi_axes),
     )

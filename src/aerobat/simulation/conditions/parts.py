@@ -10,8 +10,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.control.parameters import airframe_parameters, environment_parameters
-from aerobat.engines.components import components
-from aerobat.engines.pytree import Tree
+from aerobat.engines.pytree import Tree, components
 from aerobat.environment import (
     Battery,
     Dispersion,
@@ -28,15 +27,17 @@ from aerobat.kernels.mocap import MocapParameters, Seam
 from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.wind import GustFilter, GustState, WindParameters
 from aerobat.problem import Gate
-from aerobat.simulation.conditions.disturbances import BatterySag, Wind, WindSource
 from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.sensors import (
+    BatterySag,
     FeltParameters,
     ImuBias,
     ImuSensor,
-    ImuSource,
-    MocapSource,
     MotionCaptureSensor,
+    Wind,
+    imu_source,
+    mocap_source,
+    wind_source,
 )
 from aerobat.simulation.setup import LoopPart
 from aerobat.trajectory import Trajectory
@@ -64,7 +65,7 @@ class DispersedFlights:
 
     def each(self, name: str) -> Tree:
         """A field of the draws: a leaf (vehicles,), or for an array a tuple of them."""
-        values = self.draws.column(name)
+        values = self.draws.columns[name]
         return values if values.ndim == 1 else components(values)
 
     def all(self, value: float) -> Array:
@@ -78,7 +79,7 @@ class DispersedFlights:
     @property
     def effectiveness(self) -> Array:
         """Of the rotors [-], (vehicles, n)."""
-        return self.draws.column("effectiveness")
+        return self.draws.columns["effectiveness"]
 
     def slow_period(self, rate: float = SLOW) -> int:
         """The ticks of a step at so many a second, or of the next faster one."""
@@ -106,9 +107,9 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
     """Mean wind and gusts."""
     time_constant = gusts.length / gusts.airspeed
     period = flights.slow_period(max(SLOW, GUSTY / time_constant))
-    mean = flights.environment.wind + flights.draws.column("mean_wind")
+    mean = flights.environment.wind + flights.draws.columns["mean_wind"]
     speed = np.hypot(mean[:, 0], mean[:, 1])
-    heading = flights.draws.column("gust_heading")
+    heading = flights.draws.columns["gust_heading"]
     is_calm = speed == 0.0
     divisor = np.where(is_calm, 1.0, speed)
     along, first, second, third, fourth = flights.each("gust")
@@ -122,7 +123,7 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
         gust_filter(period / flights.rate / time_constant, len(flights.draws)),
         GustState(along, (first, second), (third, fourth)),
     )
-    return LoopPart(Wind(period), parameters, WindSource(flights.draws, period))
+    return LoopPart(Wind(period), parameters, wind_source(flights.draws, period))
 
 
 def gust_filter(step: float, vehicles: int) -> GustFilter:
@@ -177,8 +178,8 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
         ImuParameters(*map(flights.all, numbers)),
     )
     return (
-        LoopPart(ImuBias(slow), biases, ImuSource(flights.draws, "imu_bias", slow, block=32)),
-        LoopPart(ImuSensor(period), felt, ImuSource(flights.draws, "imu", period)),
+        LoopPart(ImuBias(slow), biases, imu_source(flights.draws, "imu_bias", slow, block=32)),
+        LoopPart(ImuSensor(period), felt, imu_source(flights.draws, "imu", period)),
     )
 
 
@@ -204,14 +205,14 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
         seam=_seam(capture.hand_off, flights),
         first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
     )
-    source = MocapSource(flights.draws, period, flights.rate)
+    source = mocap_source(flights.draws, period, flights.rate)
     return LoopPart(MotionCaptureSensor(period, latency), parameters, source)
 
 
 def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
     """The plane of hand-off; without one, some plane, and no misfit."""
     point, normal = hand_off_plane(hand_off or HandOff(), flights.trajectory, flights.gates)
-    rotation = so3.exp(flights.draws.column("hand_off_rotation"))
+    rotation = so3.exp(flights.draws.columns["hand_off_rotation"])
     return Seam(
         flights.vector(point),
         flights.vector(normal),

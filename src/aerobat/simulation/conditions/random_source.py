@@ -19,6 +19,7 @@ from aerobat.engines.engine import Coded, Held
 from aerobat.engines.pytree import Tree
 
 Words: TypeAlias = NDArray[np.uint16]
+Arrange: TypeAlias = Callable[[Sequence[Coded], Array, NDArray[np.intp]], Tree]
 
 _LEVELS = 2**16
 _WORDS_AT_ONCE = 4  # 16-bit words in a number of the generator
@@ -34,9 +35,12 @@ class RandomSource:
     ticks into chunks, in any order, give the same bits. Only ticks at which the component steps draw numbers.
     """
 
+    per_vehicle = True
+
     def __init__(
         self,
         seeds: Sequence[ISeedSequence],
+        arrange: Arrange,
         *,
         normals: int,
         uniforms: int = 0,
@@ -47,12 +51,15 @@ class RandomSource:
 
         Args:
             seeds: of each vehicle.
+            arrange: makes a component's inputs of the normals, of the uniforms (numbers, samples, vehicles),
+                and of the ticks at which the component steps, (samples,).
             normals: standard normals a sample.
             uniforms: numbers in (0, 1) a sample.
             period: ticks from one sample to the next.
             block: samples whose numbers lie together in the generator's, a multiple of 4.
         """
         self._seeds = seeds
+        self._arrange = arrange
         self._normals = normals
         self._words = normals + 2 * uniforms
         self._period = period
@@ -60,16 +67,14 @@ class RandomSource:
         self._blocks = max(1, _DRAWN_AT_ONCE // block)
         self._restart()
 
-    def inputs(self, begin: int, end: int, arrange: Callable[[Sequence[Coded], Array], Tree]) -> Tree:
-        """Inputs of the ticks from `begin` to before `end`, held from one sample to the next.
-
-        `arrange` makes a tree of the normals and of the uniforms (numbers, samples, vehicles).
-        """
+    def chunk(self, begin: int, end: int) -> Tree:
+        """See `Source.chunk`; inputs are held from one sample to the next."""
         first = begin // self._period
         words = self._samples(first, (end - 1) // self._period + 1)
         high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]
         uniforms = (high + (low + 0.5) / _LEVELS) / _LEVELS
-        samples = arrange([Coded(word, _quantiles()) for word in words[: self._normals]], uniforms)
+        normals = [Coded(word, _quantiles()) for word in words[: self._normals]]
+        samples = self._arrange(normals, uniforms, (first + np.arange(words.shape[1])) * self._period)
         return samples if self._period == 1 else Held(np.arange(begin, end) // self._period - first, samples)
 
     def _samples(self, begin: int, end: int) -> Words:

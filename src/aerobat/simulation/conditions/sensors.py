@@ -1,4 +1,4 @@
-"""The loop's components that measure: an IMU with its walking biases, and motion capture with its latency."""
+"""The loop's components under conditions: wind, a sagging battery, an IMU, motion capture."""
 
 from __future__ import annotations
 
@@ -7,28 +7,79 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerobat.arrays import Array, Mask
 from aerobat.engines.engine import Coded
-from aerobat.engines.pytree import Tree
-from aerobat.kernels import imu, mocap, motors, rigid_body
+from aerobat.kernels import battery, imu, mocap, motors, rigid_body, wind
+from aerobat.kernels.battery import BatteryParameters, BatteryState
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
 from aerobat.kernels.mocap import MocapInput, MocapParameters, PoseSample
 from aerobat.kernels.motors import Airframe
 from aerobat.kernels.ops import Ops
 from aerobat.kernels.rigid_body import EnvironmentParameters
+from aerobat.kernels.wind import GustNoise, WindParameters, WindState
 from aerobat.simulation.components import with_wind
 from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.random_source import RandomSource
-from aerobat.simulation.loop import Signals
+from aerobat.simulation.loop import Component, Signals
 
 
 @dataclass(frozen=True)
-class ImuBias:
+class Wind(Component):
+    """The wind, held from one step to the next; the plant and the accelerometer feel it."""
+
+    period: int = 1
+
+    def init(self, ops: Ops, parameters: WindParameters, noise: GustNoise, signals: Signals) -> WindState:
+        """See `Component.init`."""
+        return wind.init(parameters)
+
+    def step(
+        self, ops: Ops, parameters: WindParameters, state: WindState, noise: GustNoise, signals: Signals
+    ) -> WindState:
+        """See `Component.step`."""
+        return wind.step(parameters, state, noise)
+
+
+def wind_source(draws: Draws, period: int) -> RandomSource:
+    """Return the random numbers of gusts, for a component that steps at every so many ticks."""
+
+    def noise(x: Sequence[Coded], *_: object) -> GustNoise:
+        return GustNoise(x[0], (x[1], x[2]), (x[3], x[4]))
+
+    return RandomSource(draws.stream("wind"), noise, normals=5, period=period, block=32)
+
+
+@dataclass(frozen=True)
+class BatterySag(Component):
+    """The battery, emptied by the rotors' thrusts; the plant's ceilings are what it leaves of them."""
+
+    period: int = 1
+
+    def init(
+        self, ops: Ops, parameters: BatteryParameters, inputs: tuple[()], signals: Signals
+    ) -> BatteryState:
+        """See `Component.init`."""
+        return battery.init(parameters)
+
+    def step(
+        self,
+        ops: Ops,
+        parameters: BatteryParameters,
+        state: BatteryState,
+        inputs: tuple[()],
+        signals: Signals,
+    ) -> BatteryState:
+        """See `Component.step`."""
+        return battery.step(ops, parameters, state, signals.plant.thrusts, signals.clock.elapsed)
+
+
+@dataclass(frozen=True)
+class ImuBias(Component):
     """The biases of an IMU, held from one step to the next."""
 
     period: int = 1
-    feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: BiasParameters, noise: ImuSample, signals: Signals) -> ImuSample:
         """See `Component.init`."""
@@ -50,11 +101,10 @@ class FeltParameters(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ImuSensor:
+class ImuSensor(Component):
     """An IMU at the centre of mass, biased as `ImuBias` says; its sample ends at the tick of its step."""
 
     period: int = 1
-    feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: FeltParameters, noise: ImuSample, signals: Signals) -> ImuState:
         """See `Component.init`."""
@@ -72,30 +122,20 @@ class ImuSensor:
         return imu.step(ops, parameters.errors, state, felt, signals.of(ImuSample), noise)
 
 
-class ImuSource:
-    """Random numbers of an IMU's white noise, or of the walk of its biases."""
+def imu_source(draws: Draws, stream: str, period: int, block: int = 256) -> RandomSource:
+    """Return the random numbers of an IMU's white noise, or of the walk of its biases.
 
-    per_vehicle = True
+    Args:
+        draws: of each vehicle.
+        stream: "imu" or "imu_bias".
+        period: ticks from one sample to the next.
+        block: samples drawn at once.
+    """
 
-    def __init__(self, draws: Draws, stream: str, period: int, block: int = 256) -> None:
-        """Prepare to draw.
+    def noise(x: Sequence[Coded], *_: object) -> ImuSample:
+        return ImuSample((x[0], x[1], x[2]), (x[3], x[4], x[5]))
 
-        Args:
-            draws: of each vehicle.
-            stream: "imu" or "imu_bias".
-            period: ticks from one sample to the next.
-            block: samples drawn at once.
-        """
-        seeds = draws.stream(stream)
-        self._numbers = RandomSource(seeds, normals=6, period=period, block=block)
-
-    def chunk(self, begin: int, end: int) -> Tree:
-        """See `Source.chunk`; an ImuSample."""
-
-        def noise(x: Sequence[Coded], _: Array) -> ImuSample:
-            return ImuSample((x[0], x[1], x[2]), (x[3], x[4], x[5]))
-
-        return self._numbers.inputs(begin, end, noise)
+    return RandomSource(draws.stream(stream), noise, normals=6, period=period, block=block)
 
 
 class MocapState(NamedTuple):
@@ -110,7 +150,7 @@ class MocapState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MotionCaptureSensor:
+class MotionCaptureSensor(Component):
     """Motion capture: a pose is taken at every step, and arrives `latency` ticks later.
 
     It steps at exposures alone. Of tick t with `arrives([t])`, `MocapState.delivered` is the
@@ -120,7 +160,6 @@ class MotionCaptureSensor:
 
     period: int = 1
     latency: int = 0  # ticks
-    feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: MocapParameters, inputs: MocapInput, signals: Signals) -> MocapState:
         """See `Component.init`."""
@@ -145,29 +184,18 @@ class MotionCaptureSensor:
         return np.asarray((since >= 0) & (since % self.period == 0))
 
 
-class MocapSource:
-    """Time, and random numbers of motion capture."""
+def mocap_source(draws: Draws, period: int, rate: float) -> RandomSource:
+    """Return the time, and the random numbers of motion capture.
 
-    per_vehicle = True
+    Args:
+        draws: of each vehicle.
+        period: ticks from one sample to the next.
+        rate: of the ticks [1/s].
+    """
 
-    def __init__(self, draws: Draws, period: int, rate: float) -> None:
-        """Prepare to draw.
+    def sampled(x: Sequence[Coded], chance: Array, ticks: NDArray[np.intp]) -> MocapInput:
+        return MocapInput(ticks / rate, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), chance[0])
 
-        Args:
-            draws: of each vehicle.
-            period: ticks from one sample to the next.
-            rate: of the ticks [1/s].
-        """
-        seeds = draws.stream("motion_capture")
-        self._numbers = RandomSource(seeds, normals=9, uniforms=1, period=period, block=32)
-        self._period = period
-        self._rate = rate
-
-    def chunk(self, begin: int, end: int) -> Tree:
-        """See `Source.chunk`; a MocapInput."""
-
-        def sampled(x: Sequence[Coded], chance: Array) -> MocapInput:
-            times = (begin // self._period + np.arange(chance.shape[1])) * self._period / self._rate
-            return MocapInput(times, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), chance[0])
-
-        return self._numbers.inputs(begin, end, sampled)
+    return RandomSource(
+        draws.stream("motion_capture"), sampled, normals=9, uniforms=1, period=period, block=32
+    )

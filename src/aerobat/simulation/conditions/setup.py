@@ -15,9 +15,14 @@ from aerobat.simulation.components import (
     DelayTicks,
     StateObserver,
 )
-from aerobat.simulation.conditions.disturbance_observer import DisturbanceObserver, DisturbanceParameters
-from aerobat.simulation.conditions.draw import dispersed_fleet, draw_flights
-from aerobat.simulation.conditions.observer import EkfObserver, ObserverParameters, ObserverSource
+from aerobat.simulation.conditions.draw import Draws, dispersed_fleet
+from aerobat.simulation.conditions.observer import (
+    DisturbanceObserver,
+    DisturbanceParameters,
+    EkfObserver,
+    ObserverParameters,
+    ObserverSource,
+)
 from aerobat.simulation.conditions.parts import WHOLE, DispersedFlights, condition_parts, whole_ticks
 from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig
@@ -56,7 +61,7 @@ def dispersed_setup(
     nominal.without_dead_rotors()
     rate = _tick_rate(conditions, config.control_rate)
     numbers = config.flights or range(1)
-    draws = draw_flights(conditions, len(nominal.rotors), config.seed, numbers)
+    draws = Draws(conditions, len(nominal.rotors), config.seed, numbers)
     controller = config.controller_of([nominal])
     flights = DispersedFlights(
         draws=draws,

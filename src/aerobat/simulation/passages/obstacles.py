@@ -19,7 +19,7 @@ from aerobat import so3
 from aerobat.arrays import Array, Indices
 from aerobat.declaration import by_value
 from aerobat.environment.obstacles import Pieces
-from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.simulation.passages.passage import one_of_many
 from aerobat.vehicle import Ellipsoid
 
@@ -43,11 +43,11 @@ class NearestObstacle:
         return one_of_many(self, k, shared=0)
 
     @property
-    def failure(self) -> tuple[Outcome, float, dict[str, object]] | None:
-        """One flight's contact, when [s], and its numbers; None where there is none."""
+    def failure(self) -> FlightFailure | None:
+        """One flight's contact; None where there is none."""
         if not self.clearance < 0.0:
             return None
-        return Outcome.HIT_OBSTACLE, self.time, {"obstacle": self.obstacle}
+        return FlightFailure(self.time, Outcome.HIT_OBSTACLE, {"obstacle": self.obstacle})
 
 
 class FlownBodies(NamedTuple):

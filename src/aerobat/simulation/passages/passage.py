@@ -22,16 +22,15 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage
+from aerobat.certification.envelope import PlannedPassage
 from aerobat.declaration import by_value
-from aerobat.engines.components import components
-from aerobat.engines.pytree import tree_map
+from aerobat.engines.pytree import components, tree_map
 from aerobat.kernels.gates.progress import GatePlane, GateProgress
 from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
 from aerobat.kernels.gates.swath import NOWHERE, Extreme, Swath
 from aerobat.problem.gate import Gate
 from aerobat.problem.opening import EdgeProbe, edge_name
-from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.vehicle import Ellipsoid
 
 T = TypeVar("T")
@@ -89,31 +88,34 @@ class Passage:
         return one_of_many(self, k, shared=2)
 
     @property
-    def failure(self) -> tuple[Outcome, float, dict[str, object]] | None:
-        """One flight's failure, when [s], and its numbers; None where nothing is wrong, or known."""
+    def failure(self) -> FlightFailure | None:
+        """The mistake of one flight; None where nothing is wrong, or known."""
         if np.isnan(self.planned):
             return None
         if np.isnan(self.time):
             return self._instead()
         if not self.inside:
-            return Outcome.MISSED_GATE, self.time, {"miss": self.miss}
+            return self._failed(Outcome.MISSED_GATE, self.time, miss=self.miss)
         if self.clearance < 0.0:
-            numbers = {"excess_cm": -100 * self.clearance, "edge": self.closest_edge}
-            return Outcome.HIT_FRAME, self.closest_time, {**numbers}
+            excess_cm, edge = -100 * self.clearance, self.closest_edge
+            return self._failed(Outcome.HIT_FRAME, self.closest_time, excess_cm=excess_cm, edge=edge)
         if self.attitude_error_deg > self.attitude_tolerance_deg:
-            angles = {"angle": self.attitude_error_deg, "tolerance": self.attitude_tolerance_deg}
-            return Outcome.WRONG_ATTITUDE, self.time, {**angles}
+            angle, tolerance = self.attitude_error_deg, self.attitude_tolerance_deg
+            return self._failed(Outcome.WRONG_ATTITUDE, self.time, angle=angle, tolerance=tolerance)
         return None
 
-    def _instead(self) -> tuple[Outcome, float, dict[str, object]]:
+    def _instead(self) -> FlightFailure:
         """What happened in place of a crossing in the gate's direction."""
         if self.max_distance <= 0.0:
-            return Outcome.SHORT_OF_GATE, self.planned, {"short": -self.max_distance}
+            return self._failed(Outcome.SHORT_OF_GATE, self.planned, short=-self.max_distance)
         if self.max_distance >= PASSAGE_DEPTH and np.isfinite(self.backward_time):
-            return Outcome.BACKWARDS, self.backward_time, {}
+            return self._failed(Outcome.BACKWARDS, self.backward_time)
         if self.min_distance <= 0.0:
-            return Outcome.STOPPED_IN_GATE, self.planned, {"beyond_cm": 100 * self.max_distance}
-        return Outcome.EARLY, self.planned, {"early": self.min_distance}
+            return self._failed(Outcome.STOPPED_IN_GATE, self.planned, beyond_cm=100 * self.max_distance)
+        return self._failed(Outcome.EARLY, self.planned, early=self.min_distance)
+
+    def _failed(self, outcome: Outcome, time: float, **numbers: object) -> FlightFailure:
+        return FlightFailure(time, outcome, {"gate": f"gate '{self.gate}'", **numbers})
 
 
 def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Passage:

@@ -10,9 +10,9 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import by_value
-from aerobat.engines.components import components
+from aerobat.engines.pytree import components
 from aerobat.kernels.gates.pointing import Direction, Pointing
-from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, one_of_many
 
 
@@ -48,12 +48,12 @@ class StageAttitude:
         return one_of_many(self, k, shared=3)
 
     @property
-    def failure(self) -> tuple[Outcome, float, dict[str, object]] | None:
-        """One flight's failure, when [s], and its numbers; None where nothing is wrong, or known."""
+    def failure(self) -> FlightFailure | None:
+        """The mistake of one flight; None where nothing is wrong, or known."""
         if np.isnan(self.planned) or self.angle_deg <= self.tolerance_deg:
             return None
         angles = {"angle": self.angle_deg, "tolerance": self.tolerance_deg}
-        return Outcome.MISSED_ATTITUDE, self.planned, {"stage": self.stage, **angles}
+        return FlightFailure(self.planned, Outcome.MISSED_ATTITUDE, {"stage": self.stage, **angles})
 
 
 def stage_attitudes(planned: PlannedAttitude, found: Pointing, stop: Array) -> StageAttitude:

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import PlannedWaypoint
+from aerobat.certification.envelope import PlannedWaypoint
 from aerobat.declaration import by_value
-from aerobat.engines.components import components
+from aerobat.engines.pytree import components
 from aerobat.kernels.gates.approach import Approach, Target
-from aerobat.simulation.outcome import Outcome
+from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, one_of_many
 
 # [m] beyond the radius that is no miss: paths of least time touch the ball, and no flight is its path
@@ -40,12 +40,12 @@ class WaypointPassage:
         return one_of_many(self, k, shared=3)
 
     @property
-    def failure(self) -> tuple[Outcome, float, dict[str, object]] | None:
-        """One flight's failure, when [s], and its numbers; None where nothing is wrong, or known."""
+    def failure(self) -> FlightFailure | None:
+        """The mistake of one flight; None where nothing is wrong, or known."""
         if np.isnan(self.planned) or self.miss <= self.radius + GRAZING:
             return None
-        numbers: dict[str, object] = {"waypoint": self.waypoint, "miss": self.miss, "radius": self.radius}
-        return Outcome.MISSED_WAYPOINT, self.time, numbers
+        numbers = {"waypoint": self.waypoint, "miss": self.miss, "radius": self.radius}
+        return FlightFailure(self.time, Outcome.MISSED_WAYPOINT, numbers)
 
 
 def waypoint_passages(planned: PlannedWaypoint, found: Approach, stop: Array) -> WaypointPassage:

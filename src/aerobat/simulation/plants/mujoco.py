@@ -21,11 +21,11 @@ from aerobat.arrays import Array
 from aerobat.environment.obstacles import ConvexPiece, Obstacle
 from aerobat.environment.obstacles.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from aerobat.environment.obstacles.surface import surface_of
-from aerobat.errors import BackendMissing
+from aerobat.errors import import_extra
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.problem.gate import Gate
-from aerobat.simulation.contact import Contact
+from aerobat.simulation.outcome import Contact
 from aerobat.simulation.plants.plant import PLANTS, Actuation, Plant, PlantScene
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class MujocoRun:
     """A vehicle in MuJoCo, on its way; see `PlantRun`."""
 
     def __init__(self, scene: PlantScene, motion: VehicleState, contacts: bool, max_step: float) -> None:
-        self._mujoco = _import_mujoco()
+        self._mujoco = import_extra("mujoco", "the plant mujoco needs MuJoCo", "aerobat[mujoco]")
         self._airframe = scene.airframe
         rates = [rate for rate in scene.airframe.rotors.inverse_time_constant if rate < _AT_ONCE]
         self._max_step = min([max_step, *(1.0 / rate for rate in rates)])  # Runge-Kutta bears 2.8 times that
@@ -235,13 +235,3 @@ def _actuators(airframe: Airframe) -> Iterator[dict[str, str]]:
 
 def _text(numbers: Any) -> str:
     return " ".join(repr(float(number)) for number in numbers)
-
-
-def _import_mujoco() -> Any:
-    try:
-        import mujoco
-    except ImportError:
-        raise BackendMissing(
-            'the plant mujoco needs MuJoCo; install it with pip install "aerobat[mujoco]"'
-        ) from None
-    return mujoco

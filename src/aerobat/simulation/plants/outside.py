@@ -39,9 +39,9 @@ from aerobat.simulation.components import (
     with_ceiling,
     with_wind,
 )
-from aerobat.simulation.contact import Contact
 from aerobat.simulation.flight_controller import AutopilotRun, Sensed
-from aerobat.simulation.loop import Controlling, LoopInput, Signals, compose
+from aerobat.simulation.loop import Component, Controlling, LoopInput, Signals, compose
+from aerobat.simulation.outcome import Contact
 from aerobat.simulation.plants.plant import Actuation, PlantRun, PlantScene
 from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle.ellipsoid import Ellipsoid
@@ -50,11 +50,8 @@ ROUNDING = 1e-9  # of a step
 
 
 @dataclass(frozen=True)
-class OutsidePlant:
+class OutsidePlant(Component):
     """A plant that the loop is told of at every tick; its parameters are those of the vehicle's model."""
-
-    period: int = 1
-    feedthrough: bool = True
 
     def init(
         self, ops: Ops, parameters: PlantParameters, inputs: VehicleState, signals: Signals
@@ -75,11 +72,8 @@ class OutsidePlant:
 
 
 @dataclass(frozen=True)
-class Actuator:
+class Actuator(Component):
     """The inputs of the plant outside: commands, wind, and the rotors' limits as the battery leaves them."""
-
-    period: int = 1
-    feedthrough: bool = True
 
     def init(self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Actuation:
         """See `Component.init`."""

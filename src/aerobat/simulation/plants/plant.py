@@ -11,7 +11,7 @@ from aerobat.environment.obstacles import Obstacle
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.ops import PerRotor, Vector
 from aerobat.problem.gate import Gate
-from aerobat.simulation.contact import Contact
+from aerobat.simulation.outcome import Contact
 from aerobat.vehicle.ellipsoid import Ellipsoid
 
 

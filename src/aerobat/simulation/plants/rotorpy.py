@@ -16,10 +16,10 @@ from pydantic import PlainValidator
 
 from aerobat.arrays import Array
 from aerobat.declaration import FieldError, shown, validated
-from aerobat.errors import BackendMissing, SpecError
+from aerobat.errors import SpecError, import_extra
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.rigid_body import Body
-from aerobat.simulation.contact import Contact
+from aerobat.simulation.outcome import Contact
 from aerobat.simulation.plants.plant import PLANTS, Actuation, Plant, PlantScene
 from aerobat.vehicle import Rotor, Vehicle
 
@@ -186,7 +186,4 @@ def _parameters(name: str) -> dict[str, Any]:
 
 
 def _import_rotorpy(module: str) -> Any:
-    try:
-        return import_module(f"rotorpy.vehicles.{module}")
-    except ImportError:
-        raise BackendMissing("the plant rotorpy needs RotorPy; install it with pip install rotorpy") from None
+    return import_extra(f"rotorpy.vehicles.{module}", "the plant rotorpy needs RotorPy", "rotorpy")

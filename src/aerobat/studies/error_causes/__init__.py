@@ -1,8 +1,6 @@
 """The causes of flights' errors, switched on one at a time and all together."""
 
-from aerobat.studies.error_causes.cause import Cause, Trial
-from aerobat.studies.error_causes.four import four_causes
-from aerobat.studies.error_causes.measure import error_causes
-from aerobat.studies.error_causes.result import Cost, ErrorCauses, TrialResult
+from aerobat.studies.error_causes.cause import Cause, Trial, four_causes
+from aerobat.studies.error_causes.result import Cost, ErrorCauses, TrialResult, error_causes
 
 __all__ = ["Cause", "Cost", "ErrorCauses", "Trial", "TrialResult", "error_causes", "four_causes"]

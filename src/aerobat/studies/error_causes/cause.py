@@ -1,8 +1,10 @@
-"""Causes of error as values: what each changes in how a maneuver is planned and flown."""
+"""Causes of error as values: what each changes in how a maneuver is planned and flown; the paper's four."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from math import radians
 from types import MappingProxyType
 from typing import Annotated, Any
 
@@ -10,10 +12,13 @@ from pydantic import AfterValidator
 
 from aerobat.control import Controller
 from aerobat.declaration import AS_IT_IS, Label, declared
-from aerobat.environment import Dispersion
+from aerobat.environment import Dispersion, HandOff
 from aerobat.errors import SpecError
 from aerobat.planning import Planner
 from aerobat.studies.lens import lens
+
+OFFSET, TURN = 0.05, radians(2.0)  # [m], [rad] of the second camera system, as an old calibration leaves it
+SLOWER = 1.5  # times as slow as tuned are the loops of the detuned controller
 
 
 def _read_only(changes: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -69,3 +74,32 @@ def together(causes: Iterable[Cause], name: str) -> Cause:
 def _overlap(path: str, other: str) -> bool:
     """True where one path is the other, or leads into it."""
     return f"{path}.".startswith(f"{other}.") or f"{other}.".startswith(f"{path}.")
+
+
+def four_causes(conditions: Dispersion, controller: Controller) -> tuple[Cause, ...]:
+    """Rotors that the plan does not know, a bad hand-off, jerk as the input, gains that are not tuned.
+
+    They suit a planner with an order, 4 or more without them. Raises SpecError for conditions without motion
+    capture, which hands nothing over.
+    """
+    capture = conditions.motion_capture
+    if capture is None:
+        raise SpecError(
+            f"conditions '{conditions.name}' have no motion capture, whose hand-off is a cause; take lab"
+        )
+    hand_off = replace(capture.hand_off or HandOff(), translation=OFFSET, rotation=TURN)
+    return (
+        Cause("rotors not known", {"vehicle_known": False}),
+        Cause("hand-off 5 cm, 2°", {"conditions.motion_capture.hand_off": hand_off}),
+        Cause("jerk as input", {"planner.order": 3}),
+        Cause(
+            "gains not tuned",
+            {
+                "controller.position_gain": controller.position_gain / SLOWER**2,
+                "controller.velocity_gain": controller.velocity_gain / SLOWER,
+                "controller.integral_gain": controller.integral_gain / SLOWER**3,
+                "controller.attitude_frequency": controller.attitude_frequency / SLOWER,
+                "controller.attitude_integral_gain": controller.attitude_integral_gain / SLOWER**3,
+            },
+        ),
+    )

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import product
-from math import nan, prod
+from math import floor, isfinite, nan, prod
 from types import MappingProxyType
 from typing import Annotated, Any
 
@@ -15,22 +15,93 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field as Bounds
 
-from aerobat.declaration import NonNegative, Seed, by_value, in_notebooks, short, validated
+from aerobat.declaration import NonNegative, Seed, by_value, in_notebooks, short, shown, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
 from aerobat.planning import Planner, as_planner
 from aerobat.problem import Problem, as_problem
-from aerobat.studies.feasibility.axis import MAX_CELLS, Axis
-from aerobat.studies.feasibility.binding import least_reserve
-from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, ProbedTask, probe
+from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, ProbedTask, least_reserve, probe
 from aerobat.studies.flights import FlightTask, fly_scores
 from aerobat.studies.lens import Lens, Scenario, lens
-from aerobat.studies.sweep.share import Share
+from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
+MAX_CELLS = 10_000  # of a map: hours, where most are refused
+DIGITS = 12  # that values of a range are rounded to: steps of 0.1 add up to 0.3
+ROUNDING = 1e-9  # of a step
 MAX_AXES = 2
 Flights = Annotated[int, Bounds(ge=1, le=10**6, description="whole number from 1 to a million")]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A field's name, and its values in their order."""
+
+    name: str
+    values: tuple[float, ...]
+    unit: str = ""  # of the values
+
+    @property
+    def label(self) -> str:
+        """The name with the unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    @classmethod
+    def of(cls, name: str, values: object) -> Axis:
+        """The axis of any numbers in a row. Raises SpecError for what are none, or not each once."""
+        try:
+            row = np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            row = np.zeros((0, 0))
+        if row.ndim != 1 or not np.isfinite(row).all():
+            raise SpecError(
+                f"over: the values of {name} must be finite numbers in a row, got {shown(values)}"
+            )
+        if not len(row) or len(row) > MAX_CELLS:
+            raise SpecError(f"over: {name} must have from 1 to {MAX_CELLS} values, got {len(row)}")
+        if len(set(row.tolist())) < len(row):
+            raise SpecError(f"over: {name} has a value twice; give each once")
+        return cls(name, tuple(row.tolist()))
+
+    @classmethod
+    def parse(cls, text: str) -> Axis:
+        """The axis of a text, FIRST:LAST:STEP or values between commas behind a name and an equals sign."""
+        name, separator, numbers = text.partition("=")
+        name = name.strip()
+        if not separator or not name or not numbers.strip():
+            raise SpecError(f"over: give a field and its values, as speed=2:20:2, got {shown(text)}")
+        if ":" not in numbers:
+            return cls.of(name, [_number(each, text) for each in numbers.split(",")])
+        parts = [_number(each, text) for each in numbers.split(":")]
+        if len(parts) != 3:
+            raise SpecError(f"a range is FIRST:LAST:STEP, as speed=2:20:2, got {shown(text)}")
+        return cls(name, _range(name, *parts))
+
+
+def _number(text: str, whole: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = float("nan")
+    if not isfinite(number):
+        raise SpecError(f"{shown(text)} is no finite number in {shown(whole)}; give one, as speed=2:20:2")
+    return number
+
+
+def _range(name: str, first: float, last: float, step: float) -> tuple[float, ...]:
+    """The values from the first by steps to the last, itself where a step ends there."""
+    if step == 0.0:
+        raise SpecError(f"the step of {name} is 0; give another, or one value, as {name}={first:g}")
+    count = floor((last - first) / step + ROUNDING) + 1
+    if count < 1:
+        raise SpecError(
+            f"the range of {name} is empty: steps of {step:g} do not lead from {first:g} to {last:g}; "
+            "turn it round"
+        )
+    if count > MAX_CELLS:
+        raise SpecError(f"{name} has {count} values, {MAX_CELLS} at most are allowed; take a larger step")
+    return tuple(round(first + k * step, DIGITS) + 0.0 for k in range(count))
 
 
 @by_value

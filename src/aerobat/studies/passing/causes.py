@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from aerobat.environment import Dispersion
-from aerobat.studies.sweep import Share
+from aerobat.studies.share import Share
 
 CAUSES: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # each with what is there without it
     {

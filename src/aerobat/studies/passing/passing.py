@@ -23,8 +23,7 @@ from aerobat.studies.flights import FlightTask, cut, fly_scores
 from aerobat.studies.passing.causes import standing_in_the_way
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, firmer, narrowed, spread_of
-from aerobat.studies.sweep import Share
-from aerobat.studies.sweep.share import CONFIDENCE, percent
+from aerobat.studies.share import CONFIDENCE, Share, percent
 from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from aerobat.declaration import by_value, in_notebooks, short
 from aerobat.planning import Plan
 from aerobat.planning.tube import Tube
-from aerobat.studies.sweep import Share
+from aerobat.studies.share import Share
 
 
 @by_value

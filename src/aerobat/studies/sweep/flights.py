@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.evaluation import Passage, Score
+from aerobat.evaluation.score import Score
 from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
-from aerobat.simulation.conditions.draw import Draws, draw_flights
+from aerobat.simulation.conditions.draw import Draws
+from aerobat.simulation.passages import Passage
 from aerobat.studies.flights import CHUNK, FlightTask, cut
 
 SAMPLED = 4 * CHUNK  # flights, the first ones, whose errors are kept over time
@@ -66,7 +67,7 @@ def fly_chunk(task: FlightTask, flights: range) -> Chunk:
 
 def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> tuple[Columns, ErrorsOverTime]:
     """Columns of the table for some flights, and their errors over time if they are sampled."""
-    draws = draw_flights(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
+    draws = Draws(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
     stride = STRIDE if is_sampled else None
     scores, errors = score_over_time(task.plan, task.vehicle, None, None, task.config(numbers), stride)
     return _drawn(draws) | _scored(scores), errors
@@ -74,20 +75,20 @@ def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> tuple[Columns,
 
 def _drawn(draws: Draws) -> Columns:
     """What flights draw, in few numbers."""
-    effectiveness = draws.column("effectiveness")
+    effectiveness = draws.columns["effectiveness"]
     return {
         "flight": np.array(draws.flights),
-        "mass": draws.column("mass"),
-        "inertia": draws.column("inertia"),
-        "lag_mean": draws.column("lags").mean(axis=1),
+        "mass": draws.columns["mass"],
+        "inertia": draws.columns["inertia"],
+        "lag_mean": draws.columns["lags"].mean(axis=1),
         "thrust_mean": effectiveness.mean(axis=1),
         "thrust_min": effectiveness.min(axis=1),
-        "drag_1_s": draws.column("drag"),
-        "start_offset_m": _norms(draws.column("start_position")),
-        "start_speed_m_s": _norms(draws.column("start_velocity")),
-        "start_tilt_deg": np.rad2deg(_norms(draws.column("start_attitude"))),
-        "mean_wind_m_s": _norms(draws.column("mean_wind")),
-        "charge": draws.column("charge"),
+        "drag_1_s": draws.columns["drag"],
+        "start_offset_m": _norms(draws.columns["start_position"]),
+        "start_speed_m_s": _norms(draws.columns["start_velocity"]),
+        "start_tilt_deg": np.rad2deg(_norms(draws.columns["start_attitude"])),
+        "mean_wind_m_s": _norms(draws.columns["mean_wind"]),
+        "charge": draws.columns["charge"],
     }
 
 
@@ -113,7 +114,7 @@ def _scored(scores: Score) -> Columns:
 def _passage_outcome(passage: Passage) -> str:
     """One passage's end, as the outcome of a flight that has no other would be."""
     if passage.failure is not None:
-        return passage.failure[0].name.lower()
+        return passage.failure.outcome.name.lower()
     return NOT_REACHED if np.isnan(passage.time) else PASSED
 
 

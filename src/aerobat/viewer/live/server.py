@@ -17,8 +17,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from aerobat.errors import SpecError
-from aerobat.viewer.live.desk import Desk
-from aerobat.viewer.live.replan import Answer, LiveVerdict
+from aerobat.viewer.live.replan import Answer, Desk, LiveVerdict
 
 HOST = "127.0.0.1"
 MAX_CONNECTIONS = 64  # at a time, each with a thread: half of the files that the smallest shells let be open

@@ -15,8 +15,7 @@ from aerobat.planning import Plan, Planner, as_planner, planner_for, registered_
 from aerobat.problem import Problem, as_problem
 from aerobat.vehicle import Vehicle, as_vehicle
 from aerobat.viewer.document import document
-from aerobat.viewer.live.desk import Desk
-from aerobat.viewer.live.replan import Replanner, flown, judged
+from aerobat.viewer.live.replan import Desk, Replanner, flown, judged
 from aerobat.viewer.live.server import HOST, LiveServer
 from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.replay import inline_frame

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from aerobat.planning import Plan
 from aerobat.reporting.page import AXIS, TITLES, blank_page, heading, house_style, panel
 from aerobat.reporting.panels.stages import draw_stages
-from aerobat.reporting.paper.paper_figure import Caption, PaperFigure
-from aerobat.studies.paper import maneuver_flights
+from paper.flights import maneuver_flights
+from paper.paper_figure import Caption, PaperFigure
 
 HEIGHT = 6.9  # [in]
 LEFTS = (0.74, 6.55)  # [in] of the two panels

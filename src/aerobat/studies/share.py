@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
+
+from aerobat.environment import Dispersion
 
 CONFIDENCE = 0.95  # of the intervals
 MAX_DIGITS = 6  # of a percentage, behind the point
@@ -51,3 +54,24 @@ def percent(fraction: float) -> str:
     value = 100.0 * fraction
     texts = (f"{value:.{digits}f}" for digits in range(1, MAX_DIGITS + 1))
     return next((text for text in texts if float(text) not in (0.0, 100.0)), f"{value:.0f}")
+
+
+@dataclass(frozen=True)
+class Trials:
+    """A number of flights under conditions, and how many of them succeed."""
+
+    NEEDED: ClassVar[float] = 0.95  # of all flights
+
+    conditions: Dispersion
+    seed: int
+    share: Share
+
+    @property
+    def proven(self) -> bool:
+        """True if so many succeed that at least NEEDED of all do, at the share's confidence."""
+        return self.share.interval[0] >= self.NEEDED
+
+    @property
+    def refuted(self) -> bool:
+        """True if so few succeed that less than NEEDED of all do, at the share's confidence."""
+        return self.share.interval[1] < self.NEEDED

@@ -1,14 +1,15 @@
-"""Links over MAVLink: a plan flown on an autopilot, and the simulator as a vehicle that clients fly."""
+"""`aerobat link mavlink` and `mavlink-vehicle`: plans flown on an autopilot, and a vehicle for clients."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from cyclopts import Parameter
 
 from aerobat.arrays import Array
-from aerobat.cli.exit_code import ExitCode
+from aerobat.cli.failures import ExitCode
 from aerobat.cli.interrupts import REPORTED
 from aerobat.cli.link_options import MavlinkOptions, MavlinkVehicleOptions
 from aerobat.cli.runs.saved_plans import named_vehicle
@@ -28,12 +29,20 @@ CLEARANCE = 3.0  # [m] of a plan's lowest point over where the vehicle stands
 RECOVERED = 1.0  # [m] of the lowest point of a recovery from any instant of it, at the least
 
 
-def fly(plan: Path, options: MavlinkOptions) -> ExitCode:
-    """Fly a plan on an autopilot; the exit code tells if all went well.
+def mavlink(
+    plan: Path, options: Annotated[MavlinkOptions, Parameter(name="*")] = MavlinkOptions()
+) -> ExitCode:
+    """Fly a plan on an autopilot over MAVLink: PX4, or `aerobat link mavlink-vehicle`.
 
-    Args:
-        plan: A .plan file, or a run's folder.
-        options: Of the command.
+    Arms, takes off, goes to the plan's start, streams attitude, rates and thrust along the plan, holds where
+    it ends, and lands. Whatever goes wrong on the way, the vehicle is told to hover, then to land. Read
+    docs/vehicles.md before anything real is armed. Exits with 0 only if the plan was flown to its end,
+    through its gates, and the vehicle has landed.
+
+    Parameters
+    ----------
+    plan
+        A .plan file, or a run's folder.
     """
     found = read_plan(plan)
     if not isinstance(found, Plan):
@@ -72,12 +81,20 @@ def fly(plan: Path, options: MavlinkOptions) -> ExitCode:
     return ExitCode.WELL if report.is_success else ExitCode.NOT_WELL
 
 
-def simulate(vehicle: str, options: MavlinkVehicleOptions) -> None:
-    """Simulate a vehicle, until interrupted.
+def mavlink_vehicle(
+    vehicle: str = "agile-quad",
+    /,
+    options: Annotated[MavlinkVehicleOptions, Parameter(name="*")] = MavlinkVehicleOptions(),
+) -> None:
+    """Simulate a vehicle that MAVLink clients take for a PX4: `aerobat link mavlink`, ground stations.
 
-    Args:
-        vehicle: Its name or file.
-        options: Of the command.
+    It stands on the ground until it is armed, and runs until it is interrupted. A client that falls silent
+    while it is obeyed leaves it hovering.
+
+    Parameters
+    ----------
+    vehicle
+        A name that `aerobat show` lists, or a vehicle's TOML file.
     """
     found = named_vehicle(vehicle)
     from aerobat.links.autopilot.vehicle import SimulatedVehicle

@@ -11,12 +11,12 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.reporting.page import AXIS, blank_page, heading, house_style, legend, panel
-from aerobat.reporting.paper.paper_figure import Caption, PaperFigure
 from aerobat.reporting.style import BLUE, INK, MUTED, PAPER, RED, SMALL, YELLOW
 from aerobat.simulation import Flight
 from aerobat.studies.error_causes import ErrorCauses
-from aerobat.studies.paper import CAUSES, OPENINGS, TILTS, HardwareTrials, hardware_causes, hardware_trials
 from aerobat.vehicle import Vehicle, load_vehicle
+from paper.hardware import CAUSES, OPENINGS, TILTS, HardwareTrials, hardware_causes, hardware_trials
+from paper.paper_figure import Caption, PaperFigure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

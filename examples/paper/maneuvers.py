@@ -11,10 +11,10 @@ from aerobat.arrays import Array
 from aerobat.reporting.page import AXIS, blank_page, heading, house_style, panel
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import actual_poses, plan_reference, reference_poses
-from aerobat.reporting.paper.paper_figure import Caption, PaperFigure
 from aerobat.reporting.style import BLUE, MUTED, YELLOW
 from aerobat.simulation.outcome import length
-from aerobat.studies.paper import MANEUVERS, ManeuverFlights, maneuver_flights
+from paper.flights import MANEUVERS, ManeuverFlights, maneuver_flights
+from paper.paper_figure import Caption, PaperFigure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,7 +17,7 @@ from aerobat.planning import BisectionSearch, Miqp
 from aerobat.problem import GatePassage, HalfFlip, Limits, Problem, load_problem
 from aerobat.simulation import Flight, fly
 from aerobat.studies.error_causes import ErrorCauses, TrialResult, error_causes, four_causes
-from aerobat.studies.paper.maneuvers import HEXAROTOR
+from paper.flights import HEXAROTOR
 
 TILTS = (90, 75, 60, 45)  # [deg]
 OPENINGS = ((1.0, 0.6), (0.8, 0.4), (0.65, 0.25))  # [m] width and height; the body is 0.49 by 0.10

@@ -1,4 +1,4 @@
-"""The nodes of the command line, of ROS 1 and ROS 2 alike."""
+"""`aerobat link ros` and `ros-vehicle`: nodes of ROS 1 and ROS 2 alike."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from math import inf
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
 
 from aerobat import so3
 from aerobat.cli.link_options import RosOptions, RosVehicleOptions
@@ -28,12 +30,19 @@ from aerobat.vehicle import Vehicle
 _VEHICLE_RATE = 250.0  # [1/s] at which the simulated vehicle goes on
 
 
-def fly_on_demand(problems: tuple[str, ...], options: RosOptions) -> None:
-    """Offer maneuvers as services, until interrupted.
+def ros(*problems: str, options: Annotated[RosOptions, Parameter(name="*")] = RosOptions()) -> None:
+    """Fly maneuvers on demand as a node of ROS 1 or ROS 2.
 
-    Args:
-        problems: names or files of those beside the paper's.
-        options: of the command.
+    Offers services of std_srvs/Trigger: /aerobat/takeoff, the paper's line, flip, flip_pitch, flip_trans and
+    window (a half-flip), hold, and land. A maneuver is planned from where the odometry sees the vehicle
+    hover, answered once it begins, and streamed as goals; what came of it is told on /aerobat/report. Runs
+    until it is interrupted; a vehicle that gets no more goals is to hover by itself. Read docs/ros.md before
+    anything real is flown.
+
+    Parameters
+    ----------
+    problems
+        Names that `aerobat show` lists, or problems' TOML files, to be services too, of their names.
     """
     vehicle = named_vehicle(options.vehicle)
     settings = NodeSettings(
@@ -50,17 +59,51 @@ def fly_on_demand(problems: tuple[str, ...], options: RosOptions) -> None:
     for service, name in services.items():
         problem = load_problem(name)
         maneuvers[service] = problem, _planner(problem, vehicle, options)
-    ros = _joined("aerobat", options.generation, sim_time=options.sim_time)
+    middleware = _joined("aerobat", options.generation, sim_time=options.sim_time)
     try:
         # two, so that none of them is this one
         with processes(2, forked=False) as executor:
             _rehearse(executor, vehicle, maneuvers, settings)
-            node = ManeuverNode(ros, vehicle, maneuvers, executor, settings, say)
+            node = ManeuverNode(middleware, vehicle, maneuvers, executor, settings, say)
             say(f"flies {vehicle.name}: /aerobat/ takeoff, {', '.join(maneuvers)}, hold, land")
-            say(f"to look: {RVIZ[type(ros).__name__]}")
-            run(node, ros, options.rate, options.seconds or inf)
+            say(f"to look: {RVIZ[type(middleware).__name__]}")
+            run(node, middleware, options.rate, options.seconds or inf)
     finally:
-        ros.close()
+        middleware.close()
+
+
+def ros_vehicle(
+    vehicle: str = "agile-quad",
+    /,
+    options: Annotated[RosVehicleOptions, Parameter(name="*")] = RosVehicleOptions(),
+) -> None:
+    """Simulate a vehicle that is a node of ROS: goals in, odometry out, for `aerobat link ros`.
+
+    It stands on the ground, is armed by the first goal above it, and hovers where goals stop. Runs until it
+    is interrupted.
+
+    Parameters
+    ----------
+    vehicle
+        A name that `aerobat show` lists, or a vehicle's TOML file.
+    """
+    found = named_vehicle(vehicle)
+    clock = None if options.speed is None else PacedClock(options.speed)
+    middleware = _joined("aerobat_vehicle", options.generation, clock)
+    try:
+        node = VehicleNode(
+            middleware,
+            SimulatedVehicle(found, Environment()),
+            goal=options.goal,
+            odometry=options.odometry,
+            rate=options.rate,
+            clock=clock,
+            say=say,
+        )
+        say(f"{found.name} stands on the ground, and obeys {options.goal}")
+        run(node, middleware, _VEHICLE_RATE, options.seconds or inf)
+    finally:
+        middleware.close()
 
 
 def _rehearse(
@@ -95,32 +138,6 @@ def _joined(
     from aerobat.links.ros.rospy_middleware import RospyMiddleware
 
     return RospyMiddleware(name, clock)
-
-
-def simulate(vehicle: str, options: RosVehicleOptions) -> None:
-    """Simulate a vehicle, until interrupted.
-
-    Args:
-        vehicle: its name or file.
-        options: of the command.
-    """
-    found = named_vehicle(vehicle)
-    clock = None if options.speed is None else PacedClock(options.speed)
-    ros = _joined("aerobat_vehicle", options.generation, clock)
-    try:
-        node = VehicleNode(
-            ros,
-            SimulatedVehicle(found, Environment()),
-            goal=options.goal,
-            odometry=options.odometry,
-            rate=options.rate,
-            clock=clock,
-            say=say,
-        )
-        say(f"{found.name} stands on the ground, and obeys {options.goal}")
-        run(node, ros, _VEHICLE_RATE, options.seconds or inf)
-    finally:
-        ros.close()
 
 
 def _service(name: str) -> str:

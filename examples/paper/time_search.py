@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aerobat.planning import MinSnap, Plan, plan
+from aerobat.problem import load_problem
 from aerobat.reporting.page import AXIS, TITLES, blank_page, heading, house_style, panel, size_of
 from aerobat.reporting.panels.path import mark_ends
 from aerobat.reporting.panels.poses import plan_reference, reference_poses
-from aerobat.reporting.panels.signals import draw_limits
-from aerobat.reporting.paper.paper_figure import Caption, PaperFigure
+from aerobat.reporting.panels.timelines import draw_limits
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.glyphs import enlargement, vehicle_shapes
 from aerobat.reporting.scene.shapes import draw_depth_sorted
 from aerobat.reporting.style import BAND, BLUE, INK, MUTED, RED, SMALL
-from aerobat.reporting.tracking import tracking_page
 from aerobat.simulation.outcome import length
-from aerobat.studies.paper import TimeSearch, time_search
-from aerobat.studies.paper.maneuvers import FlownPlan
-from aerobat.studies.paper.time_search import STOPPED_AFTER
+from aerobat.vehicle import Vehicle, load_vehicle
+from paper.flights import FlownPlan, flown
+from paper.paper_figure import Caption, PaperFigure
+from paper.tracking import tracking_page
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+SECTION_V = "section-v"  # the problem, and the vehicle
+STOPPED_AFTER = 6  # iterations, in the paper's Fig. 10
 HEIGHT = 5.7  # [in]
 FOOT = AXIS + 0.13  # [in] for numbers in two lines
 PLANE = Camera(float(np.deg2rad(-90.0)))  # x to the right, z up
@@ -32,6 +37,33 @@ POSES = 9  # vehicles along the last path
 SIZE = 0.55  # [m] a vehicle, as drawn
 PAPER_ITERATIONS = 12
 PAPER_TIMES = {PAPER_ITERATIONS: (1.6, 3.1), STOPPED_AFTER: (1.0, 2.5)}  # [s] t1 and t2, its captions
+
+
+@dataclass(frozen=True, eq=False)
+class TimeSearch:
+    """The plans of a search's iterations, in their order; only the last one is within the rotors' limits."""
+
+    iterations: tuple[Plan, ...]
+    vehicle: Vehicle
+
+    @property
+    def optimized(self) -> FlownPlan:
+        """The last plan, flown (paper, Fig. 9)."""
+        return flown(self.iterations[-1], self.vehicle)
+
+    @property
+    def stopped(self) -> FlownPlan:
+        """The plan of the search stopped early, flown (paper, Fig. 10)."""
+        return flown(self.iterations[STOPPED_AFTER - 1], self.vehicle)
+
+
+@cache  # two figures show it, or three
+def time_search() -> TimeSearch:
+    """Search as printed, and plan with the search stopped at each iteration before the last."""
+    problem, vehicle = load_problem(SECTION_V), load_vehicle(SECTION_V)
+    last = plan(problem, MinSnap(), vehicle)
+    before = (plan(problem, MinSnap(stop_after=k), vehicle) for k in range(1, len(last.attempts)))
+    return TimeSearch((*before, last), vehicle)
 
 
 def figure_8(begin: Callable[[str], None]) -> PaperFigure:
@@ -108,8 +140,7 @@ def _times_text(times: tuple[float, float]) -> str:
 
 
 def _path_caption(search: TimeSearch) -> Caption:
-    plan = search.iterations[-1]
-    waypoint = plan.trajectory.evaluate(_times(search, len(search.iterations))[0])
+    waypoint = search.iterations[-1].trajectory.evaluate(_times(search, len(search.iterations))[0])
     return Caption(
         8,
         "A path of the alternative method",
@@ -124,9 +155,9 @@ def _path_caption(search: TimeSearch) -> Caption:
 def _draw_paths(axes: Axes, search: TimeSearch) -> None:
     """Draw all paths in the plane that holds them, the vehicle along the last one."""
     last = search.iterations[-1]
-    for plan in search.iterations:
-        path = PLANE.project(plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 201)))
-        final = plan is last
+    for each in search.iterations:
+        path = PLANE.project(each.trajectory.evaluate(np.linspace(0.0, each.duration, 201)))
+        final = each is last
         axes.plot(*path.T, color=INK if final else BAND, linewidth=1.8 if final else 0.9, zorder=2.0 + final)
     shown = reference_poses(plan_reference(last, search.vehicle))
     scale = enlargement(search.vehicle, SIZE)
@@ -150,10 +181,10 @@ def _draw_paths(axes: Axes, search: TimeSearch) -> None:
 
 def _draw_thrusts(axes: Axes, search: TimeSearch) -> None:
     """Draw the range of thrusts that each iteration asks, over the duration that it comes to."""
-    for number, plan in enumerate(search.iterations, start=1):
-        margin = plan.margin
+    for number, each in enumerate(search.iterations, start=1):
+        margin = each.margin
         assert margin is not None, "a plan for a vehicle has its rotors' margin"
-        colour = BLUE if plan.certified else RED
+        colour = BLUE if each.certified else RED
         axes.plot([number, number], [margin.min_thrust, margin.max_thrust], color=colour, linewidth=4.5)
     axes.set_yscale("symlog", linthresh=20.0)
     limits = (float(search.vehicle.min_thrusts.min()), float(search.vehicle.max_thrusts.max()))

@@ -11,9 +11,9 @@ import numpy as np
 from aerobat.planning import Plan
 from aerobat.reporting.page import AXIS, TITLES, blank_page, heading, house_style, legend, panel, size_of
 from aerobat.reporting.panels.timelines import finish_column
-from aerobat.reporting.paper.paper_figure import Caption, PaperFigure
 from aerobat.reporting.style import BAND, BLUE, FAINT, INK, MUTED, SKY, SMALL, YELLOW
-from aerobat.studies.paper import printed_plan
+from paper.flights import printed_plan
+from paper.paper_figure import Caption, PaperFigure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,7 +16,9 @@ from aerobat.reporting.page import AXIS, TITLES, Place, blank_page, heading, hou
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import actual_poses, reference_poses
-from aerobat.reporting.panels.signals import (
+from aerobat.simulation import Flight
+from aerobat.vehicle import Vehicle, as_vehicle
+from paper.signals import (
     Signal,
     draw_signal,
     effort_signals,
@@ -24,8 +26,6 @@ from aerobat.reporting.panels.signals import (
     rotor_signals,
     shade,
 )
-from aerobat.simulation import Flight
-from aerobat.vehicle import Vehicle, as_vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

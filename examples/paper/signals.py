@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aerobat.arrays import Array, Mask
 from aerobat.flatness import Reference
-from aerobat.reporting.page import size_of
-from aerobat.reporting.style import BAND, INK, MUTED, RED, SMALL
+from aerobat.reporting.panels.timelines import LIMIT, draw_limits, fit_to_limits
+from aerobat.reporting.style import BAND, INK, RED
 from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle, wrench
 
@@ -21,11 +20,9 @@ if TYPE_CHECKING:
 LimitPair = tuple[float, float]
 
 STILL = 0.01  # what changes by less than this fraction of its scale stands still
-REACH = 1.0  # by how many times the limits' distance an axis extends beyond them, at most
 REFERENCE_WIDTH, ACTUAL_WIDTH = 4.0, 1.2  # [pt]
 LEGEND = ("reference", "actual", "limits", "saturated")
 SATURATED = (RED, 0.13)
-LIMIT: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
 NEAR = 0.01  # of a rotor's range: a saturated command this near to a limit is at it, or soon will be
 
 
@@ -126,30 +123,6 @@ def draw_signal(axes: Axes, signal: Signal, reference_times: Array, actual_times
         axes.plot([], [], label=limits, **LIMIT)
     if signal.saturated is not None:
         shade(axes, actual_times, signal.saturated, saturated)
-
-
-def draw_limits(axes: Axes, limits: Sequence[float]) -> None:
-    """Draw dashed lines across axes."""
-    for limit in limits:
-        axes.axhline(limit, **LIMIT)
-
-
-def fit_to_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
-    """Make the upright axis show limits and values (...), cut off, and saying so, far beyond the limits."""
-    low, high = min(limits), max(limits)
-    lowest = min(float(values.min()), low)
-    highest = max(float(values.max()), high)
-    bottom = max(lowest, low - REACH * (high - low))
-    top = min(highest, high + REACH * (high - low))
-    pad = 0.08 * (top - bottom)
-    axes.set_ylim(bottom - pad, top + pad)
-    if lowest < bottom or highest > top:
-        x, y = 1.0 - 0.06 / size_of(axes)
-        note = f"cut off: {lowest:.4g} to {highest:.4g}".replace("-", "−")
-        axes.text(
-            x, y, note, size=SMALL, color=MUTED, ha="right", va="top", transform=axes.transAxes,
-            bbox={"fc": "white", "ec": "none", "pad": 1.5}, zorder=4.0,
-        )  # fmt: skip
 
 
 def shade(axes: Axes, times: Array, where: Mask, label: str = "") -> None:

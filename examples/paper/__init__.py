@@ -1,0 +1,1 @@
+"""The paper's experiments, planned and flown anew, and its figures, drawn from them."""
