@@ -113,10 +113,18 @@ class Pieces:
         gaps = pairs.gaps(normals[:, None])[:, 0]
         return Separation(normals, np.sum(normals * centres, axis=-1) - pairs.extents(normals) - gaps, gaps)
 
-    def distances(self, points: Array) -> Array:
-        """Return lower bounds of the distances of points (m, 3) to all pieces [m], (m,)."""
-        found = [piece.distances(points) for piece in self.pieces]
-        return np.asarray(np.min(found, axis=0)) if found else np.full(len(points), inf)
+    def distances(self, points: Array, exact_within: float = inf) -> Array:
+        """Return lower bounds of the distances to all pieces [m], (m,): those of boxes, or of what is in them.
+
+        Args:
+            points: Where from [m], (m, 3).
+            exact_within: The distance [m] from a piece's box from which on the box will do.
+        """
+        found = self.apart(points, points)
+        for number, near in enumerate(found.T < exact_within):
+            if near.any():
+                found[near, number] = self.pieces[number].distances(points[near])
+        return np.asarray(found.min(axis=1, initial=inf))
 
     @cached_property
     def largest(self) -> float:

@@ -21,6 +21,7 @@ from aerobat.vehicle import Ellipsoid
 CELLS = 25_000  # about so many: a way through takes a tenth of a second
 FINEST = 0.1  # [m] of a cell
 AROUND = 3.0  # [m] beyond the places to pass, that a grid reaches to all sides
+LOOKED_WITHIN = 1.2  # [m] from a piece's box, beyond which that is as good as the piece
 ROOM = 0.15  # [m] beyond the body's reach, within which cells cost more
 CLOSE = 4.0  # times its length, that a step costs more where the body on its side just fits
 STEPS = np.array([step for step in product((-1, 0, 1), repeat=3) if step > (0, 0, 0)])
@@ -78,7 +79,7 @@ class Cells:
     @cached_property
     def clearance(self) -> Array:
         """The distance of all cells to the nearest piece, at least [m], (n,)."""
-        return self.pieces.distances(self.centres)
+        return self.pieces.distances(self.centres, LOOKED_WITHIN)
 
     @cached_property
     def free(self) -> Mask:
