@@ -114,14 +114,14 @@ class Pieces:
         return Separation(normals, np.sum(normals * centres, axis=-1) - pairs.extents(normals) - gaps, gaps)
 
     def distances(self, points: Array, exact_within: float = inf) -> Array:
-        """Return lower bounds of the distances to all pieces [m], (m,): those of boxes, or of what is in them.
+        """Return lower bounds of the distances to all pieces [m], (m,), or to boxes around them.
 
         Args:
             points: Where from [m], (m, 3).
             exact_within: The distance [m] from a piece's box from which on the box will do.
         """
         found = self.apart(points, points)
-        for number, near in enumerate(found.T < exact_within):
+        for number, near in enumerate((found < exact_within).T):
             if near.any():
                 found[near, number] = self.pieces[number].distances(points[near])
         return np.asarray(found.min(axis=1, initial=inf))
