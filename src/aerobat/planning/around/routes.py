@@ -80,9 +80,9 @@ def straightened(grid: Cells, points: Array, slack: float) -> Array:
 
 def _is_straight(grid: Cells, points: Array, slack: float) -> bool:
     """True if the straight line between the ends is everywhere as clear as the way beside it, or has room."""
-    along = grid.pieces.distances(_spaced(points), grid.room)
+    along = grid.distances(_spaced(points), grid.room)
     beside = np.minimum(along, np.minimum(np.roll(along, 1), np.roll(along, -1)))
-    line = grid.pieces.distances(_spaced(points[[0, -1]]), grid.room)
+    line = grid.distances(_spaced(points[[0, -1]]), grid.room)
     return bool((line >= np.minimum(beside, grid.room) - slack * grid.step).all())
 
 

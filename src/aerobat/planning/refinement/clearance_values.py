@@ -37,12 +37,12 @@ class ClearanceValues:
         """The number of columns."""
         return 0 if self.clearance is None else NEAREST
 
-    def planes(self, derivatives: Array) -> Planes:
-        """The planes at places of a path's derivatives (m, 6, 3)."""
+    def planes(self, times: Array, derivatives: Array) -> Planes:
+        """The planes at places of a path's derivatives (m, 6, 3) at times (m,)."""
         assert self.clearance is not None, "planes are asked for where there are obstacles"
         thrust = self._thrust(derivatives)
         size = np.linalg.norm(thrust, axis=1, keepdims=True)
-        return self.clearance.planes(derivatives[:, 0], thrust / np.maximum(size, COMPLEX_STEP))
+        return self.clearance.planes(derivatives[:, 0], thrust / np.maximum(size, COMPLEX_STEP), times)
 
     def values(self, derivatives: Array, planes: Planes) -> Array:
         """The values at derivatives (m, 6, 3), (m, NEAREST)."""
