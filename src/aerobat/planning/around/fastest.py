@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
 from math import inf
 
 from aerobat.optimization.deadline import out_of_time
@@ -21,7 +22,7 @@ from aerobat.planning.warm_start import WarmStart
 QUICK_SEGMENTS = 6  # of a quick round's path: with fewer variables it goes farther, in half the time
 QUICK_PLACES = 12  # of a segment
 QUICK = Settings(iterations=40)
-QUICK_STRETCH = 2.0  # the factor by which durations may differ in it, as guesses are slow
+QUICK_STRETCHES = (2.0, 1.6)  # the factors by which durations may differ in it, a batch each in turn
 FOLLOWED = 2  # of the paths after it, the shortest ones, at a time: which is the best it tells nearly always
 
 
@@ -54,8 +55,8 @@ def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -
         segments: Of a path, at least.
         count: Of the routes, at most.
     """
-    for batch in guesses(refinement.task, count):
-        quick = sorted(_quickly_refined(refinement, segments, batch), key=lambda each: each.duration)
+    for batch, stretch in zip(guesses(refinement.task, count), cycle(QUICK_STRETCHES)):
+        quick = sorted(_quickly_refined(refinement, segments, batch, stretch), key=lambda each: each.duration)
         for k in range(0, len(quick), FOLLOWED):
             rough = _refined_roughly(quick[k : k + FOLLOWED], segments)
             for found in sorted(rough, key=lambda each: each.duration):
@@ -67,21 +68,23 @@ def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -
     return None
 
 
-def _quickly_refined(refinement: Refinement, segments: int, batch: Sequence[Guess]) -> Iterator[_Rough]:
+def _quickly_refined(
+    refinement: Refinement, segments: int, batch: Sequence[Guess], stretch: float
+) -> Iterator[_Rough]:
     """Yield the paths of guesses after one round, without those that are lost."""
     known: dict[float, Refinement] = {}  # by what is kept clear, compiled once each
     for guess in batch:
         own = known.setdefault(guess.task.clearance, replace(refinement, task=guess.task))
-        path = _quick(own, _begun(refinement, guess, segments), segments)
+        path = _quick(own, _begun(refinement, guess, segments, stretch), segments, stretch)
         if own.is_promising(path):
             yield _Rough(own, path)
         if out_of_time():
             return
 
 
-def _quick(refinement: Refinement, guess: WarmStart, segments: int) -> RefinedPath:
+def _quick(refinement: Refinement, guess: WarmStart, segments: int, stretch: float) -> RefinedPath:
     begun = knots_at_stages(guess, min(segments, QUICK_SEGMENTS))
-    return Rounds(refinement, begun, QUICK, QUICK_PLACES, stretch=QUICK_STRETCH).solve().source
+    return Rounds(refinement, begun, QUICK, QUICK_PLACES, stretch=stretch).solve().source
 
 
 def _refined_roughly(quick: Sequence[_Rough], segments: int) -> Iterator[_Rough]:
@@ -96,10 +99,10 @@ def _refined_roughly(quick: Sequence[_Rough], segments: int) -> Iterator[_Rough]
             return
 
 
-def _begun(refinement: Refinement, guess: Guess, segments: int) -> WarmStart:
+def _begun(refinement: Refinement, guess: Guess, segments: int, stretch: float) -> WarmStart:
     """The path of a guess, refined to pass walls on its side where it has to."""
     if guess.turned is None:
         return guess.path
     begun = replace(guess.path, stages=guess.turned.stages.stages)
     turned = Refinement.of(guess.turned, refinement.recorder, refinement.still_ends)
-    return replace(_quick(turned, begun, segments).path, stages=guess.path.stages)
+    return replace(_quick(turned, begun, segments, stretch).path, stages=guess.path.stages)
