@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
-from math import inf
+from math import ceil, inf
 
 from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.interior_point import Settings
 from aerobat.planning.around.guesses import ROUTES, Guess, guesses
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.refinement.refine import (
+    MAX_SEGMENTS,
     RefinedPath,
     Refinement,
     Rounds,
@@ -24,6 +25,8 @@ QUICK_PLACES = 12  # of a segment
 QUICK = Settings(iterations=40)
 QUICK_STRETCHES = (2.0, 1.6)  # the factors by which durations may differ in it, a batch each in turn
 FOLLOWED = 2  # of the paths after it, the shortest ones, at a time: which is the best it tells nearly always
+LONG = 12  # segments: a way of so many is refined roughly at once, few would lose it
+LONGEST = 0.5  # [s] of a guess's segment: with longer ones 100 m past trunks lose their way
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +78,18 @@ def _quickly_refined(
     known: dict[float, Refinement] = {}  # by what is kept clear, compiled once each
     for guess in batch:
         own = known.setdefault(guess.task.clearance, replace(refinement, task=guess.task))
-        path = _quick(own, _begun(refinement, guess, segments, stretch), segments, stretch)
+        count = _segments(guess.path, segments)
+        begun = _begun(refinement, guess, segments, stretch)
+        path = _quick(own, begun, segments, stretch) if count < LONG else own.rough(begun, count)
         if own.is_promising(path):
             yield _Rough(own, path)
         if out_of_time():
             return
+
+
+def _segments(guess: WarmStart, segments: int) -> int:
+    begun = guess.trajectory
+    return min(max(segments, begun.segments, ceil(begun.duration / LONGEST)), MAX_SEGMENTS)
 
 
 def _quick(refinement: Refinement, guess: WarmStart, segments: int, stretch: float) -> RefinedPath:
@@ -91,7 +101,8 @@ def _refined_roughly(quick: Sequence[_Rough], segments: int) -> Iterator[_Rough]
     """Yield the rough paths near quick ones, without those that are lost or far behind one before."""
     shortest = inf
     for each in quick:
-        path = each.refinement.rough(each.path.path, segments, shortest)
+        count = max(segments, each.path.path.trajectory.segments)
+        path = each.refinement.rough(each.path.path, count, shortest)
         if each.refinement.is_promising(path):
             yield _Rough(each.refinement, path)
             shortest = min(shortest, path.path.trajectory.duration)
