@@ -41,6 +41,19 @@ def box_mesh(path: Path, **moved: Any) -> None:
     made.export(path)
 
 
+def test_the_path_of_what_moves_is_read_from_a_csv_file(tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("t, x, y, z\n0, 1, 2, 3\n2, 1, 4, 3\n", encoding="utf-8")
+    kind = 'kind = "sphere"\nposition = [9, 0, 0]\nradius = 0.5\npath = '
+    (obstacle,) = problem_with(tmp_path, kind + '"path.csv"').environment.obstacles
+    assert obstacle.motion is not None
+    assert obstacle.motion.moved(np.array([-1.0, 0.5, 3.0])).tolist() == [[0, 0, 0], [0, 0.5, 0], [0, 2, 0]]
+    assert OBSTACLES.read(to_table(obstacle)) == obstacle
+    (tmp_path / "path.csv").write_text("0, 1, 2, 3\n2, x, 4, 3\n", encoding="utf-8")
+    assert "has a row that is not four numbers" in refusal(tmp_path, kind + '"path.csv"')
+    assert "there is no file" in refusal(tmp_path, kind + '"other.csv"')
+    assert "the time rising" in refusal(tmp_path, kind + "[[1, 0, 0, 0], [1, 1, 0, 0]]")
+
+
 def directions() -> np.ndarray:
     made = np.random.default_rng(0).normal(size=(500, 3))
     return made / np.linalg.norm(made, axis=1, keepdims=True)

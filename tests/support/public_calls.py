@@ -579,5 +579,5 @@ def _content(value: Any) -> dict[str, Any]:
 VALUES = [
     public
     for public in (getattr(ab, name) for name in ab.__all__)
-    if dataclasses.is_dataclass(public) and isinstance(public, type)
+    if dataclasses.is_dataclass(public) and isinstance(public, type) and not inspect.isabstract(public)
 ]

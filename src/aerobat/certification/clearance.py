@@ -82,7 +82,11 @@ def least_gap(path: BodyPath, pieces: Pieces) -> LeastGap:
     if not len(path.pieces):
         return LeastGap()
     centres, radii = path.balls
-    lower = pieces.apart(centres, centres) - radii[:, None]
+    over = (
+        path.pieces.times(path.trajectory, np.array(-1.0)),
+        path.pieces.times(path.trajectory, np.array(1.0)),
+    )
+    lower = pieces.apart(centres, centres, over) - radii[:, None]
     first = np.argsort(lower.min(axis=0))[:FIRST]
     pairs = _Beside.of(path, pieces, lower[:, first].argmin(axis=0), first).separated()
     found = pairs.nearest(LeastGap())
@@ -143,7 +147,7 @@ class _Beside:
 
     def separated(self) -> _Beside:
         """The same pairs with the planes that separate best in the middle of the parts."""
-        centres, axes = np.split(_in_the_middle(self.series), 2, axis=-1)
+        centres, axes = np.split(_in_the_middle(self._relative), 2, axis=-1)
         arms, shapes = self.path.body.turned(axes / np.linalg.norm(axes, axis=-1, keepdims=True))
         planes = self.pieces.separated(self.obstacles, centres + arms, shapes)
         found = replace(self, normals=planes.normals, offsets=planes.offsets)
@@ -157,9 +161,7 @@ class _Beside:
         row = int(np.argmin(gaps)) if len(gaps) else 0
         if not len(gaps) or gaps[row] >= known.value:
             return known
-        part = self.parts[row : row + 1]
-        pieces, position = self.path.pieces[part.interval], 2 * part.start + part.length - 1
-        time = float(pieces.times(self.path.trajectory, position)[0])
+        time = float(self[np.array([row])]._times(0.0)[0])
         name = self.pieces.pieces[self.obstacles[row]].name
         return replace(known, value=float(gaps[row]), time=time, obstacle=name)
 
@@ -184,13 +186,47 @@ class _Beside:
     def error(self) -> Array:
         """Of bounds and gaps, at most [m], (m,)."""
         position, axis = self.path.error[self.parts.interval].T
+        bent = self._moved[2]
         summed = np.abs(self._linear).sum(axis=1) + np.abs(self.offsets) + self.pieces.largest
-        return np.asarray(position + np.abs(self._lever) * axis + SUMMATION_ROUNDING * summed)
+        summed += np.abs(self.series[:, 0, :3]).sum(axis=1)
+        return np.asarray(position + bent + np.abs(self._lever) * axis + SUMMATION_ROUNDING * summed)
+
+    @cached_property
+    def _relative(self) -> Array:
+        """The series beside pieces that stay where they are at first."""
+        if not self.pieces.moving:
+            return self.series
+        middle, slope, _ = self._moved
+        series = self.series.copy()
+        series[:, 0, :3] -= middle
+        series[:, 1, :3] -= slope
+        return series
+
+    @cached_property
+    def _moved(self) -> tuple[Array, Array, Array]:
+        """How pieces move, m + s τ along the parts, τ in [−1, 1] [m], (m, 3) each; but for so much, (m,)."""
+        begin, end = self._times(-1.0), self._times(1.0)
+        first, last = self.pieces.moved(self.obstacles, begin), self.pieces.moved(self.obstacles, end)
+        bent = np.zeros(len(self))
+        for number, motion in self.pieces.moving:
+            own = np.flatnonzero(self.obstacles == number)
+            for jump in motion.times.tolist():
+                inside = own[(begin[own] < jump) & (jump < end[own])]
+                part = ((jump - begin[inside]) / (end - begin)[inside])[:, None]
+                line = first[inside] + part * (last - first)[inside]
+                away = np.linalg.norm(motion.moved(np.full(len(inside), jump)) - line, axis=-1)
+                bent[inside] = np.maximum(bent[inside], away)
+        return (first + last) / 2.0, (last - first) / 2.0, bent
+
+    def _times(self, position: float) -> Array:
+        """The times [s] of a position in [-1, 1] on each part, (m,)."""
+        along = 2 * self.parts.start + self.parts.length * (1 + position) - 1
+        return self.path.pieces[self.parts.interval].times(self.path.trajectory, along)
 
     @cached_property
     def _along(self) -> tuple[Array, Array]:
         """The series of n·p [m] and of u = n·b3, (m, K + 1) each."""
-        places = self.series.reshape(*self.series.shape[:2], 2, 3)
+        places = self._relative.reshape(*self.series.shape[:2], 2, 3)
         along = (places @ self.normals[:, None, :, None])[..., 0]
         return along[..., 0], along[..., 1]
 

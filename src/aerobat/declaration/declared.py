@@ -105,6 +105,8 @@ def declared(cls: type[T]) -> type[T]:
     plain_class: Any = cls  # checked by its fields even where a field of its base takes tables
     plain_class.__get_pydantic_core_schema__ = classmethod(lambda _, source, handler: handler(source))
     made: Any = pydantic_dataclass(frozen=True, eq=False, config=CONFIG)(cls)
+    in_order = sorted(made.__dataclass_fields__.items(), key=lambda item: item[1].kw_only is True)
+    made.__dataclass_fields__ = dict(in_order)  # those of a base that are given by name come last
     made.__get_pydantic_core_schema__ = classmethod(_field_schema)
     made.__checked_init__ = _checked(made.__init__)
     made.__init__ = _named_init(made)

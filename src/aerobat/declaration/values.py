@@ -137,5 +137,7 @@ def is_default(value: Any, field: dataclasses.Field[Any]) -> bool:
     default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
     current = getattr(value, field.name)
     if isinstance(current, np.ndarray) and default is not None:
-        return np.array_equal(current, np.broadcast_to(np.asarray(default), current.shape), equal_nan=True)
+        usual = np.asarray(default)
+        usual = usual if usual.size != 1 else np.broadcast_to(usual, current.shape)
+        return np.array_equal(current, usual, equal_nan=True)
     return bool(current is default if default is None else current == default)

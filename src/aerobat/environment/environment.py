@@ -40,7 +40,9 @@ class Environment:
     @cached_property
     def pieces(self) -> Pieces:
         """The convex pieces of all obstacles; names that several obstacles have are numbered."""
-        solids = [obstacle.pieces for obstacle in self.obstacles]
+        solids = [
+            tuple(replace(piece, motion=each.motion) for piece in each.pieces) for each in self.obstacles
+        ]
         shared = Counter(pieces[0].name for pieces in solids if pieces)
         seen: Counter[str] = Counter()
         found: list[ConvexPiece] = []

@@ -49,14 +49,16 @@ class Clearance:
     pieces: Pieces
     body: Ellipsoid
 
-    def planes(self, positions: Array, thrust_axes: Array) -> Planes:
+    def planes(self, positions: Array, thrust_axes: Array, times: Array) -> Planes:
         """Return the planes between body and pieces.
 
         Args:
             positions: Of the centre of mass [m], (m, 3).
             thrust_axes: Unit vectors, (m, 3).
+            times: [s], (m,).
         """
-        bodies, _, found = self._separated(positions, thrust_axes, EXACT_WITHIN)
+        bodies, numbers, found = self._separated(positions, thrust_axes, times, EXACT_WITHIN)
+        moved = np.sum(found.normals * self.pieces.moved(numbers, times[bodies]), axis=-1)
         order = np.lexsort((found.gaps, bodies))
         bodies = bodies[order]
         rank = np.arange(len(bodies)) - np.searchsorted(bodies, bodies)
@@ -64,18 +66,19 @@ class Clearance:
         rows, ranks, order = bodies[kept], rank[kept], order[kept]
         normals = np.tile([0.0, 0.0, 1.0], (len(positions), NEAREST, 1))
         offsets = np.full((len(positions), NEAREST), -inf)
-        normals[rows, ranks], offsets[rows, ranks] = found.normals[order], found.offsets[order]
+        normals[rows, ranks], offsets[rows, ranks] = found.normals[order], (found.offsets + moved)[order]
         return Planes(normals, offsets)
 
-    def least(self, positions: Array, thrusts: Array) -> tuple[list[float], list[str]]:
+    def least(self, positions: Array, thrusts: Array, times: Array) -> tuple[list[float], list[str]]:
         """Return the clearance [m] from the nearest piece at each place, infinite far away, and its name.
 
         Args:
             positions: Of the centre of mass [m], (m, 3).
             thrusts: Along the thrust axis there, of any length, (m, 3).
+            times: [s], (m,).
         """
         axes = thrusts / np.linalg.norm(thrusts, axis=-1, keepdims=True)
-        bodies, numbers, found = self._separated(positions, axes, inf)
+        bodies, numbers, found = self._separated(positions, axes, times, inf)
         gaps = found.gaps - self.body.revolved.aside
         least, names = [inf] * len(positions), [""] * len(positions)
         for body, number, gap in zip(bodies.tolist(), numbers.tolist(), gaps.tolist(), strict=True):
@@ -84,14 +87,14 @@ class Clearance:
         return least, names
 
     def _separated(
-        self, positions: Array, thrust_axes: Array, exact_within: float
+        self, positions: Array, thrust_axes: Array, times: Array, exact_within: float
     ) -> tuple[Indices, Indices, Separation]:
         """Bodies and pieces that are near, (m,) each, and the planes between them."""
         revolved = self.body.revolved
         offset, shapes = revolved.turned(thrust_axes)
         centres = positions + offset
-        bodies, numbers = self.pieces.near(centres, revolved.reach, AWAY)
-        found = self.pieces.separated(numbers, centres[bodies], shapes[bodies], exact_within)
+        bodies, numbers = self.pieces.near(centres, revolved.reach, AWAY, times)
+        found = self.pieces.separated(numbers, centres[bodies], shapes[bodies], exact_within, times[bodies])
         return bodies, numbers, found
 
 

@@ -96,8 +96,9 @@ def require_clear_ends(problem: Problem, vehicle: Vehicle | None) -> None:
     positions = np.array([state.position for state in ends.values()]).reshape(-1, 3)
     balance = force_balance(environment, vehicle)
     thrusts = [balance.specific_thrust(state.velocity, state.acceleration) for state in ends.values()]
-    clearance = Clearance(environment.pieces, vehicle.bounding_ellipsoid)
-    for end, left, name in zip(ends, *clearance.least(positions, np.array(thrusts)), strict=True):
+    clearance = Clearance(environment.pieces.still, vehicle.bounding_ellipsoid)
+    least = clearance.least(positions, np.array(thrusts), np.zeros(len(ends)))
+    for end, left, name in zip(ends, *least, strict=True):
         if left < 0.0:
             raise SpecError(
                 f"{end}.position: the body of {vehicle.name} reaches {length(-left)} into '{name}' there; "

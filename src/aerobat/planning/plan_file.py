@@ -149,6 +149,11 @@ def _in_full(environment: Environment) -> dict[str, Any]:
         "ground": environment.ground,
         "obstacles": [
             {"name": piece.name, "points": piece.points.tolist(), "rounding": piece.rounding.tolist()}
+            | (
+                {}
+                if piece.motion is None
+                else {"motion": [each.tolist() for each in vars(piece.motion).values()]}
+            )
             for piece in environment.pieces.pieces
         ],
     }

@@ -192,7 +192,7 @@ class Gate:
         return replace(self, normal=normal, up=up)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GateWall(Obstacle):
     """The wall of a gate: a piece beside each side of the polygon that planners take for its opening.
 

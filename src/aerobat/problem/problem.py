@@ -215,7 +215,7 @@ class Problem:
 
     def _check_clear_of_obstacles(self) -> None:
         """Refuse ends and gates whose middle lies in an obstacle."""
-        pieces = self.surroundings.pieces
+        pieces = self.surroundings.pieces.still
         places = {f"{end}.position": state.position for end, state in self.ends.items()}
         places |= {f"gates[{i}].position": gate.position for i, gate in enumerate(self.gates)}
         for field_name, place in places.items():

@@ -113,7 +113,12 @@ def _header(scene: Scene, blob: Blob) -> dict[str, Any]:
             for rotor in vehicle.rotors
         ],
         "gates": [_gate(gate) for gate in scene.gates],
-        "obstacles": _obstacles(scene.surfaces, blob),
+        "obstacles": _obstacles([each for each in scene.surfaces if each.motion is None], blob),
+        "moving": [
+            _obstacles([each], blob) | {"places": blob.add(each.motion.moved(scene.times), "f4")}
+            for each in scene.surfaces
+            if each.motion is not None
+        ],
         "stages": [{"name": s.name, "time": s.time, "gate": s.gate} for s in scene.stages],
         "ghosts": [
             {"name": g.name, "position": _rounded(g.position), "attitude": _rounded(g.q_world_body)}

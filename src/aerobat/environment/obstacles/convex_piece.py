@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.environment.obstacles.motion import Motion
 
 TINY = 1e-12  # [m] beside lengths that divide
 
@@ -24,11 +25,12 @@ def _not_rounded() -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ConvexPiece:
-    """The hull of points, each rounded by the ellipsoid of all L y with |y| ≤ 1, in the world."""
+    """The hull of points, each rounded by the ellipsoid of all L y with |y| ≤ 1, in the world at first."""
 
     points: Array  # [m] (V, 3)
     rounding: Array = field(default_factory=_not_rounded)  # L [m], (3, 3)
     name: str = "obstacle"  # of what it is a piece of
+    motion: Motion | None = None  # away from where it is here
 
     def support(self, normals: Array) -> Array:
         """Return how far it reaches [m] along unit vectors (..., 3), (...)."""

@@ -7,18 +7,25 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import ClassVar, TypeVar, cast, dataclass_transform
 
+import numpy as np
 from pydantic import Field
 
-from aerobat.declaration import Label, Registry, validated
+from aerobat.declaration import Label, Registry, Vector3, validated
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
+from aerobat.environment.obstacles.motion import Motion, PathRows
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class Obstacle(ABC):
-    """Something solid that stands in the world, made of convex pieces.
+    """Something solid in the world that stands or moves without turning, made of convex pieces.
 
     An obstacle of one's own inherits from this class, is registered by `@obstacle("its-name")`, and says its
     pieces: planners, certificates, flights and pictures know nothing else of it.
     """
+
+    velocity: Vector3 = dataclasses.field(default_factory=lambda: np.zeros(3))  # [m/s] with which it moves
+    # t [s], x, y, z [m] of a point of it: straight from row to row, in its place at the first
+    path: PathRows = dataclasses.field(default_factory=lambda: np.zeros((0, 4)))
 
     kind: ClassVar[str] = ""  # its name in files, set when it is registered
 
@@ -26,6 +33,12 @@ class Obstacle(ABC):
     @abstractmethod
     def pieces(self) -> tuple[ConvexPiece, ...]:
         """The convex pieces, in the world."""
+
+    @property
+    def motion(self) -> Motion | None:
+        """The motion; None for what stands still."""
+        moves = self.velocity.any() or len(self.path)
+        return Motion(self.velocity, self.path) if moves else None
 
 
 O = TypeVar("O", bound=Obstacle)  # noqa: E741 - an obstacle

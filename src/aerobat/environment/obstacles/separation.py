@@ -23,6 +23,7 @@ import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
 from aerobat.environment.obstacles.convex_piece import TINY, ConvexPiece, units
+from aerobat.environment.obstacles.motion import Motion
 
 STEPS = 40  # of Newton's method at most; most pairs take five
 ENOUGH = 1e-11  # [m] a step that gains less is the last
@@ -40,44 +41,74 @@ class Separation:
     """Planes between bodies and pieces, a pair a row."""
 
     normals: Array  # unit vectors from the piece to the body, (m, 3)
-    offsets: Array  # [m] of the plane along them that touches the piece, h(n), (m,)
+    offsets: Array  # [m] of the plane along them that touches the piece where that is at first, h(n), (m,)
     gaps: Array  # [m] between body and piece across the plane, (m,)
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """All convex pieces of a world, as arrays."""
+    """All convex pieces of a world, as arrays.
+
+    Where times [s] are given pieces are where they are then, else where they are at first.
+    """
 
     pieces: tuple[ConvexPiece, ...]
 
     def __len__(self) -> int:
         return len(self.pieces)
 
-    def near(self, centres: Array, reach: float, within: float) -> tuple[Indices, Indices]:
+    @property
+    def still(self) -> Pieces:
+        """The pieces that never move."""
+        return Pieces(tuple(piece for piece in self.pieces if piece.motion is None))
+
+    @cached_property
+    def moving(self) -> tuple[tuple[int, Motion], ...]:
+        """The numbers and motions of those that move."""
+        return tuple((k, piece.motion) for k, piece in enumerate(self.pieces) if piece.motion is not None)
+
+    def moved(self, pieces: Indices, times: Array) -> Array:
+        """Return how far pieces (m,) have moved [m] at times (m, ...), (m, ..., 3)."""
+        found = np.zeros((*times.shape, 3))
+        for number, motion in self.moving:
+            own = np.broadcast_to(pieces.reshape(-1, *[1] * (times.ndim - 1)) == number, times.shape)
+            found[own] = motion.moved(times[own])
+        return found
+
+    def near(
+        self, centres: Array, reach: float, within: float, times: Array | None = None
+    ) -> tuple[Indices, Indices]:
         """Return the pairs of bodies and pieces that may be near, as numbers of bodies and of pieces.
 
         Args:
             centres: Of the bodies [m], (m, 3).
             reach: Of a body from its centre in whichever direction, at most [m].
             within: The distance [m] between body and piece from which on a pair is left out.
+            times: Of the bodies, (m,).
         """
-        bodies, pieces = np.nonzero(self.apart(centres, centres) < reach + within)
+        over = None if times is None else (times, times)
+        bodies, pieces = np.nonzero(self.apart(centres, centres, over) < reach + within)
         return bodies, pieces
 
-    def apart(self, lower: Array, upper: Array) -> Array:
+    def apart(self, lower: Array, upper: Array, over: tuple[Array, Array] | None = None) -> Array:
         """Return how far boxes are at least from all pieces [m]: from the boxes around these.
 
         Args:
             lower: Lower corners [m], (..., 3).
             upper: Upper corners [m], (..., 3).
+            over: When each box's time begins and ends, (...) both.
 
         Returns:
             Distances (..., P).
         """
         own_lower, own_upper = self._boxes
+        if over is not None and self.moving:
+            own_lower, own_upper = self._boxes_over(*over, lower.shape[:-1])
         squares: Array = np.zeros((*lower.shape[:-1], len(self)))
         for k in range(3):  # which is faster than a last axis of three
-            between = np.maximum(own_lower[:, k] - upper[..., None, k], lower[..., None, k] - own_upper[:, k])
+            between = np.maximum(
+                own_lower[..., k] - upper[..., None, k], lower[..., None, k] - own_upper[..., k]
+            )
             squares += np.maximum(between, 0.0) ** 2
         return np.sqrt(squares)
 
@@ -89,19 +120,37 @@ class Pieces:
         inside = pieces[found.gaps < 0.0]
         return self.pieces[inside[0]] if len(inside) else None
 
+    def _boxes_over(self, begin: Array, end: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
+        """The corners of the boxes around all pieces over times (...), (..., P, 3) each."""
+        lower, upper = (np.broadcast_to(each, (*shape, *each.shape)).copy() for each in self._boxes)
+        for number, motion in self.moving:
+            inside = [np.clip(time, begin, end) for time in motion.times.tolist()]
+            moved = motion.moved(np.stack([begin, end, *inside]))
+            lower[..., number, :] += moved.min(axis=0)
+            upper[..., number, :] += moved.max(axis=0)
+        return lower, upper
+
     def separated(
-        self, pieces: Indices, centres: Array, shapes: Array, exact_within: float = inf
+        self,
+        pieces: Indices,
+        centres: Array,
+        shapes: Array,
+        exact_within: float = inf,
+        times: Array | None = None,
     ) -> Separation:
-        """Separate bodies from pieces, pair by pair.
+        """Separate bodies from pieces, pair by pair; planes are where pieces are at first.
 
         Args:
             pieces: The number of each pair's piece, (m,).
             centres: Of each pair's body [m], (m, 3).
             shapes: L of each pair's body [m], (m, 3, 3).
             exact_within: The gap [m] beyond which a plane between will do that is not the best.
+            times: Of each pair, (m,).
         """
         if not len(pieces):
             return Separation(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+        if times is not None and self.moving:
+            centres = centres - self.moved(pieces, times)
         normals = np.empty_like(centres)
         for number in np.unique(pieces):
             own = pieces == number
@@ -113,10 +162,20 @@ class Pieces:
         gaps = pairs.gaps(normals[:, None])[:, 0]
         return Separation(normals, np.sum(normals * centres, axis=-1) - pairs.extents(normals) - gaps, gaps)
 
-    def distances(self, points: Array) -> Array:
-        """Return lower bounds of the distances of points (m, 3) to all pieces [m], (m,)."""
-        found = [piece.distances(points) for piece in self.pieces]
-        return np.asarray(np.min(found, axis=0)) if found else np.full(len(points), inf)
+    def distances(self, points: Array, exact_within: float = inf, times: Array | None = None) -> Array:
+        """Return lower bounds of the distances to all pieces [m], (m,), or to boxes around them.
+
+        Args:
+            points: Where from [m], (m, 3).
+            exact_within: The distance [m] from a piece's box from which on the box will do.
+            times: Of the points, (m,).
+        """
+        found = self.apart(points, points, None if times is None else (times, times))
+        for number, near in enumerate((found < exact_within).T):
+            if near.any():
+                moved = 0.0 if times is None else self.moved(np.full(near.sum(), number), times[near])
+                found[near, number] = self.pieces[number].distances(points[near] - moved)
+        return np.asarray(found.min(axis=1, initial=inf))
 
     @cached_property
     def largest(self) -> float:

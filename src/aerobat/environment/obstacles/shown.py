@@ -25,15 +25,16 @@ def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surfa
     """Return what is seen of the pieces near points; what reaches far from them is cut off there.
 
     Args:
-        pieces: In the world.
+        pieces: In the world; those that move are whole.
         points: What else is shown [m], (n, 3).
     """
     low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max())
     lower, upper = low - NEAR * size, high + NEAR * size
-    near = [each for each in pieces if (each.box[0] <= upper).all() and (each.box[1] >= lower).all()]
+    still = [each for each in pieces if each.motion is None]
+    near = [each for each in still if (each.box[0] <= upper).all() and (each.box[1] >= lower).all()]
     whole = [surface_of(piece) for piece in near]
-    parts = _apart(near, whole) if len(near) <= MANY else whole
+    parts = [*(_apart(near, whole) if len(near) <= MANY else whole)]
     margin = WHOLE * size
     found = (
         part
@@ -41,7 +42,8 @@ def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surfa
         else part.within(lower, upper)
         for part in parts
     )
-    return tuple(surface for surface in found if surface.faces)
+    moving = (surface_of(piece) for piece in pieces if piece.motion is not None)
+    return tuple(surface for surface in (*found, *moving) if surface.faces)
 
 
 def _apart(pieces: Sequence[ConvexPiece], surfaces: Sequence[Surface]) -> Iterator[Surface]:

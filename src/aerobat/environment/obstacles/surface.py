@@ -16,6 +16,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
+from aerobat.environment.obstacles.motion import Motion
 
 FACETS = 24  # around what is round: a turn of 15° from each to the next
 SHARP = np.cos(np.deg2rad(20.0))  # of the angle between two faces: those of what is round meet at less
@@ -31,6 +32,14 @@ class Surface:
     name: str  # of the obstacle
     faces: tuple[Array, ...]  # corners of each [m], anticlockwise from outside, (k, 3)
     edges: Array  # [m] the ends of the sharp edges, (n, 2, 3)
+    motion: Motion | None = None  # away from where it is here
+
+    def at(self, time: float) -> Surface:
+        """Return it where it is at a time [s]."""
+        if self.motion is None:
+            return self
+        moved = self.motion.moved(np.array(time))
+        return Surface(self.name, tuple(face + moved for face in self.faces), self.edges + moved)
 
     @property
     def points(self) -> Array:
@@ -60,7 +69,7 @@ class Surface:
         lines = [clipped(edge, lower, upper) for edge in self.edges]
         edges = [line for line in lines if len(line) > 1]
         kept = tuple(face for face in faces if len(face) > 2)
-        return Surface(self.name, kept, np.array(edges).reshape(-1, 2, 3))
+        return Surface(self.name, kept, np.array(edges).reshape(-1, 2, 3), self.motion)
 
 
 def surface_of(piece: ConvexPiece, facets: int = FACETS) -> Surface:
@@ -72,7 +81,7 @@ def surface_of(piece: ConvexPiece, facets: int = FACETS) -> Surface:
     """
     points = (piece.points[:, None] + _rounding(piece, facets)).reshape(-1, 3)
     faces = _faces(points)
-    return Surface(piece.name, faces, _sharp_edges(faces))
+    return Surface(piece.name, faces, _sharp_edges(faces), piece.motion)
 
 
 def flattening(piece: ConvexPiece, facets: int = FACETS) -> float:

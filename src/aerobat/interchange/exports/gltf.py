@@ -57,7 +57,13 @@ def blender_scene(plan: Plan, rate: float) -> Content:
         scene.node(gate.name, scene.mesh(gate.name, [scene.primitive(_frame(gate), TRIANGLES, "gate")]))
     for solid in solid_surfaces(plan):
         corners = solid.triangles.reshape(-1, 3)
-        scene.node(solid.name, scene.mesh(solid.name, [scene.primitive(corners, TRIANGLES, "obstacle")]))
+        node = scene.node(
+            solid.name, scene.mesh(solid.name, [scene.primitive(corners, TRIANGLES, "obstacle")])
+        )
+        if solid.motion is not None:
+            scene.animate(
+                node, times, {"translation": _y_up(solid.motion.moved(found.times).astype(np.float32))}
+            )
     rotation = np.concatenate([_y_up(q[:, 1:]), q[:, :1]], axis=1)
     scene.animate(vehicle, times, {"translation": _y_up(position), "rotation": rotation})
     rows = ExportRows(found.times, position.astype(float), None, so3.normalize(q))

@@ -2,7 +2,8 @@
 
 A cell is free where a point in its middle is clear of all pieces by the body's least semi-axis: a body on its
 side passes where it does not level. Cells nearer to a piece than the body reaches cost more, so that a way
-keeps off where there is room.
+keeps off where there is room. Pieces that move are where they are when the body comes by: a cell is passed as
+late as it is far from the start beside the goal.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from aerobat.vehicle import Ellipsoid
 CELLS = 25_000  # about so many: a way through takes a tenth of a second
 FINEST = 0.1  # [m] of a cell
 AROUND = 3.0  # [m] beyond the places to pass, that a grid reaches to all sides
+LOOKED_WITHIN = 1.2  # [m] from a piece's box, beyond which that is as good as the piece
 ROOM = 0.15  # [m] beyond the body's reach, within which cells cost more
 CLOSE = 4.0  # times its length, that a step costs more where the body on its side just fits
 STEPS = np.array([step for step in product((-1, 0, 1), repeat=3) if step > (0, 0, 0)])
@@ -34,21 +36,26 @@ class Cells:
     body: Ellipsoid
     lower: Array  # [m] the box's corner, (3,)
     upper: Array  # [m] the opposite one, (3,)
+    ends: Array  # [m] where all begins and ends, (2, 3)
+    duration: float  # [s] from end to end, about: when the body is in a cell, where pieces are then
 
     @classmethod
-    def around(cls, pieces: Pieces, body: Ellipsoid, places: Array, lower: Array, upper: Array) -> Cells:
+    def around(
+        cls, pieces: Pieces, body: Ellipsoid, places: Array, lower: Array, upper: Array, duration: float
+    ) -> Cells:
         """Return the grid around places to pass.
 
         Args:
             pieces: Of all obstacles.
             body: That passes.
-            places: [m] (k, 3).
+            places: [m] (k, 3), in the order in which they are passed.
             lower: The corner of the volume allowed [m], −infinite where it is open.
             upper: The opposite one.
+            duration: From the first place to the last [s], about.
         """
         low = np.maximum(places.min(axis=0) - AROUND, lower)
         high = np.minimum(places.max(axis=0) + AROUND, upper)
-        return cls(pieces, body, low, high)
+        return cls(pieces, body, low, high, places[[0, -1]], duration)
 
     @property
     def room(self) -> float:
@@ -75,10 +82,16 @@ class Cells:
         ]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
+    def distances(self, points: Array, exact_within: float) -> Array:
+        """Return the distances of points to the nearest piece, at least [m], when the body is there, (n,)."""
+        before, after = np.linalg.norm(points - self.ends[:, None], axis=-1)
+        times = self.duration * before / np.maximum(before + after, self.step)
+        return self.pieces.distances(points, exact_within, times)
+
     @cached_property
     def clearance(self) -> Array:
         """The distance of all cells to the nearest piece, at least [m], (n,)."""
-        return self.pieces.distances(self.centres)
+        return self.distances(self.centres, LOOKED_WITHIN)
 
     @cached_property
     def free(self) -> Mask:

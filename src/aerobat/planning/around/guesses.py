@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
+from math import ceil, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,8 @@ LEAST_CLEARANCE = 0.001  # [m] that is kept clear in the narrowest: what lies be
 # how near straight lines cut corners, of a cell, and times the duration of a closed form, in turn: slits are
 # reached from slow ones, windows by those that cut no corner
 STARTS = ((0.1, 1.4), (0.0, 1.4), (0.1, 1.8), (0.0, 1.0))
+HURRIED = 0.5  # of the vehicle's thrust that accelerates it, by which the duration is foreseen
+LATE = (1.0, 1.4, 0.7)  # times that duration, at which routes pass what moves: behind it, or in front
 BOTH_WAYS = 0.5  # of an upright's height, below which the body may turn either way
 TOLERANCE = 0.1  # [rad] of a body on its side, at first
 LEAST_THRUST = 0.4  # of gravity, of a body on its side
@@ -57,15 +60,20 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
     legs = list(zip([begin for _, begin in places[:-1]], [end for end, _ in places[1:]], strict=True))
     lower, upper = task.problem.path_limits.of(0)
     corners = np.array([point for leg in legs for point in leg])
-    grid = Cells.around(task.environment.pieces, task.vehicle.bounding_ellipsoid, corners, lower, upper)
-    ends = float(grid.pieces.distances(corners[[0, -1]]).min())
+    pieces = task.environment.pieces
+    hurried = _hurried(task, corners)
+    grids = [
+        Cells.around(pieces, task.vehicle.bounding_ellipsoid, corners, lower, upper, late * hurried)
+        for late in (LATE if pieces.moving else LATE[:1])
+    ]
+    ends = float(pieces.still.distances(corners[[0, -1]]).min())
     walls = [gate for gate in (_in_wall(task, stage) for stage in task.stages.stages) if gate is not None]
     narrowest = min([ends, *(gate.opening.inradius for gate in walls)])
     body = task.vehicle.bounding_ellipsoid.revolved
-    found = list(routes(grid, legs, count))
+    found = [(grid, way) for grid in grids for way in routes(grid, legs, ceil(count / len(grids)))]
     for turned, (slack, pace) in product(_turned(task) if found else (), STARTS):
         paths = []
-        for flown, clear in _different(grid, found, slack):
+        for flown, clear in _different(found, slack):
             room = min(narrowest, clear) - min(body.wide, body.high)
             clearance = min(task.clearance, max(SHARE * room, LEAST_CLEARANCE))
             path = _along(turned or task, flown).time_scaled(pace)
@@ -74,10 +82,16 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
         yield paths
 
 
-def _different(grid: Cells, found: Iterable[Way], slack: float) -> Iterator[tuple[list[Array], float]]:
+def _hurried(task: Task, corners: Array) -> float:
+    """The duration [s] from rest to rest along corners (k, 3) at much of the vehicle's thrust, about."""
+    length = float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum())
+    return 2.0 * sqrt(length / (HURRIED * task.vehicle.max_specific_thrust))
+
+
+def _different(found: Iterable[tuple[Cells, Way]], slack: float) -> Iterator[tuple[list[Array], float]]:
     """Yield the corners of ways and their clearances [m], but of ways whose corners one before has."""
     known: list[Array] = []
-    for way in found:
+    for grid, way in found:
         legs = [straightened(grid, leg, slack) for leg in way.legs]
         corners = np.concatenate(legs)
         if not any(len(x) == len(corners) and np.abs(x - corners).max() < CLOSEST for x in known):

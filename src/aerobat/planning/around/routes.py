@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from aerobat.arrays import Array, Indices
-from aerobat.planning.around.cells import Cells
+from aerobat.planning.around.cells import LOOKED_WITHIN, Cells
 
-BETWEEN = 1.2  # [m] from a route to what it passes, at most, that a curtain hangs on
+BETWEEN = LOOKED_WITHIN  # [m] from a route to what it passes, at most, that a curtain hangs on
 WIDE = 4.0  # [m] from a route, that a curtain reaches at most
 DETOUR = 1.5  # [m] that it costs to pass a curtain
 LOOKED_AT = 24  # places of a straight line, at which it is looked whether it is free
@@ -80,9 +80,9 @@ def straightened(grid: Cells, points: Array, slack: float) -> Array:
 
 def _is_straight(grid: Cells, points: Array, slack: float) -> bool:
     """True if the straight line between the ends is everywhere as clear as the way beside it, or has room."""
-    along = grid.pieces.distances(_spaced(points))
+    along = grid.distances(_spaced(points), grid.room)
     beside = np.minimum(along, np.minimum(np.roll(along, 1), np.roll(along, -1)))
-    line = grid.pieces.distances(_spaced(points[[0, -1]]))
+    line = grid.distances(_spaced(points[[0, -1]]), grid.room)
     return bool((line >= np.minimum(beside, grid.room) - slack * grid.step).all())
 
 

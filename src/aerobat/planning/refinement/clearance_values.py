@@ -7,17 +7,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from aerobat.arrays import Array, xyz
+from aerobat.arrays import Array
 from aerobat.engines.array_functions import COMPLEX_STEP, ArrayFunction, array_function, gradient
 from aerobat.engines.tracing import Trace, TraceOps
-from aerobat.kernels.vectors import add, add_scaled
 from aerobat.limits.clearance import NEAREST, SIZE, Clearance, Planes, left_between
 from aerobat.planning.task import Task
-from aerobat.problem.problem import DERIVATIVES
 
 MOVED = 6  # components of velocity and acceleration, in which clearances are not linear
 FAR = 1e3  # [m] that is left to planes that do not count
@@ -40,29 +37,28 @@ class ClearanceValues:
         """The number of columns."""
         return 0 if self.clearance is None else NEAREST
 
-    def planes(self, derivatives: Array) -> Planes:
-        """The planes at places of a path's derivatives (m, 6, 3)."""
+    def planes(self, times: Array, derivatives: Array) -> Planes:
+        """The planes at places of a path's derivatives (m, 6, 3) at times (m,)."""
         assert self.clearance is not None, "planes are asked for where there are obstacles"
-        thrust = self.task.balance.specific_thrust(derivatives[:, 1], derivatives[:, 2])
+        thrust = self._thrust(derivatives)
         size = np.linalg.norm(thrust, axis=1, keepdims=True)
-        return self.clearance.planes(derivatives[:, 0], thrust / np.maximum(size, COMPLEX_STEP))
+        return self.clearance.planes(derivatives[:, 0], thrust / np.maximum(size, COMPLEX_STEP), times)
 
     def values(self, derivatives: Array, planes: Planes) -> Array:
         """The values at derivatives (m, 6, 3), (m, NEAREST)."""
-        given = self._given(derivatives, planes)
         with np.errstate(divide="ignore", invalid="ignore"):
-            (found,) = self._functions[0](given)
+            (found,) = self._functions[0](self._given(derivatives, planes))
         return np.asarray(np.where(np.isnan(found), np.inf, found))
 
     def slopes(self, derivatives: Array, planes: Planes) -> Array:
         """The slopes by the derivatives, (m, NEAREST, 6, 3)."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = self._functions[1](self._given(derivatives, planes))
-        shape = planes.offsets.shape
-        slopes = np.zeros((*shape, 18))
-        for k, each in enumerate(found):
-            slopes[..., k] = np.broadcast_to(each, shape)
-        return slopes.reshape(*shape, 6, 3)
+            by_thrust = self._functions[1](self._given(derivatives, planes))
+        slopes = np.zeros((*planes.offsets.shape, 6, 3))
+        slopes[..., 0, :] = -planes.normals / SIZE
+        slopes[..., 2, :] = np.stack(by_thrust, axis=-1)
+        slopes[..., 1, :] = self.task.balance.drag * slopes[..., 2, :]
+        return slopes
 
     def curvature(self, derivatives: Array, planes: Planes, weights: Array) -> tuple[Array, Array]:
         """The weighted values' slopes (m, 6, 3), and second derivatives by velocity and acceleration.
@@ -76,35 +72,31 @@ class ClearanceValues:
             The slopes (m, 6, 3), and the second derivatives (m, 6, 6).
         """
         given = self._given(derivatives, planes)
-        second = np.empty((len(derivatives), MOVED, MOVED))
-        for k in range(MOVED):
-            stepped: list[Any] = list(given)
-            stepped[3 + k] = given[3 + k] + 1j * COMPLEX_STEP
-            with np.errstate(divide="ignore", invalid="ignore"):
-                found = self._functions[1](stepped)[3:]
-            for j, each in enumerate(found):
-                bent = np.broadcast_to(np.imag(each), weights.shape) / COMPLEX_STEP
-                second[:, k, j] = np.sum(weights * bent, axis=1)
-        slopes = np.einsum("mk,mkij->mij", weights, self.slopes(derivatives, planes))
-        return slopes, second
+        for k in range(3):
+            given[3 + k] = given[3 + k] + 1j * COMPLEX_STEP * np.eye(3)[k].reshape(3, 1, 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = np.stack(self._functions[1](given), axis=-1)
+        bent = np.einsum("mk,imkj->mij", weights, found.imag) / COMPLEX_STEP
+        by_motion = np.array([[self.task.balance.drag], [1.0]])
+        second = np.kron(by_motion @ by_motion.T, bent)
+        return np.einsum("mk,mkij->mij", weights, self.slopes(derivatives, planes)), second
+
+    def _thrust(self, derivatives: Array) -> Array:
+        return self.task.balance.specific_thrust(derivatives[:, 1], derivatives[:, 2])
 
     def _given(self, derivatives: Array, planes: Planes) -> list[Array]:
-        """What the functions take: position, velocity, acceleration, normals and offsets, (m, 1) or so."""
-        state = derivatives[:, :3].reshape(len(derivatives), 9, 1)
+        """What the functions take: position, thrust, normals and offsets, (m, 1) or so."""
+        state = np.concatenate([derivatives[:, 0], self._thrust(derivatives)], axis=1)
         normals = np.moveaxis(planes.normals, -1, 0)
-        return [*np.moveaxis(state, 1, 0), *normals, np.maximum(planes.offsets, -FAR)]
+        return [*state.T[..., None], *normals, np.maximum(planes.offsets, -FAR)]
 
     @cached_property
     def _functions(self) -> tuple[ArrayFunction, ArrayFunction]:
-        """What is missing, and its slopes by position, velocity and acceleration."""
+        """What is missing, and its slopes by the thrust."""
         trace = Trace()
-        ops = TraceOps(trace)
-        position, velocity, acceleration = (trace.vector(name) for name in DERIVATIVES[:3])
-        normal, offset = trace.vector("normal"), trace.input("offset")
-        balance, body = self.task.balance, self.task.vehicle.bounding_ellipsoid
-        thrust = add(add_scaled(acceleration, balance.drag, velocity), xyz(balance.constant))
-        left = left_between(ops, body, position, thrust, normal, offset)
+        position, thrust, normal = (trace.vector(name) for name in ("position", "thrust", "normal"))
+        offset, body = trace.input("offset"), self.task.vehicle.bounding_ellipsoid
+        left = left_between(TraceOps(trace), body, position, thrust, normal, offset)
         missing = trace.symbol(1.0 / SIZE * (self.task.clearance - left))
-        state = [*position, *velocity, *acceleration]
-        given = [*state, *normal, offset]
-        return array_function(given, [missing]), array_function(given, gradient(missing, state))
+        given = [*position, *thrust, *normal, offset]
+        return array_function(given, [missing]), array_function(given, gradient(missing, thrust))

@@ -89,7 +89,7 @@ class LimitValues:
     def frames(self, times: Array, derivatives: Array) -> Frames:
         """Body axes along a path's derivatives (m, 6, 3) at times (m,)."""
         axes = self._axes(times, derivatives)
-        planes = self.clearances.planes(derivatives) if self.clearances.count else None
+        planes = self.clearances.planes(times, derivatives) if self.clearances.count else None
         return Frames(axes, self.task.environment.weight @ axes, UP @ axes, planes)
 
     def values(self, derivatives: Array, near: Frames) -> Array:

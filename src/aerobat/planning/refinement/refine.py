@@ -271,10 +271,11 @@ class Rounds:
         places: int = ROUGH_PLACES,
         radius: float = RADIUS,
         multipliers: Array | None = None,
+        stretch: float = STRETCH,
     ) -> None:
         limits = refinement.limits
         self._refinement, self._guess, self._settings = refinement, guess, settings
-        self._fractions, self._radius = chebyshev(places), radius
+        self._fractions, self._radius, self._stretch = chebyshev(places), radius, stretch
         trajectory = guess.trajectory
         self._segments = tuple(_segment_that_ends(trajectory, time) for time in guess.times)
         kept = limits.reserve + BACKOFF
@@ -339,7 +340,7 @@ class Rounds:
             fractions=self._fractions,
             backoff=self._backoff,
             radius=self._radius,
-            stretch=STRETCH,
+            stretch=self._stretch,
         )
 
 

@@ -201,12 +201,13 @@ class MovingPicture:
         path = self.subject.reference.path
         shapes = [Shape(shadow(path, self._floor), edge=HAIR, width=2.5, depth_bias=-1e3)]
         shapes += polyline(path, BAND, 3.2, depth_bias=-BELOW * self.subject.reference.extent)
-        shapes += obstacle_shapes(self._surfaces, self._camera)
+        shapes += obstacle_shapes([each for each in self._surfaces if each.motion is None], self._camera)
         return shapes + [shape for gate in self.subject.gates for shape in gate_shapes(gate)]
 
     def _moving(self, time: float) -> list[Shape]:
         """Vehicles at an instant, the paths that they have flown by then, and the stages that are behind."""
-        shapes = self._passed(time)
+        moved = [each.at(time) for each in self._surfaces if each.motion is not None]
+        shapes = [*obstacle_shapes(moved, self._camera), *self._passed(time)]
         many = len(self.subject.shown) > 1
         line: Any = (BLUE, 0.3) if many else BLUE
         for poses in self.subject.shown:

@@ -119,6 +119,7 @@ class _NearestSearch:
 
     def __init__(self, pieces: Pieces, flown: FlownBodies, flights: slice) -> None:
         self._pieces = pieces
+        self._times = flown.times
         self._position, self._attitude = flown.position[flights], flown.q_world_body[flights]
         self._centre, self._semi_axes = flown.centre[flights], flown.semi_axes[flights]
         last = np.maximum(flown.rows[flights].astype(np.intp) - 1, 0)
@@ -159,7 +160,10 @@ class _NearestSearch:
         stretches = padded.reshape(3, flights, -1, STRETCH)
         lower, upper = (np.moveaxis(x, 0, -1) for x in (stretches.min(axis=-1), stretches.max(axis=-1)))
         reach = np.linalg.norm(self._centre, axis=-1) + self._semi_axes.max(axis=-1)
-        apart = self._pieces.apart(lower, upper)
+        begin = self._times[::STRETCH]
+        end = self._times[np.minimum(np.arange(1, len(begin) + 1) * STRETCH, len(self._times)) - 1]
+        over = np.broadcast_to(begin, lower.shape[:-1]), np.broadcast_to(end, lower.shape[:-1])
+        apart = self._pieces.apart(lower, upper, over)
         return np.asarray(apart - reach[:, None, None])
 
     def _likeliest(self, apart: Array) -> tuple[_Encounters, Indices]:
@@ -225,10 +229,11 @@ class _NearestSearch:
         q = self._attitude[flight, row]
         shapes = so3.axes(q) * semi_axes[:, None]
         centres = self._position[flight, row] + so3.rotate(q, centre)
-        found = self._pieces.separated(piece, centres, shapes, exact_within)
+        found = self._pieces.separated(piece, centres, shapes, exact_within, self._times[row])
         rows = np.minimum(first[:, None] + np.arange(STRETCH), last[:, None])
+        position = self._position[flight[:, None], rows] - self._pieces.moved(piece, self._times[rows])
         normals = so3.unrotate(self._attitude[flight[:, None], rows], found.normals[:, None])
         reach = np.linalg.norm(normals * semi_axes[:, None], axis=-1)
-        along = np.sum(self._position[flight[:, None], rows] * found.normals[:, None], axis=-1)
+        along = np.sum(position * found.normals[:, None], axis=-1)
         bounds = along + np.sum(normals * centre[:, None], axis=-1) - reach - found.offsets[:, None]
         return bounds, found.gaps

@@ -72,6 +72,7 @@ class MujocoRun:
         names = [self._model.geom(k).name for k in range(self._model.ngeom)]
         self._kinds = [_KINDS[name.partition(" ")[0]] for name in names]
         self._contact = Contact.NOTHING
+        self._motions = [each.motion for each in scene.obstacles for _ in _shapes(each) if each.motion]
         self._begin(motion)
 
     def _begin(self, motion: VehicleState) -> None:
@@ -110,7 +111,13 @@ class MujocoRun:
             airspeed = self._data.qvel[:3] - np.array(actuation.wind)
             self._data.xfrc_applied[1, :3] = -so3.rotate(q, drag * so3.unrotate(q, airspeed))
             self._mujoco.mj_step(self._model, self._data)
+            self._move_obstacles()
             self._feel()
+
+    def _move_obstacles(self) -> None:
+        """Move those that move to where they are now."""
+        for place, motion in zip(self._data.mocap_pos, self._motions, strict=True):
+            place[:] = motion.moved(np.array(self._data.time))
 
     def _feel(self) -> None:
         touched = self._data.contact.geom[: self._data.ncon].ravel().tolist()
@@ -126,7 +133,7 @@ def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
     """
     root = Element("mujoco", model="aerobat")
     SubElement(root, "option", integrator="RK4", gravity=f"0 0 {-scene.gravity!r}", density="0")
-    shapes = [shape for obstacle in scene.obstacles for shape in _shapes(obstacle)]
+    shapes = [(each.motion, shape) for each in scene.obstacles for shape in _shapes(each)]
     assets = SubElement(root, "asset")
     world = SubElement(root, "worldbody")
     SubElement(world, "light", pos="0 0 20", dir="0 0 -1", directional="true")
@@ -136,12 +143,14 @@ def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
             world, "geom", name=_GROUND, type="plane", size="50 50 1", pos=f"0 0 {scene.ground!r}",
             rgba="0.9 0.9 0.9 1", contype="0", conaffinity=meets,
         )  # fmt: skip
-    for number, shape in enumerate(shapes):
+    _add_vehicle(world, scene)
+    for number, (motion, shape) in enumerate(shapes):
         name = f"{_OBSTACLE} {number}"
         if "vertex" in shape:
             SubElement(assets, "mesh", name=name, vertex=shape.pop("vertex"))
             shape["mesh"] = name
-        SubElement(world, "geom", shape, name=name, rgba="0.5 0.5 0.5 1", contype="0", conaffinity=meets)
+        holder = world if motion is None else SubElement(world, "body", name=name, mocap="true")
+        SubElement(holder, "geom", shape, name=name, rgba="0.5 0.5 0.5 1", contype="0", conaffinity=meets)
     for number, gate in enumerate(scene.gates):
         for side, (centre, outward, half_size) in enumerate(_frame_bars(gate)):
             if gate.wall is not None:
@@ -151,7 +160,6 @@ def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
                 size=_text(half_size), xyaxes=_text((*gate.normal, *outward)), rgba="0.85 0.4 0.1 1",
                 contype="0", conaffinity=meets,
             )  # fmt: skip
-    _add_vehicle(world, scene)
     actuators = SubElement(root, "actuator")
     for actuator in _actuators(scene.airframe):
         SubElement(actuators, "general", actuator)

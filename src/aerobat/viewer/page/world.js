@@ -19,6 +19,8 @@ class World {
     this.addGround();
     this.placeGates(HEADER.gates);
     if (HEADER.obstacles.triangles.length) this.scene.add(obstacleModel(HEADER.obstacles));
+    this.moving = HEADER.moving.map((each) => ({ model: obstacleModel(each), places: values(each.places) }));
+    for (const { model } of this.moving) this.scene.add(model);
     this.addPlan();
     this.addTracks();
     this.choose(TRACKS.findIndex((track) => track.failed) > -1 && TRACKS.length > 1 ? TRACKS.findIndex((t) => t.failed) : 0);
@@ -164,6 +166,11 @@ class World {
   // Everything as it is at a time.
   show(time) {
     const until = Math.min(time, this.track.end);
+    const [before, part] = place(until);
+    for (const { model, places } of this.moving) {
+      const [a, b] = [before, Math.min(before + 1, places.length / 3 - 1)].map((k) => vector(places.subarray(3 * k, 3 * k + 3)));
+      model.position.copy(a.lerp(b, part));
+    }
     this.track.pose(until, this.vehicle);
     showThrusts(this.vehicle, this.track, until);
     const { x, y, z } = this.vehicle.position;

@@ -1,0 +1,63 @@
+"""Motions of obstacles: along straight lines from row to row, with a velocity beside, without turning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, PlainValidator
+
+from aerobat.arrays import Array
+from aerobat.declaration import FieldError, finite
+from aerobat.documents import read_named_file
+
+MAX_FILE = 2**22  # bytes: some fifty thousand rows
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The motion of an obstacle away from where its file has it."""
+
+    velocity: Array  # [m/s] (3,)
+    rows: Array  # time [s] and place [m], (k, 4); it rests before the first and after the last
+
+    @property
+    def times(self) -> Array:
+        """The instants [s] at which its velocity may jump, (k,)."""
+        return self.rows[:, 0]
+
+    def moved(self, times: Array) -> Array:
+        """Return how far it is from its place at first [m] at times (...), (..., 3)."""
+        moved = np.multiply.outer(times, self.velocity)
+        if len(self.rows):
+            along = [np.interp(times, self.times, each) - each[0] for each in self.rows.T[1:]]
+            moved += np.stack(along, axis=-1)
+        return np.asarray(moved)
+
+
+def rows_of_path(value: Any) -> Array:
+    """Return the rows of an obstacle's path, (k, 4), of a value or of the CSV file that it names."""
+    if isinstance(value, str):
+        lines = read_named_file(value, MAX_FILE).decode(errors="replace").splitlines()
+        cells = [line.split(",") for line in lines if line.strip() and not line.lstrip().startswith("#")]
+        try:
+            value = [[float(cell) for cell in row] for row in cells[_is_header(cells) :]]
+        except ValueError:
+            raise FieldError("", f": {value} has a row that is not four numbers; mend it") from None
+    count = len(value) if hasattr(value, "__len__") else 1
+    rows = finite(value, count, 4) if count else np.zeros((0, 4))
+    if count and (len(rows) < 2 or not (np.diff(rows[:, 0]) > 0.0).all()):
+        raise FieldError("", "must be two rows or more of t, x, y, z, the time rising from row to row")
+    return rows
+
+
+def _is_header(cells: list[list[str]]) -> bool:
+    return bool(cells) and [cell.strip() for cell in cells[0]][:1] == ["t"]
+
+
+PathRows = Annotated[
+    Array,
+    PlainValidator(rows_of_path),
+    Field(description="a CSV file's name, from the problem's folder, or rows of four numbers each"),
+]
