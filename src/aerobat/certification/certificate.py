@@ -50,6 +50,7 @@ class Finding:
     rotor: int | None = None  # whose thrust or command it is about
     field: str = ""  # of the vehicle or the problem, that the limit comes from: "max_thrust", "limits.jerk"
     size: float | None = None  # of the range between its limits, of which reserves are fractions
+    most_kept: float = 1.0  # of that range, however large a reserve is asked
     end: Literal["start", "goal"] | None = None  # of the path, at that time
     obstacle: str | None = None  # nearest to the body at that time
 

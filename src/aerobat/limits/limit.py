@@ -38,7 +38,7 @@ class Limit:
     fields: tuple[str, str]  # that the lower and the upper end come from: "max_thrust", "limits.velocity"
     size: float  # of its range, of which reserves and excesses are fractions
     rotor: int | None = None  # whose it is
-    has_reserve: bool = False  # whether a reserve for the controller is kept from its ends
+    reserves: tuple[float, float] = (0.0, 0.0)  # of that size, the most that a reserve keeps from either end
     is_implied: bool = False  # whether others imply it along a whole path: an optimizer may leave it out
     is_proven: bool = True  # whether a certificate states it; else it guards what planners do between
     search: tuple[Limit, ...] = ()
@@ -54,6 +54,11 @@ class Limit:
         return (self.lower - self.quantity.constant) / self.size, (
             self.upper - self.quantity.constant
         ) / self.size
+
+    def kept(self, reserve: float) -> tuple[float, float]:
+        """Return what a reserve for the controller keeps from either end, as fractions of its size."""
+        lower, upper = self.reserves
+        return min(reserve, lower), min(reserve, upper)
 
     def exceeded(self, excess: float, time: float, fields: Sequence[str] = ()) -> Reason:
         """Return a sentence without its full stop about an excess.

@@ -9,6 +9,7 @@ from aerobat.limits.quantity import PathQuantity
 from aerobat.vehicle import mixer
 
 FIELDS = ("min_thrust", "max_thrust")
+HOVER_SHARE = 0.5  # of a hover's thrust: with more kept at the lower end a vehicle cannot sink
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
@@ -16,6 +17,7 @@ def limits(asked: Asked) -> Iterator[Limit]:
     vehicle = asked.vehicle
     if vehicle is None:
         return
+    below = HOVER_SHARE * asked.environment.gravity / vehicle.max_specific_thrust
     for i, (rotor, share) in enumerate(zip(vehicle.rotors, mixer(vehicle), strict=True)):
         yield Limit(
             name="thrust",
@@ -26,6 +28,6 @@ def limits(asked: Asked) -> Iterator[Limit]:
             fields=FIELDS,
             size=rotor.max_thrust - rotor.min_thrust,
             rotor=i,
-            has_reserve=True,
+            reserves=(below, 1.0),
             is_implied=rotor.lag > 0.0,
         )
