@@ -21,5 +21,5 @@ def limits(asked: Asked) -> Iterator[Limit]:
             upper=most,
             fields=("", "max_body_rate"),
             size=most,
-            reserves=(1.0, 1.0),
+            rooms=(inf, inf),
         )

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 
 from aerobat.limits.limit import Asked, Limit
 from aerobat.limits.quantity import PathQuantity
 from aerobat.vehicle import mixer
 
 FIELDS = ("min_thrust", "max_thrust")
-HOVER_SHARE = 0.5  # of a hover's thrust: with more kept at the lower end a vehicle cannot sink
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
@@ -17,7 +17,7 @@ def limits(asked: Asked) -> Iterator[Limit]:
     vehicle = asked.vehicle
     if vehicle is None:
         return
-    below = HOVER_SHARE * asked.environment.gravity / vehicle.max_specific_thrust
+    hover = asked.environment.gravity / vehicle.max_specific_thrust  # with as much kept it could not sink
     for i, (rotor, share) in enumerate(zip(vehicle.rotors, mixer(vehicle), strict=True)):
         yield Limit(
             name="thrust",
@@ -28,6 +28,6 @@ def limits(asked: Asked) -> Iterator[Limit]:
             fields=FIELDS,
             size=rotor.max_thrust - rotor.min_thrust,
             rotor=i,
-            reserves=(below, 1.0),
+            rooms=(hover, inf),
             is_implied=rotor.lag > 0.0,
         )

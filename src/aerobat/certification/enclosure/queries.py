@@ -54,7 +54,7 @@ class ExtremumQuery:
             return found
         end, source = self.side is Side.MAX, self.source
         about = replace(found, rotor=source.rotor, field=source.fields[end], size=source.size)
-        return replace(about, most_kept=source.reserves[end])
+        return replace(about, room=source.rooms[end])
 
 
 @dataclass(frozen=True)

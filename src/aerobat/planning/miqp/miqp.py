@@ -62,7 +62,7 @@ class Miqp(Planner):
     reserve: Reserve = option(
         0.0,
         "The fraction of every limit of the vehicle that is kept from either of its ends for the controller, "
-        "of the least thrusts no more than half of what a hover takes; with 0 a plan leaves it next to "
+        "of the least thrusts a part of what a hover takes; with 0 a plan leaves it next to "
         "nothing. The default is given up where no plan keeps it.",
         command_default=FLYING_RESERVE,
     )

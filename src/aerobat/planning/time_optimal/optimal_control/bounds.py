@@ -78,7 +78,7 @@ class Bounds:
         return np.array([*sizes, 1.0 if self.rate is None else self.rate.size])
 
     def kept(self, reserve: float) -> Array:
-        """What rotors keep in reserve from their lower and their upper ends, all else nothing, (2, M)."""
+        """The reserve that rotors keep from their lower and upper ends, zero of all else, (2, M)."""
         limits = (*self.path, *self.driven)
         shares = [(0.0, 0.0) if limit.rotor is None else limit.kept(reserve) for limit in limits]
         return np.asarray(self.sizes * np.array([*shares, (0.0, 0.0)]).T)
