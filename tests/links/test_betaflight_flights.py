@@ -99,7 +99,7 @@ def test_a_firmware_that_refuses_to_arm_names_its_flags(monkeypatch: pytest.Monk
 
 def test_a_firmware_that_disarms_in_flight_names_its_flags(monkeypatch: pytest.MonkeyPatch) -> None:
     flying = armed()
-    monkeypatch.setattr(autopilot.Sticks, "packet", lambda *_: autopilot.idle_sticks(armed=False))
+    monkeypatch.setattr(autopilot.Sticks, "packet", lambda self, *_: self.idle(armed=False))
     with closing(flying), pytest.raises(SpecError, match=r"disarmed 0\.\d\d s into the flight"):
         hover(flying)
 
