@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 
@@ -57,7 +56,7 @@ class SerialLine:
 
         self._address, self._broken = address, (OSError, serial.SerialException)
         try:
-            self._line: Any = serial.serial_for_url(address, baud, timeout=0, write_timeout=_PATIENCE)
+            self._line = serial.serial_for_url(address, baud, timeout=0, write_timeout=_PATIENCE)
         except (*self._broken, ValueError) as error:
             raise SpecError(
                 f"cannot open {address}: {error}; give a serial device that is there, or socket://HOST:PORT"
@@ -106,7 +105,7 @@ class Board:
         self._sticks = Sticks(board_rate(vehicle), protocol)
         model = controller_parameters(vehicle.controller, Fleet.of([vehicle]), environment)
         self._model: ControllerModel = first_numbers(model)
-        self._law: Any = Rates()
+        self._law = Rates()
         self._state: RatesState | None = None
         self._last = 0.0  # [s] when the law stepped
         self._ground: float | None = None  # [m] where it was armed

@@ -109,7 +109,7 @@ class ManeuverNode:
         self._last = None if goal is None else (now + self._period, goal)
         self._follow_up()
 
-    def _send(self, publish: Callable[[Any], None], piece: PathPiece | None, *_: object) -> None:
+    def _send(self, publish: Callable[[object], None], piece: PathPiece | None, *_: object) -> None:
         """Publish a piece of a path, if there is one."""
         if piece is not None:
             at = self.origin + round(piece.stamp * NANOSECONDS)
