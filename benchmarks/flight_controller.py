@@ -1,11 +1,10 @@
 """Flights on Betaflight's own firmware, beside the same flights with the model of its inner loop.
 
-Plans pass by the model with 95 %, proven on other flights, as `aerobat plan --pass 0.95 --reserve 0.15
---planner free-knots --autopilot betaflight` makes them, or `--reserve 0.1` by miqp where that has none.
-Prints, by maneuver and vehicle, how many flights of a lab pass, their largest distances from the path, and
-how far the model's prediction of each is off, of the whole flight and of its second half, which the offset of
-the start no longer tells; then the floors of all flights together. Needs the firmware, gcc and Linux:
-`uv sync --dev --group betaflight`.
+Plans pass by the model with 95 %, proven on other flights: those of `aerobat plan --pass 0.95 --autopilot
+betaflight`. Prints, by maneuver and vehicle, how many flights of a lab pass, their largest distances from the
+path, and how far the model's prediction of each is off, of the whole flight and of its second half, which the
+offset of the start no longer tells; then the floors of all flights together. Needs the firmware, gcc and
+Linux: `uv sync --dev --group betaflight`.
 Arguments: flights of each maneuver (20), then names or files of vehicles (agile-quad and the 5-inch quadrotor
 of examples/vehicles).
 """
@@ -22,8 +21,7 @@ import aerobat as ab
 MANEUVERS = ("half-flip", "flip-roll", "flip-pitch", "power-loop", "split-s")
 CONDITIONS = "lab"
 FIRST = 100_000  # number of a flight: the plan was tightened and proven on others
-# the first that has a plan: less reserve costs centimetres off the path
-PLANNERS = (ab.FreeKnots(reserve=0.15), ab.Miqp(reserve=0.1))
+PLANNER = ab.Miqp(reserve=0.15)
 SHARE, MEDIAN, MOST = 0.95, 0.05, 0.20  # [-], [m], [m] the floors
 
 
@@ -77,22 +75,16 @@ def main(flights: int, vehicles: list[str]) -> None:
 
 
 def planned(maneuver: str, vehicle: ab.Vehicle) -> ab.Plan:
-    """The plan of a maneuver that passes by the model. Raises Infeasible where no planner has one."""
-    for planner in PLANNERS:
-        try:
-            return ab.plan_to_pass(
-                maneuver,
-                planner,
-                vehicle,
-                probability=SHARE,
-                conditions=CONDITIONS,
-                controller="rates",
-                workers=1,
-            ).plan
-        except ab.Infeasible:
-            if planner is PLANNERS[-1]:
-                raise
-    raise AssertionError("the last planner plans or raises")
+    """The plan of a maneuver that passes by the model. Raises Infeasible where there is none."""
+    return ab.plan_to_pass(
+        maneuver,
+        PLANNER,
+        vehicle,
+        probability=SHARE,
+        conditions=CONDITIONS,
+        controller="rates",
+        workers=1,
+    ).plan
 
 
 if __name__ == "__main__":

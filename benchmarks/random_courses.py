@@ -140,7 +140,7 @@ def planned(problem: ab.Problem, vehicle: ab.Vehicle, planner: str | None = None
     if planner is None:
         return ab.plan(problem, vehicle=vehicle)
     cls = planner_class(planner)
-    return ab.plan(problem, cls(**command_settings(cls, problem, vehicle)), vehicle)
+    return ab.plan(problem, cls(**command_settings(cls)), vehicle)
 
 
 def main() -> None:

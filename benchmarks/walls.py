@@ -26,7 +26,7 @@ from aerobat.planning.around.fastest import fastest_around
 from aerobat.planning.planners import planner_for
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.refine import SEGMENTS, Refinement
-from aerobat.planning.result import FLYING_CLEARANCE, flying_reserve
+from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE
 from aerobat.planning.task import Task
 
 VEHICLE = "agile-quad"
@@ -117,7 +117,7 @@ def least_gap(plan: Plan) -> float:
 
 def best_of_many(problem: ab.Problem, vehicle: ab.Vehicle) -> float:
     """The duration [s] of the best of many routes."""
-    task = Task.of(problem, vehicle, flying_reserve(problem, vehicle), FLYING_CLEARANCE)
+    task = Task.of(problem, vehicle, FLYING_RESERVE, FLYING_CLEARANCE)
     refinement = Refinement.of(task, Recorder(None))
     around = fastest_around(refinement, SEGMENTS, MORE * 4)
     return np.inf if around is None else around.judged.solution.duration

@@ -124,7 +124,7 @@ def test_a_repetition_that_comes_to_something_else_says_what_and_exits_with_1(ke
 
 def as_the_command_has_it(planner: str, **options: Any) -> Planner:
     cls: Any = planner_class(planner)
-    return cls(**command_settings(cls, load_problem("line"), load_vehicle("agile-quad")) | options)
+    return cls(**command_settings(cls) | options)
 
 
 @pytest.mark.parametrize(

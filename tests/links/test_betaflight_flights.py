@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -99,7 +100,7 @@ def test_a_firmware_that_refuses_to_arm_names_its_flags(monkeypatch: pytest.Monk
 
 def test_a_firmware_that_disarms_in_flight_names_its_flags(monkeypatch: pytest.MonkeyPatch) -> None:
     flying = armed()
-    monkeypatch.setattr(autopilot.Sticks, "packet", lambda *_: autopilot.idle_sticks(armed=False))
+    monkeypatch.setattr(autopilot.Sticks, "packet", lambda self, *_: self.idle(armed=False))
     with closing(flying), pytest.raises(SpecError, match=r"disarmed 0\.\d\d s into the flight"):
         hover(flying)
 
@@ -146,6 +147,24 @@ def test_no_process_is_left_whoever_is_killed() -> None:
             return
         time.sleep(0.01)
     pytest.fail("a firmware outlived the program that flew it")
+
+
+def test_folders_that_killed_programs_left_are_removed_by_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And those of programs that live are not, however old."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    left = tmp_path / "aerobat-betaflight-left"
+    left.mkdir()
+    (left / "eeprom.bin").write_bytes(b"")
+    with Firmware() as living:
+        for folder in tmp_path.iterdir():
+            os.utime(folder, (0.0, 0.0))
+        with Firmware():
+            assert not left.exists()
+        assert living.step(0.01).time > 0.0
+        assert len([*tmp_path.iterdir()]) == 1
+    assert not [*tmp_path.iterdir()]
 
 
 def firmware_of(parent: int) -> list[int]:

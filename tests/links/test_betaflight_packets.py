@@ -16,7 +16,7 @@ import aerobat as ab
 from aerobat.errors import BackendMissing, SpecError
 from aerobat.links.betaflight import process
 from aerobat.links.betaflight.msp import flags_of, request, response
-from aerobat.links.betaflight.packets import MOTORS, Sticks, idle_sticks, state_packet
+from aerobat.links.betaflight.packets import MOTORS, Sticks, state_packet
 from aerobat.links.betaflight.settings import betaflight_settings, rotor_order, stick_rate
 from aerobat.simulation.flight_controller import Sensed
 from refusals import complaint
@@ -53,8 +53,8 @@ def test_sticks_say_on_average_what_is_asked(p: float, q: float, r: float, throt
 
 
 def test_the_first_switch_arms() -> None:
-    assert channels(idle_sticks(armed=False))[:5] == (1500, 1500, 1000, 1500, 1000)
-    assert channels(idle_sticks(armed=True))[4] > 1700
+    assert channels(Sticks(20.0).idle(armed=False))[:5] == (1500, 1500, 1000, 1500, 1000)
+    assert channels(Sticks(20.0).idle(armed=True))[4] > 1700
 
 
 def test_motors_are_the_rotors_at_their_places() -> None:

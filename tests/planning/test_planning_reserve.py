@@ -6,14 +6,16 @@ from typing import Any
 
 import pytest
 
-from aerobat.certification import Certificate
+from aerobat.certification import Certificate, Side
 from aerobat.errors import Infeasible
+from aerobat.limits.limit import kept as kept_of
 from aerobat.planning import FreeKnots, Miqp, Planner, TimeOptimal
 from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.rotor_margin import reserve_shortfalls
+from aerobat.planning.rotor_margin import reserve_shortfalls, rotor_findings
 from aerobat.problem import load_problem
 from aerobat.vehicle import load_vehicle
+from places import ROOT
 
 
 def kept(certificate: Certificate | None) -> float:
@@ -75,3 +77,25 @@ def test_what_is_missing_of_a_reserve_is_told_of_the_rotor_that_keeps_least() ->
     assert worst.kept == least
     assert worst.size == pytest.approx(0.01)
     assert "in reserve" in str(worst)
+
+
+@pytest.mark.slow
+def test_a_large_reserve_leaves_strong_rotors_the_room_to_sink() -> None:
+    """They hover at 15 % of their range: of that, a reserve of 0.3 keeps two thirds from their lower ends."""
+    vehicle = load_vehicle(ROOT / "examples/vehicles/agilicious.toml")
+    certificate = FreeKnots(segments=2, reserve=0.3).plan(load_problem("line"), vehicle).certificate
+    assert certificate is not None
+    hover = 9.81 / vehicle.max_specific_thrust
+    for side, least in ((Side.MIN, hover * 0.3 / 0.45), (Side.MAX, 0.3)):
+        kept = min(each.margin / each.size for each in rotor_findings(certificate, side))  # type: ignore[operator]
+        assert kept == pytest.approx(least, abs=0.02)
+        assert kept >= least
+
+
+def test_of_a_small_room_a_reserve_keeps_a_part_that_grows_and_never_all() -> None:
+    assert kept_of(0.3, float("inf")) == 0.3
+    assert kept_of(0.15, 0.15) == pytest.approx(0.075)
+    parts = [kept_of(0.01 * k, 0.15) for k in range(50)]
+    assert parts == sorted(parts)
+    assert parts[0] == 0.0
+    assert parts[-1] < 0.15

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import degrees
+from math import degrees, inf
 from typing import Literal
 
 from aerobat.declaration import by_value, in_notebooks, short, validated
@@ -50,6 +50,7 @@ class Finding:
     rotor: int | None = None  # whose thrust or command it is about
     field: str = ""  # of the vehicle or the problem, that the limit comes from: "max_thrust", "limits.jerk"
     size: float | None = None  # of the range between its limits, of which reserves are fractions
+    room: float = inf  # of that range, beside the limit, of which reserves keep a part
     end: Literal["start", "goal"] | None = None  # of the path, at that time
     obstacle: str | None = None  # nearest to the body at that time
 

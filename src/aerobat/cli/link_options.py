@@ -143,6 +143,10 @@ class RosOptions(MissionOptions, RosNodeOptions):
     """Gates and goals stay in the world where their problems have them. Default: they move along, so that
     each maneuver begins where the vehicle is."""
 
+    goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
+    """The topic of goals; or a Betaflight board that is flown by rates and thrust instead, its receiver's
+    protocol and its line, as msp:/dev/ttyACM0, crsf:/dev/ttyUSB0 or msp:socket://HOST:PORT."""
+
     rate: Annotated[float, Parameter(group=linking, validator=validators.Number(gte=50, lte=250))] = 100.0
     """Goals a second."""
 

@@ -231,7 +231,7 @@ def make_planner(options: PlannerOptions, problem: Problem, vehicle: Vehicle, pa
     _check_options(options, name)
     if paper:
         _check_paper(options, name)
-    settings = command_settings(cls, problem, vehicle) | ({"order": 3} if paper else {})
+    settings = command_settings(cls) | ({"order": 3} if paper else {})
     for option in planner_options(cls):
         given = getattr(options, option_name(option.flag))
         if option.type is bool and given:

@@ -21,5 +21,5 @@ def limits(asked: Asked) -> Iterator[Limit]:
             upper=most,
             fields=("", "max_body_rate"),
             size=most,
-            has_reserve=True,
+            rooms=(inf, inf),
         )

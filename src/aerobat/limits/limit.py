@@ -18,6 +18,7 @@ from aerobat.problem import Condition, Limits
 from aerobat.problem.condition import ForceBalance
 from aerobat.vehicle import Vehicle
 
+HALF = 0.15  # the reserve that keeps half of a small room
 SMALLEST_SIZE = 1e-3  # in SI units: a bound next to zero has no size of its own
 
 
@@ -38,7 +39,7 @@ class Limit:
     fields: tuple[str, str]  # that the lower and the upper end come from: "max_thrust", "limits.velocity"
     size: float  # of its range, of which reserves and excesses are fractions
     rotor: int | None = None  # whose it is
-    has_reserve: bool = False  # whether a reserve for the controller is kept from its ends
+    rooms: tuple[float, float] = (0.0, 0.0)  # of that size, beside either end, of which `kept` keeps a part
     is_implied: bool = False  # whether others imply it along a whole path: an optimizer may leave it out
     is_proven: bool = True  # whether a certificate states it; else it guards what planners do between
     search: tuple[Limit, ...] = ()
@@ -54,6 +55,11 @@ class Limit:
         return (self.lower - self.quantity.constant) / self.size, (
             self.upper - self.quantity.constant
         ) / self.size
+
+    def kept(self, reserve: float) -> tuple[float, float]:
+        """Return what a reserve for the controller keeps from either end, as fractions of its size."""
+        lower, upper = self.rooms
+        return kept(reserve, lower), kept(reserve, upper)
 
     def exceeded(self, excess: float, time: float, fields: Sequence[str] = ()) -> Reason:
         """Return a sentence without its full stop about an excess.
@@ -81,6 +87,14 @@ class Asked:
     def balance(self) -> ForceBalance:
         """The balance of thrust, acceleration and drag."""
         return force_balance(self.environment, self.vehicle)
+
+
+def kept(reserve: float, room: float) -> float:
+    """Return what a reserve keeps from an end with some room: itself, but of a small room a part.
+
+    Half of the room is kept by HALF, and never all of it. Both are fractions of a limit's size.
+    """
+    return min(reserve, room * (reserve / (reserve + HALF))) if reserve > 0.0 else 0.0
 
 
 def quantity_name(quantity: str, rotor: int | None) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 
 from aerobat.limits.limit import Asked, Limit
 from aerobat.limits.quantity import PathQuantity
 from aerobat.vehicle import mixer
 
 FIELDS = ("min_thrust", "max_thrust")
+_STRONG = 0.25  # of their range, below which rotors that hover have little room to sink
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
@@ -16,6 +18,8 @@ def limits(asked: Asked) -> Iterator[Limit]:
     vehicle = asked.vehicle
     if vehicle is None:
         return
+    hover = asked.environment.gravity / vehicle.max_specific_thrust  # with as much kept it could not sink
+    room = hover if hover < _STRONG else inf
     for i, (rotor, share) in enumerate(zip(vehicle.rotors, mixer(vehicle), strict=True)):
         yield Limit(
             name="thrust",
@@ -26,6 +30,6 @@ def limits(asked: Asked) -> Iterator[Limit]:
             fields=FIELDS,
             size=rotor.max_thrust - rotor.min_thrust,
             rotor=i,
-            has_reserve=True,
+            rooms=(room, inf),
             is_implied=rotor.lag > 0.0,
         )

@@ -23,7 +23,7 @@ from aerobat.planning.courses import is_course, on_open_courses
 from aerobat.planning.holds import between_holds
 from aerobat.planning.passages import require_clear_ends, require_openings
 from aerobat.planning.recorder import Progress
-from aerobat.planning.result import FLYING_RESERVE, Plan, flying_reserve
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
 
@@ -139,21 +139,12 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
 def planner_for(problem: Problem, vehicle: Vehicle | None) -> Planner:
     """The planner of that name, as the command line makes it without options: for plans that are flown."""
     cls = planner_class(suited_planner(problem, vehicle))
-    return cls(**command_settings(cls, problem, vehicle))
+    return cls(**command_settings(cls))
 
 
-def command_settings(cls: type[Planner], problem: Problem, vehicle: Vehicle | None) -> dict[str, Any]:
-    """Return the fields that a planner has otherwise on the command line, whose plans are to be flown.
-
-    Args:
-        cls: The planner's class.
-        problem: What is planned.
-        vehicle: What flies it, if it is known.
-    """
-    settings = {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
-    if settings.get("reserve") == FLYING_RESERVE:
-        settings["reserve"] = flying_reserve(problem, vehicle)
-    return settings
+def command_settings(cls: type[Planner]) -> dict[str, Any]:
+    """Return the fields that a planner has otherwise on the command line, whose plans are to be flown."""
+    return {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
 
 
 def planner_with_reserve(name: str, reserve: float, **others: Any) -> Planner:

@@ -25,20 +25,6 @@ from aerobat.vehicle import Vehicle
 # plan shall be flown: rotors without lag leave it nothing otherwise
 FLYING_RESERVE = 0.15
 FLYING_CLEARANCE = 0.1  # [m] from obstacles, of plans that are flown: what errors take under lab
-HOVER_SHARE = 0.5  # of a hover's thrust: with more kept at the lower end a vehicle cannot sink
-
-
-def flying_reserve(problem: Problem, vehicle: Vehicle | None) -> float:
-    """Return the reserve that planners keep by default where a plan shall be flown, of each limit's range.
-
-    Args:
-        problem: Its gravity says what a hover takes.
-        vehicle: With strong rotors it is kept less: half of a hover's thrust is room enough below.
-    """
-    if vehicle is None:
-        return FLYING_RESERVE
-    room = HOVER_SHARE * problem.environment.gravity / vehicle.max_specific_thrust
-    return round(min(FLYING_RESERVE, room), 3)
 
 
 @validated

@@ -11,6 +11,7 @@ from aerobat.certification import Certificate, Finding, Side
 from aerobat.environment import Environment
 from aerobat.errors import Reason
 from aerobat.flatness import reference
+from aerobat.limits.limit import kept
 from aerobat.simulation.outcome import digits
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -128,14 +129,16 @@ class ReserveShortfall:
 def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[ReserveShortfall]:
     """Return the findings where rotors are not proven to keep a reserve, the worst first.
 
-    The reserve is a fraction of a rotor's range. The list is empty without a reserve: then the rotors' limits
-    are all that counts.
+    The reserve is a fraction of a rotor's range, at its lower end a part of what a hover takes. The list is
+    empty without a reserve: then the rotors' limits are all that counts.
     """
     if reserve <= 0.0:
         return []
-    kept = [(finding, _margin(finding) / _size(finding)) for finding in rotor_findings(certificate)]
-    found = [ReserveShortfall(finding, reserve, part) for finding, part in kept if part < reserve]
-    return sorted(found, key=lambda shortfall: shortfall.kept)
+    found = [
+        ReserveShortfall(finding, kept(reserve, finding.room), _margin(finding) / _size(finding))
+        for finding in rotor_findings(certificate)
+    ]
+    return sorted((each for each in found if each.size > 0.0), key=lambda shortfall: shortfall.kept)
 
 
 def rotor_findings(certificate: Certificate, side: Side | None = None) -> list[Finding]:

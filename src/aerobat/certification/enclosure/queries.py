@@ -52,8 +52,9 @@ class ExtremumQuery:
         found = Finding(self.quantity, self.unit, self.side, value, bound, time, limit, verdict)
         if self.source is None:
             return found
-        field = self.source.fields[self.side is Side.MAX]
-        return replace(found, rotor=self.source.rotor, field=field, size=self.source.size)
+        end, source = self.side is Side.MAX, self.source
+        about = replace(found, rotor=source.rotor, field=source.fields[end], size=source.size)
+        return replace(about, room=source.rooms[end])
 
 
 @dataclass(frozen=True)

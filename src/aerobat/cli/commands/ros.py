@@ -17,6 +17,7 @@ from aerobat.cli.terminal import say
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
+from aerobat.links.betaflight.board import board_at
 from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings
 from aerobat.links.ros.middleware import Middleware, PacedClock
 from aerobat.links.ros.preparation import MANEUVERS, ManeuverRequest, prepare
@@ -59,16 +60,21 @@ def ros(*problems: str, options: Annotated[RosOptions, Parameter(name="*")] = Ro
     for service, name in services.items():
         problem = load_problem(name)
         maneuvers[service] = problem, _planner(problem, vehicle, options)
+    environment = next(iter(maneuvers.values()))[0].environment
+    board = board_at(options.goal, vehicle, environment, 1.0 / options.rate)
+    take = None if board is None else board.take
     middleware = _joined("aerobat", options.generation, sim_time=options.sim_time)
     try:
         # two, so that none of them is this one
         with processes(2, forked=False) as executor:
             _rehearse(executor, vehicle, maneuvers, settings)
-            node = ManeuverNode(middleware, vehicle, maneuvers, executor, settings, say)
+            node = ManeuverNode(middleware, vehicle, maneuvers, executor, settings, say, take)
             say(f"flies {vehicle.name}: /aerobat/ takeoff, {', '.join(maneuvers)}, hold, land")
             say(f"to look: {RVIZ[type(middleware).__name__]}")
             run(node, middleware, options.rate, options.seconds or inf)
     finally:
+        if board is not None:
+            board.close()
         middleware.close()
 
 

@@ -110,9 +110,7 @@ class RunRecord:
         """The planner's options that are not as the command has them by default, in words."""
         if self.planner is None:
             return
-        usual = command_settings(type(self.planner), self.problem, self.vehicle) | (
-            {"order": 3} if self.paper else {}
-        )
+        usual = command_settings(type(self.planner)) | ({"order": 3} if self.paper else {})
         for option in planner_options(type(self.planner)):
             value = getattr(self.planner, option.name)
             if value != usual.get(option.name, option.default):

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from aerobat.errors import SpecError
 from aerobat.kernels.ops import PerRotor
 from aerobat.kernels.rate_loop import RateSetpoint
 from aerobat.links.betaflight.msp import arming_disable_flags
-from aerobat.links.betaflight.packets import Sticks, idle_sticks, state_packet
+from aerobat.links.betaflight.packets import Sticks, state_packet
 from aerobat.links.betaflight.process import Firmware, FirmwareEnded, configured, require_firmware
-from aerobat.links.betaflight.settings import betaflight_settings, rotor_order, stick_rate
+from aerobat.links.betaflight.settings import betaflight_settings, board_rate, rotor_order, throttle_of
 from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot, Sensed
 from aerobat.storage import whole_file
 from aerobat.vehicle import Vehicle
@@ -58,7 +56,7 @@ class Betaflight(Autopilot):
 
     def settings(self, vehicle: Vehicle, max_rate: float) -> str:
         """Return the lines to paste to a board; what protects a vehicle on the ground stays on."""
-        lines = betaflight_settings(vehicle, stick_rate(max_rate))
+        lines = betaflight_settings(vehicle, board_rate(vehicle, max_rate))
         return "\n".join(
             (f"# {vehicle.name}, for the command line of Betaflight 4.6", *lines, *self.lines, "save", "")
         )
@@ -78,10 +76,10 @@ class BetaflightRun:
         more: tuple[str, ...] = (),
         blackbox: str | None = None,
     ) -> None:
-        rate = stick_rate(peak)
+        rate = board_rate(vehicle, peak)
         logging = () if blackbox is None else _BLACKBOX
         lines = (*betaflight_settings(vehicle, rate, simulated=True), *logging, *more)
-        self._blackbox = blackbox
+        self._vehicle, self._blackbox = vehicle, blackbox
         self._order = rotor_order(vehicle)
         self._low = vehicle.min_thrusts[list(self._order)]
         self._span = vehicle.max_thrusts[list(self._order)] - self._low
@@ -98,8 +96,9 @@ class BetaflightRun:
         """Arm it, and have the motors turn as at the start. Raises SpecError, naming the flags set."""
         self._firmware.step(_BOOT)
         for duration, armed in ((_GRACE, False), (_ARMING, True)):
-            self._stand(duration, idle_sticks(armed))
-        commands = self._stand(_SPINNING_UP, Sticks(1.0).packet(_STILL.omega, self._throttle(thrust)))
+            self._stand(duration, self._sticks.idle(armed))
+        turning = Sticks(1.0).packet(_STILL.omega, throttle_of(self._vehicle, thrust))
+        commands = self._stand(_SPINNING_UP, turning)
         if not any(commands):
             raise SpecError(f"autopilot: Betaflight refuses to arm: {self._flags}")
 
@@ -114,13 +113,9 @@ class BetaflightRun:
             commands = self._firmware.step(_STEP, state_packet(_STILL), sticks).commands
         return commands
 
-    def _throttle(self, thrust: float) -> float:
-        share = (thrust - self._low.sum()) / self._span.sum()
-        return float(np.clip(share, 0.0, 1.0))
-
     def step(self, sensed: Sensed, setpoint: RateSetpoint, duration: float) -> PerRotor:
         """See `AutopilotRun.step`."""
-        throttle = self._throttle(setpoint.thrust)
+        throttle = throttle_of(self._vehicle, setpoint.thrust)
         sticks = self._sticks.packet(setpoint.omega, throttle)
         motors = self._firmware.step(duration, state_packet(sensed), sticks)
         self._time += duration
@@ -137,7 +132,7 @@ class BetaflightRun:
         """See `AutopilotRun.close`."""
         try:
             if self._blackbox is not None:
-                self._stand(_FLUSHING, idle_sticks(armed=False))
+                self._stand(_FLUSHING, self._sticks.idle(armed=False))
                 with whole_file(self._blackbox) as file:
                     file.write_bytes(self._firmware.log())
         except FirmwareEnded:

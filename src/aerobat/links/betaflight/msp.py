@@ -8,8 +8,9 @@ from functools import reduce
 from operator import xor
 
 from aerobat.errors import SpecError
+from aerobat.links.betaflight.packets import ReceiverProtocol
 
-STATUS_EX = 150
+STATUS_EX, SET_RAW_RC = 150, 200
 _TO_BOARD, _FROM_BOARD, _REFUSED = b"$M<", b"$M>", b"$M!"
 _HEAD = 5  # bytes before the payload: three, its size, the code
 # the firmware's src/main/fc/runtime_config.c, bit by bit
@@ -26,6 +27,9 @@ _FLAGS_AT = 15  # of the status: the count of bytes of flight modes beyond the f
 def request(code: int, payload: bytes = b"") -> bytes:
     """The frame of a request to a board, its payload 255 bytes at most."""
     return _framed(_TO_BOARD, code, payload)
+
+
+MSP = ReceiverProtocol(lambda counts: request(SET_RAW_RC, struct.pack(f"<{len(counts)}H", *counts)))
 
 
 def _framed(head: bytes, code: int, payload: bytes) -> bytes:

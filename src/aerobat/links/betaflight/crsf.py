@@ -1,0 +1,38 @@
+"""CRSF, by which receivers of FPV quadrotors speak to their boards: the frame of all channels.
+
+The format is that of Team BlackSheep, github.com/tbs-fpv/tbs-crsf-spec: address, length, type, payload, and a
+CRC-8 (DVB-S2) of type and payload; 16 channels of 11 bits each, the first in the lowest bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+
+from aerobat.links.betaflight.packets import ReceiverProtocol
+
+_FLIGHT_CONTROLLER, _CHANNELS_PACKED = 0xC8, 0x16
+_BITS, _PAYLOAD = 11, 22  # of a channel, bytes of sixteen
+_POLYNOMIAL = 0xD5
+
+
+def channels_frame(counts: Sequence[int]) -> bytes:
+    """The frame of 16 channels, each 0 to 2047."""
+    packed = reduce(lambda bits, count: bits << _BITS | count, reversed(counts), 0)
+    body = bytes([_CHANNELS_PACKED]) + packed.to_bytes(_PAYLOAD, "little")
+    return bytes([_FLIGHT_CONTROLLER, len(body) + 1]) + body + bytes([crc8(body)])
+
+
+def crc8(data: bytes) -> int:
+    """The CRC-8 of DVB-S2 of some bytes."""
+    crc = 0
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc << 1 ^ (_POLYNOMIAL if crc & 0x80 else 0)
+        crc &= 0xFF
+    return crc
+
+
+# 172 to 1811 are 988 to 2012 µs; Betaflight's src/main/rx/crsf.c adds half a microsecond to that
+CRSF = ReceiverProtocol(channels_frame, offset=881.0, step=1024.0 / 1639.0, baud=420000)
