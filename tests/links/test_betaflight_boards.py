@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
+from aerobat.cli.commands.ros import ros
 from aerobat.cli.link_options import RosOptions
-from aerobat.cli.ros import fly_on_demand
 from aerobat.kernels.rate_loop import RateSetpoint
 from aerobat.links.betaflight.board import Board, SerialLine, board_at
 from aerobat.links.betaflight.crsf import CRSF, channels_frame, crc8
@@ -79,7 +79,7 @@ def test_other_goals_name_no_board() -> None:
 
 def test_a_vehicle_that_no_board_flies_is_refused_before_ros_is_joined() -> None:
     options = RosOptions(goal="msp:loop://", vehicle="hexarotor")
-    assert "quadrotors in X" in complaint(lambda: fly_on_demand((), options))
+    assert "quadrotors in X" in complaint(lambda: ros(options=options))
 
 
 class Wire:
