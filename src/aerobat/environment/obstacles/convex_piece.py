@@ -24,7 +24,7 @@ def _not_rounded() -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ObstacleMotion:
-    """The motion of an obstacle away from where its file has it: straight from row to row, without turning."""
+    """The motion of an obstacle from where its file has it: straight from row to row, without turning."""
 
     velocity: Array  # [m/s] (3,)
     rows: Array  # time [s] and place [m], (k, 4); it rests before the first and after the last
