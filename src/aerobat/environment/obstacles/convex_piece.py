@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.environment.obstacles.motion import Motion
 
 TINY = 1e-12  # [m] beside lengths that divide
 
@@ -24,13 +23,34 @@ def _not_rounded() -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class ObstacleMotion:
+    """The motion of an obstacle from where its file has it: straight from row to row, without turning."""
+
+    velocity: Array  # [m/s] (3,)
+    rows: Array  # time [s] and place [m], (k, 4); it rests before the first and after the last
+
+    @property
+    def times(self) -> Array:
+        """The instants [s] at which its velocity may jump, (k,)."""
+        return self.rows[:, 0]
+
+    def moved(self, times: Array) -> Array:
+        """Return how far it is from its place at first [m] at times (...), (..., 3)."""
+        moved = np.multiply.outer(times, self.velocity)
+        if len(self.rows):
+            along = [np.interp(times, self.times, each) - each[0] for each in self.rows.T[1:]]
+            moved += np.stack(along, axis=-1)
+        return np.asarray(moved)
+
+
+@dataclass(frozen=True, eq=False)
 class ConvexPiece:
     """The hull of points, each rounded by the ellipsoid of all L y with |y| ≤ 1, in the world at first."""
 
     points: Array  # [m] (V, 3)
     rounding: Array = field(default_factory=_not_rounded)  # L [m], (3, 3)
     name: str = "obstacle"  # of what it is a piece of
-    motion: Motion | None = None  # away from where it is here
+    motion: ObstacleMotion | None = None  # away from where it is here
 
     def support(self, normals: Array) -> Array:
         """Return how far it reaches [m] along unit vectors (..., 3), (...)."""

@@ -11,8 +11,8 @@ import numpy as np
 from pydantic import Field
 
 from aerobat.declaration import Label, Registry, Vector3, validated
-from aerobat.environment.obstacles.convex_piece import ConvexPiece
-from aerobat.environment.obstacles.motion import Motion, PathRows
+from aerobat.environment.obstacles.convex_piece import ConvexPiece, ObstacleMotion
+from aerobat.environment.obstacles.path_rows import PathRows
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,10 +35,10 @@ class Obstacle(ABC):
         """The convex pieces, in the world."""
 
     @property
-    def motion(self) -> Motion | None:
+    def motion(self) -> ObstacleMotion | None:
         """The motion; None for what stands still."""
         moves = self.velocity.any() or len(self.path)
-        return Motion(self.velocity, self.path) if moves else None
+        return ObstacleMotion(self.velocity, self.path) if moves else None
 
 
 O = TypeVar("O", bound=Obstacle)  # noqa: E741 - an obstacle

@@ -22,8 +22,7 @@ from math import inf
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
-from aerobat.environment.obstacles.convex_piece import TINY, ConvexPiece, units
-from aerobat.environment.obstacles.motion import Motion
+from aerobat.environment.obstacles.convex_piece import TINY, ConvexPiece, ObstacleMotion, units
 
 STEPS = 40  # of Newton's method at most; most pairs take five
 ENOUGH = 1e-11  # [m] a step that gains less is the last
@@ -63,7 +62,7 @@ class Pieces:
         return Pieces(tuple(piece for piece in self.pieces if piece.motion is None))
 
     @cached_property
-    def moving(self) -> tuple[tuple[int, Motion], ...]:
+    def moving(self) -> tuple[tuple[int, ObstacleMotion], ...]:
         """The numbers and motions of those that move."""
         return tuple((k, piece.motion) for k, piece in enumerate(self.pieces) if piece.motion is not None)
 

@@ -15,8 +15,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.environment.obstacles.convex_piece import ConvexPiece
-from aerobat.environment.obstacles.motion import Motion
+from aerobat.environment.obstacles.convex_piece import ConvexPiece, ObstacleMotion
 
 FACETS = 24  # around what is round: a turn of 15° from each to the next
 SHARP = np.cos(np.deg2rad(20.0))  # of the angle between two faces: those of what is round meet at less
@@ -32,7 +31,7 @@ class Surface:
     name: str  # of the obstacle
     faces: tuple[Array, ...]  # corners of each [m], anticlockwise from outside, (k, 3)
     edges: Array  # [m] the ends of the sharp edges, (n, 2, 3)
-    motion: Motion | None = None  # away from where it is here
+    motion: ObstacleMotion | None = None  # away from where it is here
 
     def at(self, time: float) -> Surface:
         """Return it where it is at a time [s]."""

@@ -1,8 +1,7 @@
-"""Motions of obstacles: along straight lines from row to row, with a velocity beside, without turning."""
+"""Paths of obstacles that move, as rows or as the CSV files that hold them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,27 +12,6 @@ from aerobat.declaration import FieldError, finite
 from aerobat.documents import read_named_file
 
 MAX_FILE = 2**22  # bytes: some fifty thousand rows
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """The motion of an obstacle away from where its file has it."""
-
-    velocity: Array  # [m/s] (3,)
-    rows: Array  # time [s] and place [m], (k, 4); it rests before the first and after the last
-
-    @property
-    def times(self) -> Array:
-        """The instants [s] at which its velocity may jump, (k,)."""
-        return self.rows[:, 0]
-
-    def moved(self, times: Array) -> Array:
-        """Return how far it is from its place at first [m] at times (...), (..., 3)."""
-        moved = np.multiply.outer(times, self.velocity)
-        if len(self.rows):
-            along = [np.interp(times, self.times, each) - each[0] for each in self.rows.T[1:]]
-            moved += np.stack(along, axis=-1)
-        return np.asarray(moved)
 
 
 def rows_of_path(value: Any) -> Array:
