@@ -45,7 +45,7 @@ ROOMS = {
     "certification": ("certification", "flatness", "planning"),
     "planning": ("planning", "evaluation"),
 }
-APART = "browser or ros or docs or process or peer"
+APART = "browser or ros or docs or process or peer or betaflight"
 LEFT_OUT = {"default": f"slow or {APART}", "full": APART}
 CPU_LIMIT = 600  # [s] of a run: an endless loop is a mutant killed
 

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import jsonschema
+import mujoco
 import numpy as np
 import pytest
 from pygltflib import GLTF2
@@ -52,6 +53,26 @@ def test_a_scene_has_each_obstacle_within_the_loss_that_is_said(tmp_path: Path) 
     assert lacks.max() <= made.loss.obstacles + 1e-6
     assert 0.001 < made.loss.obstacles < 0.01
     assert "round obstacles drawn up to" in str(made)
+
+
+def test_in_a_model_for_mujoco_the_body_is_as_far_from_obstacles_as_it_is_here(tmp_path: Path) -> None:
+    plan = walled_cruise()
+    ab.export(plan, tmp_path / "walled.xml", "mujoco", rate=10.0)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "walled.xml"))
+    data = mujoco.MjData(model)
+    kinds = [model.geom(k).name.partition(" ")[0] for k in range(model.ngeom)]
+    around = [k for k, kind in enumerate(kinds) if kind == "obstacle"]
+    pieces = plan.problem.surroundings.pieces
+    for key in range(model.nkey):
+        mujoco.mj_resetDataKeyframe(model, data, key)
+        mujoco.mj_forward(model, data)
+        there = min(
+            mujoco.mj_geomDistance(model, data, kinds.index("vehicle"), k, 100.0, None) for k in around
+        )
+        offset, shapes = plan.vehicle.bounding_ellipsoid.turned(data.qpos[None, 3:7])
+        bodies, beside = pieces.near(data.qpos[None, :3] + offset, plan.vehicle.body_radius, 100.0)
+        here = pieces.separated(beside, (data.qpos[None, :3] + offset)[bodies], shapes[bodies]).gaps.min()
+        assert there == pytest.approx(here, abs=0.005)
 
 
 @pytest.mark.parametrize(("to", "name"), [("ros1-bag", "walled.bag"), ("mcap", "walled.mcap")])

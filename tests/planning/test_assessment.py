@@ -222,3 +222,13 @@ def test_a_page_tells_warnings_in_red_and_nothing_else_on_it_is_red() -> None:
         assert len(said) == warnings
         lines = [line for axes in figure.axes for line in axes.lines]
         assert RED not in [line.get_color() for line in lines]
+
+
+def test_a_way_around_obstacles_is_not_called_slow_beside_a_bound_that_knows_none() -> None:
+    found = line().assessment
+    assert found is not None
+    slow = replace(found, duration=5.0 * found.least_duration)
+    around = replace(slow, obstructed=True)
+    assert (slow.suspicious, around.suspicious) == (True, False)
+    assert "if nothing stood in the way" in around.sentence
+    assert "stood in the way" not in slow.sentence

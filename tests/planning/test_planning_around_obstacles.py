@@ -12,8 +12,10 @@ from aerobat.planning.around.cells import Cells
 from aerobat.planning.around.routes import routes
 from aerobat.planning.planners import suited_planner
 from aerobat.planning.task import Task
+from places import ROOT
 
 QUAD = ab.load_vehicle("agile-quad")
+EXAMPLES = ROOT / "examples" / "problems"
 HALL = ab.Limits(lower=np.array([-2.0, -4.0, 0.2]), upper=np.array([10.0, 4.0, 3.8]))
 ENDS = ab.at_rest((0.0, 0.0, 1.5)), ab.at_rest((8.0, 0.0, 1.5))
 
@@ -57,6 +59,28 @@ def test_a_forest_is_flown_on_the_fastest_of_several_sides() -> None:
     assert plan.planner == "free-knots"
     assert plan.certified
     assert least_gap(plan) > 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.toml")))
+def test_problems_that_come_with_the_repository_are_planned_clear_of_everything(name: str) -> None:
+    plan = ab.plan(ab.load_problem(EXAMPLES / name), vehicle=QUAD)
+    assert plan.certified
+    assert plan.flies
+    assert least_gap(plan) > 0.0
+
+
+@pytest.mark.slow
+def test_a_hundred_metres_of_forest_take_little_longer_than_is_possible_without() -> None:
+    rng = np.random.default_rng(3)
+    places = rng.uniform((4.0, -15.0, 0.8), (96.0, 15.0, 1.5), (45, 3)).tolist()
+    world = ab.Environment(obstacles=tuple(trunk(x, y, radius) for x, y, radius in places))
+    hall = ab.Limits(lower=np.array([-5.0, -15.0, 0.5]), upper=np.array([105.0, 15.0, 3.5]), velocity=10.0)
+    ends = ab.at_rest((0.0, 0.0, 2.0)), ab.at_rest((100.0, 0.0, 2.0))
+    plan = ab.plan(ab.Problem("forest", *ends, limits=hall, environment=world), vehicle=QUAD)
+    assert plan.certified
+    assert least_gap(plan) > 0.0
+    assert plan.assessment.ratio < 1.1
 
 
 @pytest.mark.slow

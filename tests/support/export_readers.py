@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pandas as pd
 from mcap.reader import make_reader
@@ -156,10 +157,18 @@ def read_bag(path: Path) -> Read:
     )
 
 
+def read_mujoco(path: Path) -> Read:
+    """The keyframes of a model, as MuJoCo has them."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    attitude = Rotation.from_quat(model.key_qpos[:, [4, 5, 6, 3]])
+    return Read(model.key_time.copy(), model.key_qpos[:, :3].copy(), model.key_qvel[:, :3].copy(), attitude)
+
+
 READERS: dict[str, Callable[[Path], Read]] = {
     "csv": read_csv,
     "px4": read_px4,
     "blender": read_glb,
+    "mujoco": read_mujoco,
     "ros1-bag": read_bag,
     "ros2-bag": read_bag,
     "mcap": read_bag,

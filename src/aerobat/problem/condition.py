@@ -172,6 +172,9 @@ class Condition:
         return max(self.lower, -self.upper, 0.0) / float(np.linalg.norm(self.direction))
 
 
+THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
+
+
 @declared
 class Attitude:
     """Thrust along a direction: its axis within a cone about `up`, and so much of it at least.

@@ -217,9 +217,10 @@ def _beside_least(found: Assessment) -> str:
     """How near a duration is to the proven lower bound."""
     if found.ratio == inf:
         return ""
+    free = " if nothing stood in the way" if found.obstructed else ""
     if found.ratio > SEVERAL_TIMES:
-        return f", at most {found.ratio:.1f} times the shortest possible"
-    return f", at most {100.0 * (found.ratio - 1.0):.0f} % above the shortest possible"
+        return f", at most {found.ratio:.1f} times the shortest possible{free}"
+    return f", at most {100.0 * (found.ratio - 1.0):.0f} % above the shortest possible{free}"
 
 
 def _margin(found: Flyability) -> str:

@@ -24,7 +24,8 @@ class ExportOptions(RunOptions):
     """Options of an export: what a plan is exported to, and where."""
 
     to: Annotated[
-        Literal["csv", "crazyflie", "ros1-bag", "ros2-bag", "mcap", "px4", "blender"], Parameter(group=output)
+        Literal["csv", "crazyflie", "ros1-bag", "ros2-bag", "mcap", "px4", "blender", "mujoco"],
+        Parameter(group=output),
     ]
     """The format."""
 
@@ -47,6 +48,7 @@ def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -
     --to ros1-bag    messages for ROS 1, with markers for RViz; ros2-bag (a folder) and mcap for ROS 2
     --to px4         set-points of attitude, rates, thrust and path in PX4's axes (a folder)
     --to blender     an animated scene, glTF, for Blender and other 3D programs
+    --to mujoco      a model for MuJoCo, with a keyframe a row
 
     Parameters
     ----------

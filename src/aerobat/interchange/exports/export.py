@@ -14,6 +14,7 @@ from aerobat.interchange.exports.bags import ROS2_BAG, mcap, ros1_bag, ros2_bag
 from aerobat.interchange.exports.crazyflie import PIECES, crazyflie_pieces
 from aerobat.interchange.exports.gltf import blender_scene
 from aerobat.interchange.exports.loss import Content, ExportRows, Loss
+from aerobat.interchange.exports.mjcf import mujoco_scene
 from aerobat.interchange.exports.px4 import SETPOINTS, px4_setpoints
 from aerobat.planning import Plan
 from aerobat.storage import require_replaceable, whole_folder, write_whole
@@ -45,6 +46,7 @@ FORMATS: Mapping[str, Format] = {
     "mcap": Format(mcap, ".mcap"),
     "px4": Format(px4_setpoints, files=SETPOINTS, rate=250.0),  # its attitude control's own
     "blender": Format(blender_scene, ".glb"),
+    "mujoco": Format(mujoco_scene, ".xml"),
 }
 
 
@@ -75,7 +77,7 @@ def export(plan: Plan, path: PathName, to: str, rate: Positive | None = None) ->
     Args:
         plan: What is exported.
         path: The file to write, with the format's suffix; of crazyflie, px4 and ros2-bag a folder.
-        to: csv, crazyflie, ros1-bag, ros2-bag, mcap, px4 or blender.
+        to: csv, crazyflie, ros1-bag, ros2-bag, mcap, px4, blender or mujoco.
         rate: Rows a second [1/s], by default 100, of px4 250; crazyflie has none.
     """
     if to not in FORMATS:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import inf
+from math import ceil, inf
 
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.around.guesses import ROUTES, Guess, guesses
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, RefinedPath, Refinement
 from aerobat.planning.warm_start import WarmStart
+
+LONGEST = 0.5  # [s] of a guess's segment: with longer ones 100 m past trunks lose their way
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +59,8 @@ def _refined_roughly(refinement: Refinement, segments: int, batch: Sequence[Gues
     shortest = inf
     for guess in batch:
         own = replace(refinement, task=guess.task)
-        count = min(max(segments, guess.path.trajectory.segments), MAX_SEGMENTS)
+        begun = guess.path.trajectory
+        count = min(max(segments, begun.segments, ceil(begun.duration / LONGEST)), MAX_SEGMENTS)
         path = own.rough(_begun(refinement, guess, count), count, shortest)
         if own.is_promising(path):
             yield _Rough(own, path)

@@ -27,6 +27,7 @@ def assessment(task: Task, trajectory: Trajectory, certificate: Certificate) -> 
         max_body_rate=_largest(certificate, "body rate"),
         ground=task.environment.ground,
         rate_limit=task.vehicle.max_body_rate,
+        obstructed=bool(task.environment.obstacles),
     )
 
 

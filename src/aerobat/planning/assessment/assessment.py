@@ -62,6 +62,7 @@ class Assessment:
     max_body_rate: float | None  # [rad/s]; None likewise
     ground: float | None = None  # [m] of the environment, which the certificate is about
     rate_limit: float = inf  # [rad/s] of the vehicle, likewise
+    obstructed: bool = False  # by obstacles, of which the lower bound knows nothing
     opinion: SecondOpinion | None = None  # where there is one
 
     @property
@@ -82,7 +83,7 @@ class Assessment:
     @property
     def suspicious(self) -> bool:
         """True if the duration is so much above the lower bound that only another plan tells what it is."""
-        return self.ratio > SUSPICIOUS
+        return self.ratio > SUSPICIOUS and not self.obstructed
 
     @property
     def poor(self) -> bool:
@@ -96,7 +97,8 @@ class Assessment:
         at_most = "how near to the shortest possible is not known"
         if self.ratio < inf:
             least = f"{self.least_duration:.3f} s or more"
-            at_most = f"at most {self.ratio:.2f} times the shortest possible, which takes {least}"
+            free = " if nothing stood in the way" if self.obstructed else ""
+            at_most = f"at most {self.ratio:.2f} times the shortest possible{free}, which takes {least}"
         if self.opinion is None:
             return at_most
         if self.opinion.missing:

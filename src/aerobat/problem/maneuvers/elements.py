@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerobat.declaration import NonNegative, Positive, Vector3
-from aerobat.problem.condition import Quantity, fixed
+from aerobat.problem.condition import THRUST_FRACTION, Quantity, fixed
 from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.maneuver import Maneuver, gate_in_words, maneuver
-from aerobat.problem.maneuvers.waypoints import THRUST_FRACTION, Waypoint
+from aerobat.problem.maneuvers.waypoints import Waypoint
 from aerobat.problem.stage import MIN_CROSSING_SPEED, CrossingPoint, Stage, StageSequence, check_margin
 
 

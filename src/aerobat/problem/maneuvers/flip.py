@@ -13,7 +13,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import Count, PartialVector, Positive, validated
 from aerobat.errors import SpecError
-from aerobat.problem.condition import Condition, Quantity, fixed, free, thrust_in_plane
+from aerobat.problem.condition import THRUST_FRACTION, Condition, Quantity, fixed, free, thrust_in_plane
 from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.gate_passage import (
     PAPER_INVERTED,
@@ -56,8 +56,6 @@ class Flip(Maneuver):
     APART_DEG: ClassVar[float] = 22.5  # from the gate's: stages that are nearer ask the same
     IN_PLANE_DEG: ClassVar[float] = 0.1  # as exactly as files are written
     SIDES: ClassVar[Mapping[int, str]] = {0: "forward", 1: "left", 2: "back", 3: "right"}
-    LATERAL_FRACTION: ClassVar[float] = 0.2  # of the greatest specific thrust
-    INVERTED_FRACTION: ClassVar[float] = 0.2
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return the stages of the turn, the gate's among them.
@@ -152,9 +150,8 @@ class Flip(Maneuver):
 
     def _min_thrust(self, angle_deg: float, max_specific_thrust: float) -> float:
         """The least specific thrust [m/s²] at an angle of the turn: upside down, or sideways."""
-        if _is_inverted(angle_deg):
-            return self.min_inverted_thrust or self.INVERTED_FRACTION * max_specific_thrust
-        return self.min_lateral_thrust or self.LATERAL_FRACTION * max_specific_thrust
+        asked = self.min_inverted_thrust if _is_inverted(angle_deg) else self.min_lateral_thrust
+        return asked or THRUST_FRACTION * max_specific_thrust
 
     def _direction(self, angle_deg: float) -> Array:
         """The thrust's direction at an angle of the turn, (3,)."""

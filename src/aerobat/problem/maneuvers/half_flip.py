@@ -10,7 +10,7 @@ import numpy as np
 
 from aerobat.declaration import Angle, Positive, validated
 from aerobat.errors import SpecError
-from aerobat.problem.condition import Condition, Quantity, thrust_in_plane
+from aerobat.problem.condition import THRUST_FRACTION, Condition, Quantity, thrust_in_plane
 from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.gate_passage import PAPER_LATERAL, PAPER_PASSAGE, GatePassage
 from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
@@ -31,7 +31,6 @@ class HalfFlip(Maneuver):
     gate: str | None = None  # name of the gate; left out, the only one
 
     TITLE: ClassVar[str] = "half-flip"
-    THRUST_FRACTION: ClassVar[float] = 0.2  # of the greatest specific thrust
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return one stage, the gate, and thrust that never points down: (a_z + g) tan α = a_y, α ≤ 90°.
@@ -69,7 +68,7 @@ class HalfFlip(Maneuver):
         if gate.up[2] < -1e-9:
             raise SpecError("gate.tilt_deg must be from -90 to 90 for a half-flip; past that it is a flip")
         if self.min_lateral_thrust is None:
-            return self.THRUST_FRACTION * max_specific_thrust
+            return THRUST_FRACTION * max_specific_thrust
         across = float(np.hypot(gate.up[0], gate.up[1]))
         if across < _UPRIGHT:
             raise SpecError(

@@ -20,12 +20,11 @@ from aerobat.declaration import (
 )
 from aerobat.errors import SpecError
 from aerobat.problem.ball import Ball
-from aerobat.problem.condition import Attitude, Condition, Quantity, fixed, free
+from aerobat.problem.condition import THRUST_FRACTION, Attitude, Condition, Quantity, fixed, free
 from aerobat.problem.gate import Gate
 from aerobat.problem.maneuvers.maneuver import Maneuver, gate_in_words, in_sequence, maneuver
 from aerobat.problem.stage import CrossingPoint, Stage, StageSequence, check_crossing
 
-THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
 FIXABLE = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 
 

@@ -17,13 +17,13 @@ from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
 from aerobat.planning import Plan, Planner
 from aerobat.problem import Problem
+from aerobat.problem.condition import THRUST_FRACTION
 from aerobat.so3 import UP
 from aerobat.studies.lens import lens
 from aerobat.vehicle import Vehicle
 
 LEAST_REACH = 0.5  # [m] to either side, by which a gate can be moved
 STEPS = 40  # of a slider's range, or more: its step is round
-THRUST_FRACTION = 0.2  # of what the vehicle has: the least thrusts of maneuvers that name none
 ORDERS = range(3, 6)  # jerk, snap, crackle
 THRUST_TO_WEIGHT = (1.2, 8.0)  # from what hardly climbs to racing quadrotors
 MAX_OBSTACLES = 12  # that have sliders: more are a page that nobody reads

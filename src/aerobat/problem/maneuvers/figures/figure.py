@@ -20,13 +20,12 @@ from aerobat.declaration import (
     in_radians,
     unit,
 )
-from aerobat.problem.condition import Attitude, Condition, ConeAngle, Quantity
+from aerobat.problem.condition import THRUST_FRACTION, Attitude, Condition, ConeAngle, Quantity
 from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.maneuvers.maneuver import Maneuver
 from aerobat.problem.stage import Stage
 from aerobat.so3 import UP
 
-THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along the attitude of a stage
 LEVEL = 1e-3  # [-] a direction of passage with less across the vertical has no heading
 
 
