@@ -18,6 +18,11 @@ from aerobat.links.mission import Mission, MissionSettings
 from aerobat.links.path_follower import PathForwarder
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import least_duration
+from aerobat.planning.recorder import Recorder
+from aerobat.planning.refinement.closure import Closure
+from aerobat.planning.refinement.excess import chebyshev
+from aerobat.planning.refinement.refine import Refinement
+from aerobat.planning.task import Task
 from aerobat.reporting.facts import facts
 from aerobat.trajectory import Trajectory
 from random_flights import with_lags
@@ -39,8 +44,8 @@ def planned(lagging: bool = True, course: str = "short") -> ab.Plan:
     """A lap with rotor lag and a reserve, or at the limits of rotors without."""
     problem = {"short": SHORT, "closed": CLOSED}[course]
     if lagging:
-        return ab.plan(problem, ab.TimeOptimal(reserve=0.03), QUAD)
-    return ab.plan(problem, ab.TimeOptimal(), with_lags(QUAD, 0.0))
+        return ab.plan(problem, ab.FreeKnots(reserve=0.03), QUAD)
+    return ab.plan(problem, ab.FreeKnots(), with_lags(QUAD, 0.0))
 
 
 @cache
@@ -70,6 +75,23 @@ def test_a_closed_lap_ends_in_the_state_in_which_it_begins(lagging: bool, course
     assert np.linalg.norm(flat.setpoint.flat.velocity[0]) > 3.0
 
 
+def test_the_turn_once_around_follows_from_its_slopes() -> None:
+    """Central differences of the body's turn about its thrust axis, along random changes of a lap."""
+    task = Task.of(SHORT, QUAD)
+    limits = Refinement.of(task, Recorder(None)).limits
+    closure = Closure(limits, chebyshev(16))
+    path = planned().trajectory
+    places = np.stack([path.on_segments(chebyshev(16), k) for k in range(6)], axis=2)
+    rng, durations, step = np.random.default_rng(0), path.durations, 1e-5
+    # a smooth closed change of the path, the same at both ends of the lap
+    phase = 2.0 * np.pi * (path.knots[:-1, None] + durations[:, None] * chebyshev(16)) / path.duration
+    rate, amplitude = 2.0 * np.pi / path.duration, rng.normal(size=3)
+    change = np.stack([rate**k * np.cos(phase + k * np.pi / 2)[..., None] * amplitude for k in range(6)], 2)
+    ahead, behind = (closure.values(places + sign * step * change, durations)[0] for sign in (1.0, -1.0))
+    slope = np.sum(closure.slopes(places, durations) * change)
+    assert slope == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-3)
+
+
 @pytest.mark.slow
 def test_a_lap_flown_twice_over_is_certified_as_one_path() -> None:
     """The seam is a knot like any other, and the second time around the rotors bear the same."""
@@ -84,7 +106,7 @@ def test_a_lap_flown_twice_over_is_certified_as_one_path() -> None:
 def test_a_closed_lap_is_shorter_than_from_rest_and_longer_than_physics_allows() -> None:
     rest = ab.at_rest((-3.0, 0.0, 1.5))
     from_rest = ab.Problem("rest", rest, rest, ab.Course(LAP), (GATE,))
-    slower, lap = ab.TimeOptimal().plan(from_rest, with_lags(QUAD, 0.0)), planned(False, "closed")
+    slower, lap = ab.FreeKnots().plan(from_rest, with_lags(QUAD, 0.0)), planned(False, "closed")
     assert lap.duration < 0.95 * slower.duration
     assert 0.5 * lap.duration < least_duration(CLOSED, QUAD) < lap.duration
 
@@ -99,8 +121,9 @@ def test_a_flight_begins_in_the_laps_state_and_is_judged_and_timed_all_the_way_r
     assert [w.waypoint for w in score.waypoints] == ["waypoint"]
     assert plan.lap_times == (pytest.approx(plan.duration),)
     (lap,) = score.laps
-    assert lap.duration == pytest.approx(plan.duration, abs=1e-3)
-    assert (lap.end, plan.laps[0]) == pytest.approx((plan.duration, plan.duration), abs=1e-3)
+    # a flight is at the waypoint where it comes nearest, a plan where it is within reach
+    assert lap.duration == pytest.approx(plan.duration, abs=0.01)
+    assert (lap.end, plan.laps[0]) == pytest.approx((plan.duration, plan.duration), abs=0.01)
     (lap_1,) = (fact.said for fact in facts(score) if fact.label == "lap 1")
     assert lap_1 == f"{lap.duration:.3f} s, until {lap.end:.3f} s"
     assert ab.score_flights(plan)[0].laps[0].duration == pytest.approx(lap.duration, abs=1e-6)
@@ -125,9 +148,9 @@ def test_a_path_that_does_not_close_is_refuted() -> None:
     assert found.discontinuities[0].time == cut.duration
 
 
-@pytest.mark.parametrize("planner", ["miqp", "min-snap", "free-knots"])
+@pytest.mark.parametrize("planner", ["miqp", "min-snap"])
 def test_planners_that_need_ends_refuse_a_closed_course_and_name_the_one_that_does_not(planner: str) -> None:
-    with pytest.raises(SpecError, match=rf"closed: the {planner} planner .* take time-optimal"):
+    with pytest.raises(SpecError, match=rf"closed: the {planner} planner .* take free-knots"):
         ab.plan(CLOSED, planner, QUAD)
 
 

@@ -239,9 +239,18 @@ def test_a_search_that_ends_with_nothing_says_where_and_what_to_change():
     with pytest.raises(
         Infeasible, match=r"limit of iterations, worst on the leg from .*; ask less .* or give"
     ) as raised:
-        TimeOptimal(iterations=2, starts=2).plan(load_problem("line"), QUAD, seen.append)
+        TimeOptimal(iterations=2, starts=2).plan(load_problem("race-7"), QUAD, seen.append)
     assert list(raised.value.attempts) == seen
     assert all(not attempt.feasible for attempt in seen)
+
+
+@pytest.mark.slow
+def test_where_no_motion_is_found_polynomials_are_the_plan():
+    """Refined from the path that the motion began from."""
+    found = TimeOptimal(iterations=2, starts=1).plan(load_problem("line"), QUAD)
+    assert found.certified
+    assert found.planner == "time-optimal"
+    assert found.duration < 1.46
 
 
 def test_without_casadi_the_remedy_is_the_command_that_installs_it(monkeypatch):

@@ -170,7 +170,7 @@ def _help(offers: dict[str, PlannerOption]) -> str:
 def _planners_help() -> str:
     summaries = ((name, getdoc(cls) or cls.__name__) for name, cls in registered_planners().items())
     first = (f"{name}, {doc.splitlines()[0].rstrip('.')}" for name, doc in summaries)
-    default = "Default: miqp, of long courses free-knots, of closed laps time-optimal."
+    default = "Default: miqp, of long courses and closed laps free-knots."
     return f"The planner: {'; '.join(first)}. {default}"
 
 

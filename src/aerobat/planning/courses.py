@@ -57,7 +57,7 @@ def on_open_courses(
         if not problem.ends:
             raise SpecError(
                 f"maneuver.closed: the {name} planner goes from a start to a goal, a closed course has "
-                "neither; take time-optimal"
+                "neither; take free-knots"
             )
         return method(self, problem, vehicle, progress)
 

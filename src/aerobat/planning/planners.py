@@ -124,11 +124,11 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
     """The name of the planner to take where nobody names one.
 
     It is miqp, whose search is exact, but for long courses, which it cannot search in reasonable time: for a
-    vehicle those are free-knots', as are ways around obstacles through stages that say where they are.
-    Closed courses are time-optimal's alone.
+    vehicle those are free-knots', as are closed ones and ways around obstacles through stages that say where
+    they are.
     """
     if not problem.ends:
-        return "time-optimal"
+        return "free-knots"
     if vehicle is None:
         return "miqp"
     stages = problem.stages(vehicle.max_specific_thrust)

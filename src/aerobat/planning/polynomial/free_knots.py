@@ -23,6 +23,7 @@ from aerobat.planning.certified_solve import Judged
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
+from aerobat.planning.polynomial.flying_lap import flying_lap
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.recorder import Progress, Recorder
@@ -47,8 +48,12 @@ class FreeKnots(Planner):
     their limits by their commands, their thrusts continuous. At the ends the body does not turn, but its
     thrust may be changing, so that there is jerk along it, unless `still_ends` asks for none. A `reserve`, a
     fraction of the range of rotors and body rate, is kept from either end for the controller, proven of
-    rotors. Around obstacles they begin from routes on several sides, and keep a `clearance` from them.
+    rotors. Around obstacles they begin from routes on several sides, and keep a `clearance` from them. A
+    closed course ends in the state in which it begins, of position, velocity, attitude, body rates and
+    thrusts, all of which are chosen.
     """
+
+    PLANS_CLOSED_COURSES: ClassVar[bool] = True
 
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(
         SEGMENTS,
@@ -148,8 +153,11 @@ class FreeKnots(Planner):
         on_course = is_course(task.stages)
         if self.start is not None:
             yield self.start, WarmStart.of(self.start, task.stages)
+        begun = flying_lap if task.stages.closed else start_along_normals
         for order in START_ORDERS if on_course else ():
-            yield None, start_along_normals(task, order)
+            yield None, begun(task, order)
+        if task.stages.closed:
+            return
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points and not on_course else []
         others = [*closed_form, Miqp(reserve=self.reserve, rescue=False, flies=False)]
         for plan in _plans_to_begin_from(others, problem, task.vehicle):

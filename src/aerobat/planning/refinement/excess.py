@@ -42,7 +42,8 @@ class Excess:
         values = limits.values(derivatives, limits.frames(times.ravel(), derivatives))
         values += limits.reserve
         values = values.reshape(trajectory.segments, places, -1)
-        values[0, 0, limits.at_ends] = values[-1, -1, limits.at_ends] = -1.0
+        if not limits.task.stages.closed:
+            values[0, 0, limits.at_ends] = values[-1, -1, limits.at_ends] = -1.0
         segment, place, side = np.unravel_index(int(np.argmax(values)), values.shape)
         return cls(values.max(axis=1), limits.sides, (int(side), float(times[segment, place])))
 

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
+from aerobat.planning.refinement.closure import Closure
 from aerobat.planning.refinement.excess import chebyshev
 from aerobat.planning.refinement.limit_values import Frames, LimitValues
 from aerobat.planning.refinement.spline import Motion, Spline, basis
@@ -87,11 +88,11 @@ class RefinementProgram:
     def counts(self) -> Mask:
         """The mask of the constraints that count, (S, p, c).
 
-        Constraints of the path do not count at the very ends, which are fixed, and planes only where there
-        are obstacles near.
+        Constraints of the path do not count at ends, which are fixed, and planes only where there are
+        obstacles near.
         """
         counts = np.ones((self.spline.segments, len(self.fractions), len(self.limits.sides)), dtype=bool)
-        counts[0, 0, self.limits.at_ends] = counts[-1, -1, self.limits.at_ends] = False
+        counts[0, 0, self.limits.at_ends] = counts[-1, -1, self.limits.at_ends] = self._is_closed
         planes = self.near.planes
         if planes is not None:
             near = np.isfinite(planes.offsets).reshape(*counts.shape[:2], -1)
@@ -105,7 +106,8 @@ class RefinementProgram:
         What is kept there from limits fades instead, as ends may lie on limits of the path.
         """
         weights = np.where(self.counts, 1.0, 0.0)
-        for segment, inward in ((0, self.fractions), (-1, 1.0 - self.fractions)):
+        ends = () if self._is_closed else ((0, self.fractions), (-1, 1.0 - self.fractions))
+        for segment, inward in ends:
             faded = np.maximum(np.minimum(inward / FADED, 1.0) ** FADING, LEAST_FADED)
             weights[segment, :, self.limits.of_path] /= faded
         return weights
@@ -123,10 +125,25 @@ class RefinementProgram:
 
     @cached_property
     def timed(self) -> tuple[Array, Array]:
-        """Ratios that add up, and stages at given fractions of the duration, as rows · ratios = targets."""
+        """Ratios that add up, and stages at given fractions of the duration, as rows · ratios = targets.
+
+        The seam of a closed course lies half-way in time between the last stage and the first.
+        """
         whole = np.full(self.spline.segments, 1.0 / self.spline.segments)
-        rows = [(before, first) for before, (first, last) in self._windows if first == last]
-        return _stacked([(whole, 1.0), *rows], self.spline.segments)
+        rows = [(whole, 1.0), *((before, first) for before, (first, last) in self._windows if first == last)]
+        if self._is_closed:
+            (to_first, _), *_, (to_last, _) = self._windows
+            rows.append((to_first + to_last, 1.0))
+        return _stacked(rows, self.spline.segments)
+
+    @property
+    def closure(self) -> Closure | None:
+        """What makes the end of a closed course its start; None of others."""
+        return Closure(self.limits, self.fractions) if self._is_closed else None
+
+    @property
+    def _is_closed(self) -> bool:
+        return self.spline.task.stages.closed
 
     @property
     def _windows(self) -> Iterator[tuple[Array, tuple[float, float]]]:
@@ -161,10 +178,12 @@ class RefinedPoint:
 
     @cached_property
     def equalities(self) -> Array:
-        """The values of the equality constraints on durations, then of those at stages."""
+        """The values of the equality constraints on durations, then of those at stages, and of a closure."""
         rows, targets = self.program.timed
-        at_stages = self.program.stages.equalities(self._at_stages)
-        return np.concatenate([rows @ self._ratios - targets, at_stages])
+        found = [rows @ self._ratios - targets, self.program.stages.equalities(self._at_stages)]
+        if self.program.closure is not None:
+            found.append(self.program.closure.values(self._derivatives, self._durations))
+        return np.concatenate(found)
 
     @cached_property
     def rows(self) -> RefinedRows:
@@ -186,7 +205,12 @@ class RefinedPoint:
         rows, _ = self.program.timed
         timed = np.zeros((len(rows), len(self.x)))
         timed[:, self.program.spline.ratio_columns] = rows * self._ratios
-        return np.concatenate([timed, self._stage_rows(*self.program.stages.equality_slopes())])
+        found = [timed, self._stage_rows(*self.program.stages.equality_slopes())]
+        if self.program.closure is not None:
+            by_motion = self.program.closure.slopes(self._motion.derivatives, self._durations)
+            by_local = np.einsum("spka,spkaK->sK", by_motion, self._motion.slopes)
+            found.append(self.program.spline.scattered(by_local)[None])
+        return np.concatenate(found)
 
     def curvature(self, inequality_weights: Array, equality_weights: Array) -> Array:
         """The second derivatives of their weighted sum, (n, n)."""
@@ -202,7 +226,7 @@ class RefinedPoint:
         blocks = np.swapaxes(moving, 1, 2) @ (second @ moving)
         blocks = blocks.reshape(segments, count, *blocks.shape[1:]).sum(axis=1)
         blocks += self._motion.curvature(by_motion.reshape(segments, count, 6, 3))
-        timed, equal = np.split(equality_weights, [len(program.timed[1])])
+        timed, equal = np.split(equality_weights[: self._linear_equalities], [len(program.timed[1])])
         blocks += self._stage_blocks(at_stages, equal)
         matrix = spline.assembled(blocks)
         by_ratio = at_windows @ program.windows[0] + timed @ program.timed[0]
@@ -235,6 +259,16 @@ class RefinedPoint:
             slopes = self._ends.slopes[segment, 0].reshape(18, -1)
             np.add.at(row, spline.columns[segment], by_state.ravel() @ slopes)
         return rows[:, :-1]
+
+    @property
+    def _linear_equalities(self) -> int:
+        """The number of equality constraints but that of a closure, whose curvature is left out."""
+        return len(self.equalities) - (self.program.closure is not None)
+
+    @property
+    def _durations(self) -> Array:
+        """Of all segments [s], (S,)."""
+        return np.asarray(self._ratios * np.exp(self.x[self.program.spline.mean_column]))
 
     @property
     def _ratios(self) -> Array:

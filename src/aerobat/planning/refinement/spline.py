@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from math import log, perm
 
 import numpy as np
@@ -91,7 +92,8 @@ class Spline:
     Free are position to jerk at the inner knots, and snap: one for both neighbours if rotors lag, whose
     thrusts cannot jump, else one for each. At the ends the body does not turn but its thrust may be
     changing: free are jerk along the thrust, unless ends are still, and snap along it if rotors lag, else
-    all of it; where any attitude will do, all from acceleration on.
+    all of it; where any attitude will do, all from acceleration on. A closed course has no ends: the knot at
+    its seam is an inner one.
     """
 
     task: Task
@@ -209,10 +211,17 @@ class Spline:
     def _ends(self) -> Array:
         """The derivatives of the path that it begins with at both ends of all segments, (S, 10, 3)."""
         ends = np.stack([self.begun.on_segments([0.0, 1.0], k) for k in range(END_ORDER)], axis=2)
-        ends[1:, 0, : self._shared] = ends[:-1, 1, : self._shared] = (
-            ends[1:, 0, : self._shared] + ends[:-1, 1, : self._shared]
-        ) / 2.0
+        for before, after, shared in self._joints:
+            met = (ends[after, 0, :shared] + ends[before, 1, :shared]) / 2.0
+            ends[after, 0, :shared] = ends[before, 1, :shared] = met
         return np.asarray(ends.reshape(self.segments, 2 * END_ORDER, 3))
+
+    @property
+    def _joints(self) -> list[tuple[int, int, int]]:
+        """Segments before and after each inner knot, and how many derivatives they share: all at a seam."""
+        order = range(self.segments)
+        inner = [(before, after, self._shared) for before, after in pairwise(order)]
+        return [*inner, (order[-1], 0, END_ORDER)] if self.task.stages.closed else inner
 
     @cached_property
     def _fixed_data(self) -> Array:
@@ -234,9 +243,9 @@ class Spline:
 
     @property
     def _end_states(self) -> tuple[tuple[int, int, EndState], ...]:
-        """The segment, the row of its position and the state of both ends."""
-        problem = self.task.problem
-        return (0, 0, problem.start), (self.segments - 1, END_ORDER, problem.goal)
+        """The segment, the row of its position and the state of both ends, if there are any."""
+        places = {"start": (0, 0), "goal": (self.segments - 1, END_ORDER)}
+        return tuple((*places[name], state) for name, state in self.task.problem.ends.items())
 
     def _thrust_direction(self, state: EndState) -> Array:
         """Where the thrust points at an end, (3,)."""
@@ -247,7 +256,6 @@ class Spline:
     def _layout(self) -> tuple[list[tuple[int, int, Array, int]], list[int], int]:
         """Segment, row, direction and column of all data that variables move; columns of ln τ; of ln h."""
         moved: list[tuple[int, int, Array, int]] = []
-        ratios: list[int] = []
         count = 0
 
         def add(direction: Array, *where: tuple[int, int]) -> None:
@@ -255,21 +263,17 @@ class Spline:
             moved.extend((segment, row, direction, count) for segment, row in where)
             count += 1
 
-        first, last = self._end_states
-        for direction, *where in self._end_variables(*first):
-            add(direction, *where)
-        for segment in range(self.segments):
-            ratios.append(count)
-            count += 1
-            if segment + 1 < self.segments:
-                for order in range(END_ORDER):
-                    sides = [(segment, END_ORDER + order), (segment + 1, order)]
-                    for where in [sides] if order < self._shared else [[side] for side in sides]:
-                        for axis in np.eye(3):
-                            add(axis, *where)
-        for direction, *where in self._end_variables(*last):
-            add(direction, *where)
-        return moved, ratios, count
+        for end in self._end_states:
+            for direction, *where in self._end_variables(*end):
+                add(direction, *where)
+        for before, after, shared in self._joints:
+            for order in range(END_ORDER):
+                sides = [(before, END_ORDER + order), (after, order)]
+                for where in [sides] if order < shared else [[side] for side in sides]:
+                    for axis in np.eye(3):
+                        add(axis, *where)
+        ratios = list(range(count, count + self.segments))
+        return moved, ratios, count + self.segments
 
     def _end_variables(
         self, segment: int, first: int, state: EndState

@@ -12,12 +12,11 @@ from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
 from aerobat.planning.certified_solve import Solution
 from aerobat.planning.passages import PlacedStage, place_stages
-from aerobat.planning.time_optimal.optimal_control.boundary import ClosedLap, FixedEnds
+from aerobat.planning.time_optimal.optimal_control.boundary import FixedEnds
 from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
 from aerobat.planning.time_optimal.optimal_control.collocation import (
     CollocatedMotion,
     CollocationMesh,
-    closed,
     trajectory_of,
 )
 from aerobat.planning.time_optimal.optimal_control.elements import Elements
@@ -44,9 +43,7 @@ class SolvedMotion:
         """The motion's trajectory."""
         elements = self.program.control.elements
         mesh, heading = self.program.mesh, elements.task.problem.heading
-        if not self.program.control.boundary.is_closed:
-            return trajectory_of(elements.body, mesh, self.motion, heading)
-        return closed(trajectory_of(elements.body, mesh, self.motion.closed, heading))
+        return trajectory_of(elements.body, mesh, self.motion, heading)
 
     @property
     def placed(self) -> tuple[PlacedStage, ...]:
@@ -73,9 +70,7 @@ class SolvedMotion:
         rows, columns = map(np.array, program.derivatives["jac_g"].sparsity_out(1).get_triplet())
         legs = mesh.leg_of_unknowns[columns[rows == int(np.argmax(excess))]]
         leg = int(legs.max(initial=0))
-        names = [f"'{stage.name}'" for stage in self.program.control.stages]
-        is_closed = self.program.control.boundary.is_closed
-        names = [names[-1], *names, names[0]] if is_closed else ["the start", *names, "the goal"]
+        names = ["the start", *(f"'{stage.name}'" for stage in self.program.control.stages), "the goal"]
         return f"worst on the leg from {names[leg]} to {names[leg + 1]}"
 
     @property
@@ -160,12 +155,10 @@ class CollocatedProgram:
             return False
         control = self.control
         backoff = self.backoff.grown(control.elements.bounds, solution.trajectory, control.reserve)
-        boundary = control.boundary.corrected(solution.trajectory)
-        if backoff is None and boundary is control.boundary:
+        if backoff is None:
             return False
         answer = solution.source.answer
-        self.control = replace(control, boundary=boundary)
-        self.backoff, self._barrier = backoff or self.backoff, WARM_BARRIER
+        self.backoff, self._barrier = backoff, WARM_BARRIER
         self._x, self._multipliers = answer.x, answer.multipliers
         return True
 
@@ -174,7 +167,7 @@ def optimal_control(elements: Elements, start: Start, reserve: float) -> Optimal
     """The optimal control through the stages in the order of a start, a reserve kept from rotors' limits."""
     kept = THRUST_RESERVE * reserve * elements.task.vehicle.max_specific_thrust
     floor = max(elements.bounds.floor.lower, kept)
-    boundary = ClosedLap(elements) if elements.task.stages.closed else FixedEnds(elements)
+    boundary = FixedEnds(elements)
     return OptimalControl(
         elements=elements,
         boundary=boundary,

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import reference
 from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.planning.task import Task
 from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, CollocationMesh
 from aerobat.planning.warm_start import WarmStart
-from aerobat.so3 import UP
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +40,6 @@ def initial_motion(start: Start, mesh: CollocationMesh, task: Task) -> Collocate
     flat = setpoint.flat
     thrust = task.balance.specific_thrust(flat.velocity, flat.acceleration)
     attitude, turning = setpoint.q_world_body, (setpoint.omega_body, setpoint.omega_dot_body)
-    if task.stages.closed:
-        attitude, turning = _without_twist(attitude, turning, times / times[-1])
     rates, accelerations = (vectors[:, :2] for vectors in turning)
     place = flat.position + np.sin(np.pi * times / times[-1])[:, None] * start.aside
     states = np.concatenate([place, flat.velocity, attitude, rates], axis=1).T
@@ -52,22 +48,3 @@ def initial_motion(start: Start, mesh: CollocationMesh, task: Task) -> Collocate
     bound = 2.0 * mesh.input_scale[:, None]
     inputs = np.clip(inputs, -bound, bound)
     return CollocatedMotion(guess.phases, states, inputs[:, :-1], inputs[:, 1:])
-
-
-def _without_twist(
-    attitude: Array, vectors: tuple[Array, Array], fractions: Array
-) -> tuple[Array, tuple[Array, Array]]:
-    """Attitudes along a lap turned about the thrust axis, evenly, so that the last is as the first.
-
-    What is carried along a lap without spin comes back turned, by the solid angle about which thrust went.
-
-    Args:
-        attitude: Of the body, (K, 4).
-        vectors: In body axes, (K, 3) each.
-        fractions: Of the lap's duration, (K,).
-    """
-    twist = so3.multiply(so3.conjugate(attitude[0]), attitude[-1])
-    angle = 2.0 * np.arctan2(twist[3], twist[0])
-    turn = so3.about_axis(UP, -np.arctan2(np.sin(angle), np.cos(angle)) * fractions)
-    omega, omega_dot = (so3.rotate(so3.conjugate(turn), each) for each in vectors)
-    return so3.multiply(attitude, turn), (omega, omega_dot)

@@ -14,17 +14,14 @@ from aerobat.planning.courses import is_course
 from aerobat.planning.gate_clearance import bodies_in_gates
 from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner
-from aerobat.planning.polynomial.knots import path_along_normals, start_along_normals
+from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
 from aerobat.planning.time_optimal.start import Start
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.end_state import at_rest
-from aerobat.problem.maneuvers.line import Line
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import Stage, StageSequence
-from aerobat.trajectory import Trajectory
+from aerobat.problem.stage import StageSequence
 from aerobat.trajectory.minimum_effort import ORDERS
 from aerobat.vehicle import Vehicle
 
@@ -32,7 +29,6 @@ SLOWER = 1.5  # times the duration of a plan that knows no rotors
 PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, where paces are drawn
 SEED = 0
 NEAR_PLANE = 0.05  # of a path's length: what leaves a plane by less may begin in it
-UNROLLED = 3  # laps in a row, of which the middle one is a flying lap
 ASIDE = 0.1  # of a path's length, by which it is bent out of its plane: symmetry is an optimum of its own
 
 
@@ -59,10 +55,6 @@ def starts(task: Task, guess: Miqp, planar: bool, count: int, first: Plan | None
     """
     sequence = task.stages
     in_gates = bodies_in_gates(task) if is_course(sequence) else ()
-    if sequence.closed:
-        laps = [(flying_lap(task, order), f"minimum {ORDERS[order]}") for order in (3, 4)]
-        found = tuple(islice(in_space(_variations(laps, False)), count))
-        return Starts(tuple(replace(start, in_gates=in_gates) for start in found), ())
     if is_course(sequence):
         plans = [] if first is None else [(first, f"{first.planner}'s plan")]
         sources = [*_sources(plans, sequence), *_closed_forms(task)]
@@ -72,39 +64,6 @@ def starts(task: Task, guess: Miqp, planar: bool, count: int, first: Plan | None
     own = tuple(plan for plan, _ in plans if plan.certified and plan.vehicle == task.vehicle)
     motions = islice(_variations(sources, planar), count)
     return Starts(tuple(replace(start, in_gates=in_gates) for start in motions), own)
-
-
-def flying_lap(task: Task, order: int) -> WarmStart:
-    """A lap of the closed form through a closed sequence as a start: of three in a row the middle one.
-
-    From a rest at its last place to one at its first, laps begin and end half-way in time between those two.
-
-    Args:
-        task: With a closed course.
-        order: The derivative of position whose square is minimized.
-    """
-    problem, sequence = task.problem, task.stages
-    places = [place for stage in sequence.stages if (place := _place(stage, problem)) is not None]
-    lap = (Stage("seam"), *sequence.stages)
-    laps = replace(sequence, stages=(*UNROLLED * lap, Stage("seam")), closed=False)
-    open_ends = replace(problem, maneuver=Line(), start=at_rest(places[-1]), goal=at_rest(places[0]))
-    path = path_along_normals(replace(task, problem=open_ends, stages=laps), order)
-    first = 1 + len(lap) * (UNROLLED // 2)  # the knot at which the middle lap begins
-    segments = slice(first, first + len(lap))
-    middle = Trajectory(path.durations[segments], path.coefficients[segments], problem.heading)
-    return WarmStart(middle, sequence.stages, tuple(middle.knots[1:-1].tolist()))
-
-
-def _place(stage: Stage, problem: Problem) -> Array | None:
-    """Where a stage is; None where it does not say."""
-    centre = stage.centre(problem.gates)
-    place = stage.place if centre is None else centre
-    return None if np.isnan(place).any() else place
-
-
-def in_space(starts: Iterator[Start]) -> Iterator[Start]:
-    """Yield the starts that keep to no plane."""
-    return (start for start in starts if start.plane is None)
 
 
 def _closed_forms(task: Task) -> Iterator[tuple[WarmStart, str]]:

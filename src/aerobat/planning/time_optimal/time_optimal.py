@@ -19,10 +19,11 @@ from pydantic import Field
 
 from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, Reason, SpecError, limits_of
-from aerobat.optimization.deadline import out_of_time, within_time
+from aerobat.optimization.deadline import out_of_time, within_share, within_time
 from aerobat.optimization.nonlinear import import_casadi
 from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
+from aerobat.planning.polynomial.free_knots import FreeKnots
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls
@@ -37,6 +38,8 @@ if TYPE_CHECKING:  # what it takes to plan is imported then: the options are tho
     from aerobat.planning.time_optimal.race import Race
     from aerobat.planning.time_optimal.starts import Starts
 
+SEGMENTS = 16  # of polynomials that are refined from its motion,
+REFINED_TIME = 0.5  # of the time that is left, where there is a limit
 SMOOTHING_LAG = 0.005  # [s] that rotors without lag are given, where thrusts that jump lead nowhere
 
 
@@ -47,12 +50,12 @@ class TimeOptimal(Planner):
     So many `intervals` in all are allocated to the phases; a course of many stages has 20 a leg at least. Of
     several `starts` on a coarse mesh, from the plans of `guess` and of closed forms at several paces, the
     best are solved finely, and the fastest that is certified is returned; `Plan.starts` has the durations of
-    all. A course begins at the closed form through its stages, and elsewhere only where that leads nowhere.
-    A `start`, a plan of whichever planner, comes first. Each limit is used in full, which leaves nothing for
-    a controller: `reserve`, a fraction of each rotor's range of thrust, is kept from either of its ends for
-    it. A `planar` plan stays in the vertical plane of its start, where that has one; in space there may be a
-    faster one. A closed course ends in the state in which it begins, of position, velocity, attitude, body
-    rates and thrusts, all of which are chosen.
+    all. Polynomials that are refined from there are the plan where they are faster, and where nothing else is
+    found. A course begins at the closed form through its stages, and elsewhere only where that leads nowhere;
+    a closed one is free-knots'. A `start`, a plan of whichever planner, comes first. Each limit is used in
+    full, which leaves nothing for a controller: `reserve`, a fraction of each rotor's range of thrust, is
+    kept from either of its ends for it. A `planar` plan stays in the vertical plane of its start, where that
+    has one; in space there may be a faster one.
     """
 
     PLANS_CLOSED_COURSES: ClassVar[bool] = True
@@ -85,6 +88,8 @@ class TimeOptimal(Planner):
         from aerobat.planning.time_optimal.race import Race, with_smoother
         from aerobat.planning.time_optimal.starts import starts
 
+        if not problem.ends:
+            return self._lap(problem, vehicle, progress)
         task = flown_task("time-optimal", problem, vehicle, self.reserve)
         if np.isfinite(problem.path_limits.of(BOUNDED_DERIVATIVES)[1]).any():
             raise SpecError(
@@ -101,7 +106,10 @@ class TimeOptimal(Planner):
                 if out_of_time():
                     return stopped(_best_so_far(own, begun, race, self.time_limit))
                 if own is not None:
-                    return own
+                    break
+            best = own if race.on_course else self._refined(own, begun, race)
+            if best is not None:
+                return best
         last = attempts[-1].outcome
         remedy = "ask less of its stages and limits, or give more intervals"
         if len(task.environment.pieces):
@@ -111,6 +119,30 @@ class TimeOptimal(Planner):
             f"{last}; {remedy}"
         )
         raise Infeasible(Reason(sentence, limits_of(last)), attempts)
+
+    def _refined(self, own: Plan | None, begun: Starts, race: Race) -> Plan | None:
+        """The planner's own plan, or a faster one of polynomials that is refined from it.
+
+        Where it has none, that which is refined from the path that it began from, if there is any.
+        """
+        start = min(begun.plans, key=lambda plan: plan.duration, default=None) if own is None else own
+        if start is None:
+            return None
+        planner = FreeKnots(SEGMENTS, start, reserve=self.reserve)
+        try:
+            with within_share(REFINED_TIME):
+                found = planner.plan(race.task.problem, race.task.vehicle, race.recorder.progress)
+        except Infeasible:
+            return own
+        if own is not None and found.duration >= own.duration:
+            return own
+        attempts = (*race.recorder.attempts, *found.attempts)
+        return replace(found, planner="time-optimal", attempts=attempts, starts=race.durations)
+
+    def _lap(self, problem: Problem, vehicle: Vehicle | None, progress: Progress | None) -> Plan:
+        """The plan of a closed course, by free knots."""
+        planner = FreeKnots(reserve=self.reserve, time_limit=self.time_limit)
+        return replace(planner.plan(problem, vehicle, progress), planner="time-optimal")
 
 
 def _best_so_far(own: Plan | None, begun: Starts, race: Race, limit: float | None) -> Plan:

@@ -55,13 +55,6 @@ class CollocatedMotion:
     starts: Array  # inputs at the starts of the intervals, (3, K)
     ends: Array  # and at their ends, (3, K)
 
-    @property
-    def closed(self) -> CollocatedMotion:
-        """The same with the end made exactly the start, which solvers do but for their tolerance."""
-        states, ends = self.states.copy(), self.ends.copy()
-        states[:, -1], ends[:, -1] = states[:, 0], self.starts[:, 0]
-        return replace(self, states=states, ends=ends)
-
 
 @dataclass(frozen=True, eq=False)
 class CollocationMesh:
@@ -305,21 +298,3 @@ def _integrated(motion: CollocatedMotion, durations: Array, ends: list[Array], h
         piece[:2] = position, h * velocity
         position, velocity = piece.sum(axis=0), np.arange(8) @ piece / h
     return Trajectory(durations, coefficients, heading)
-
-
-def closed(trajectory: Trajectory) -> Trajectory:
-    """A lap whose position and velocity at the end are those at the start to rounding.
-
-    What solvers leave of the defects adds up to some 1e-6 m/s along a lap. A constant acceleration, and
-    another velocity at the start, far below what the certificate tells apart, take it away.
-    """
-    ends = [trajectory.on_segments([0.0, 1.0], k)[[0, -1], [0, 1]] for k in (0, 1)]
-    (moved, faster), duration = (end - start for start, end in ends), trajectory.duration
-    acceleration = -faster / duration
-    velocity = -moved / duration + faster / 2.0
-    t, h = trajectory.knots[:-1, None], trajectory.durations[:, None]
-    coefficients = trajectory.coefficients.copy()
-    coefficients[:, 0] += velocity * t + acceleration * t**2 / 2.0
-    coefficients[:, 1] += h * (velocity + acceleration * t)
-    coefficients[:, 2] += h**2 * acceleration / 2.0
-    return replace(trajectory, coefficients=coefficients)

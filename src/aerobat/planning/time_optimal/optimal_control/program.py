@@ -17,7 +17,7 @@ from aerobat.optimization.separable import (
     SeparableFunction,
     separable_program,
 )
-from aerobat.planning.time_optimal.optimal_control.boundary import Boundary
+from aerobat.planning.time_optimal.optimal_control.boundary import FixedEnds
 from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
 from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, CollocationMesh
 from aerobat.planning.time_optimal.optimal_control.elements import (
@@ -48,7 +48,7 @@ class OptimalControl:
     """
 
     elements: Elements
-    boundary: Boundary
+    boundary: FixedEnds
     stages: tuple[Stage, ...]  # (P - 1,)
     in_gates: tuple[BodyInGate, ...]  # among them
     min_thrust: float  # [m/s²] specific thrust at least, which keeps the attitude determined
@@ -98,17 +98,17 @@ class OptimalControl:
             rows.elements.append(Element(elements.sides[last], unknowns, fractions, np.hstack([shared, own])))
 
     def _hold_nodes(self, rows: Rows, mesh: CollocationMesh, backoff: Backoff) -> None:
-        """At inner nodes, and where a lap closes: what has one value there, the body rate, the plane."""
-        bounds, first = self.elements.bounds, 0 if self.boundary.is_closed else 1
+        """At inner nodes: what has one value there, the body rate, the plane."""
+        bounds = self.elements.bounds
         path = [i for i, bound in enumerate(bounds.path) if self.elements.has_one_value(bound)]
-        before, after = np.arange(first, mesh.total) - 1, np.arange(first, mesh.total)  # intervals
+        before, after = np.arange(mesh.total - 1), np.arange(1, mesh.total)  # intervals
         low, high = (np.maximum(b[before], b[after]) for b in (backoff.low, backoff.high))
         rates = self._squared_rates(bounds.upper[-1] - high[:, -1:])
         across = np.full_like(rates, inf if self.elements.plane is None else PLANE_TOLERANCE)
         lower = np.hstack([(bounds.lower + low)[:, path], np.full_like(rates, -inf), -across])
         upper = np.hstack([(bounds.upper - high)[:, path], rates, across])
         if np.isfinite([lower, upper]).any():
-            unknowns = np.hstack([mesh.states[first:-1], mesh.inputs[1, before]])
+            unknowns = np.hstack([mesh.states[1:-1], mesh.inputs[1, before]])
             rows.hold(self.elements.node, unknowns, lower, upper)
 
     def _hold_stage(self, rows: Rows, mesh: CollocationMesh, index: int, stage: Stage) -> None:

@@ -1,0 +1,47 @@
+"""A lap of a closed course by the closed form: what a refinement of it begins at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.planning.polynomial.knots import path_along_normals
+from aerobat.planning.task import Task
+from aerobat.planning.warm_start import WarmStart
+from aerobat.problem.end_state import at_rest
+from aerobat.problem.maneuvers.line import Line
+from aerobat.problem.problem import Problem
+from aerobat.problem.stage import Stage
+from aerobat.trajectory import Trajectory
+
+UNROLLED = 3  # laps in a row, of which the middle one is a flying lap
+
+
+def flying_lap(task: Task, order: int) -> WarmStart:
+    """A lap of the closed form through a closed sequence as a start: of three in a row the middle one.
+
+    From a rest at its last place to one at its first, laps begin and end half-way in time between those two.
+
+    Args:
+        task: With a closed course.
+        order: The derivative of position whose square is minimized.
+    """
+    problem, sequence = task.problem, task.stages
+    places = [place for stage in sequence.stages if (place := _place(stage, problem)) is not None]
+    lap = (Stage("seam"), *sequence.stages)
+    laps = replace(sequence, stages=(*UNROLLED * lap, Stage("seam")), closed=False)
+    open_ends = replace(problem, maneuver=Line(), start=at_rest(places[-1]), goal=at_rest(places[0]))
+    path = path_along_normals(replace(task, problem=open_ends, stages=laps), order)
+    first = 1 + len(lap) * (UNROLLED // 2)  # the knot at which the middle lap begins
+    segments = slice(first, first + len(lap))
+    middle = Trajectory(path.durations[segments], path.coefficients[segments], problem.heading)
+    return WarmStart(middle, sequence.stages, tuple(middle.knots[1:-1].tolist()))
+
+
+def _place(stage: Stage, problem: Problem) -> Array | None:
+    """Where a stage is; None where it does not say."""
+    centre = stage.centre(problem.gates)
+    place = stage.place if centre is None else centre
+    return None if np.isnan(place).any() else place
