@@ -42,7 +42,11 @@ def _obstacle(pen: Pen, kind: str) -> Table:
         | pen.one_of({"boxes": [[0, 0, 0, 3, 2, 1], [0, 0, 1, 1, 1, 4]]}, {"file": "scan.npy"}),
     }
     turned = _attitude(pen) if kind == "mesh" else {}
-    return {"kind": kind} | shapes[kind] | turned | pen.some({"name": lambda _: f"a {kind}"}, 0.3)
+    motion = {
+        "velocity": lambda p: p.vector(1.0),
+        "path": lambda p: [[0.0, *place], [4.0, *p.vector(BESIDE)]],
+    }
+    return {"kind": kind} | shapes[kind] | turned | pen.some({"name": lambda _: f"a {kind}"} | motion, 0.15)
 
 
 def _attitude(pen: Pen) -> Table:

@@ -42,7 +42,8 @@ from aerobat.declaration import validated
 from aerobat.environment import Environment
 from aerobat.flatness import Planned, TimeInterval, environment_of, has_unequal_drag, vehicle_of
 from aerobat.flatness.references import UNDETERMINED
-from aerobat.limits import Limit, limits_along
+from aerobat.limits.along import limits_along
+from aerobat.limits.limit import Limit
 from aerobat.limits.quantity import BODY_RATE, UPRIGHT, WRENCH, WRENCH_RATE
 from aerobat.problem import Condition, Quantity
 from aerobat.trajectory import Trajectory, as_trajectory

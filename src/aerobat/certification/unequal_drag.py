@@ -27,7 +27,7 @@ from aerobat.kernels import flatness
 from aerobat.kernels import unequal_drag as kernel
 from aerobat.kernels.ops import Scalar, Vector
 from aerobat.kernels.vectors import dot
-from aerobat.limits import Limit
+from aerobat.limits.limit import Limit
 from aerobat.limits.quantity import UPRIGHT, WRENCH, WRENCH_RATE
 from aerobat.so3 import UP
 from aerobat.trajectory import polynomial

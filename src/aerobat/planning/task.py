@@ -9,7 +9,8 @@ from functools import cached_property
 from aerobat.certification.envelope import Envelope
 from aerobat.environment import Environment
 from aerobat.flatness import force_balance
-from aerobat.limits import Limit, limits_along
+from aerobat.limits.along import limits_along
+from aerobat.limits.limit import Limit
 from aerobat.planning.passages import PlacedStage, planned_passages, planned_waypoints
 from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem

@@ -28,8 +28,9 @@ from aerobat.declaration import (
     unknown_name,
     validated,
 )
-from aerobat.environment.obstacles import ConvexPiece, Obstacle
 from aerobat.environment.obstacles.attitude import axes_of
+from aerobat.environment.obstacles.convex_piece import ConvexPiece
+from aerobat.environment.obstacles.obstacle import Obstacle
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, ConeAngle, Quantity, fixed
 from aerobat.problem.opening import Circle, Corners, OpeningShape, Polygon, Rectangle

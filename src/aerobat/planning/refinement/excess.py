@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import Reason
-from aerobat.limits import Limit
+from aerobat.limits.limit import Limit
 from aerobat.planning.refinement.limit_values import LimitValues
 from aerobat.planning.refinement.spline import DERIVATIVES
 from aerobat.trajectory import Trajectory

@@ -13,8 +13,8 @@ from aerobat.arrays import Array, Indices, Mask, xyz
 from aerobat.engines.array_functions import COMPLEX_STEP, ArrayFunction, array_function, gradient
 from aerobat.engines.tracing import Symbol, Trace, TraceOps
 from aerobat.kernels.vectors import add, add_scaled
-from aerobat.limits import Limit
 from aerobat.limits.body_in_gate import BodyInGate, OpeningAhead, extent_of_thrust
+from aerobat.limits.limit import Limit
 from aerobat.limits.path_condition import limit_of
 from aerobat.planning.task import Task
 from aerobat.problem.ball import Ball

@@ -12,8 +12,8 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.kernels.quaternions import axes
-from aerobat.limits import Limit
 from aerobat.limits.body_in_gate import OpeningAhead, extent_of_attitude
+from aerobat.limits.limit import Limit
 from aerobat.limits.path_condition import limit_of
 from aerobat.optimization.nonlinear import SymbolicOps, components, import_casadi
 from aerobat.optimization.separable import ElementFunction
