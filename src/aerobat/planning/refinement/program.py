@@ -138,7 +138,7 @@ class RefinementProgram:
 
     @property
     def closure(self) -> Closure | None:
-        """What makes the end of a closed course its start; None of others."""
+        """The constraint that a closed course ends in the attitude in which it begins; None of others."""
         return Closure(self.limits, self.fractions) if self._is_closed else None
 
     @property

@@ -256,6 +256,7 @@ class Spline:
     def _layout(self) -> tuple[list[tuple[int, int, Array, int]], list[int], int]:
         """Segment, row, direction and column of all data that variables move; columns of ln τ; of ln h."""
         moved: list[tuple[int, int, Array, int]] = []
+        ratios: list[int] = []
         count = 0
 
         def add(direction: Array, *where: tuple[int, int]) -> None:
@@ -263,17 +264,22 @@ class Spline:
             moved.extend((segment, row, direction, count) for segment, row in where)
             count += 1
 
-        for end in self._end_states:
-            for direction, *where in self._end_variables(*end):
-                add(direction, *where)
-        for before, after, shared in self._joints:
-            for order in range(END_ORDER):
+        start, goal = self._end_states or ((), ())
+        for direction, *where in self._end_variables(*start) if start else ():
+            add(direction, *where)
+        joints = {before: (after, shared) for before, after, shared in self._joints}
+        for before in range(self.segments):
+            ratios.append(count)
+            count += 1
+            after, shared = joints.get(before, (0, 0))
+            for order in range(END_ORDER if before in joints else 0):
                 sides = [(before, END_ORDER + order), (after, order)]
                 for where in [sides] if order < shared else [[side] for side in sides]:
                     for axis in np.eye(3):
                         add(axis, *where)
-        ratios = list(range(count, count + self.segments))
-        return moved, ratios, count + self.segments
+        for direction, *where in self._end_variables(*goal) if goal else ():
+            add(direction, *where)
+        return moved, ratios, count
 
     def _end_variables(
         self, segment: int, first: int, state: EndState
