@@ -117,7 +117,7 @@ def test_the_first_route_goes_around_the_nearer_side_and_the_next_around_the_oth
     task = Task.of(hall(wall), QUAD)
     lower, upper = HALL.lower, HALL.upper
     places = np.array([ENDS[0].position, ENDS[1].position])
-    grid = Cells.around(task.environment.pieces, QUAD.bounding_ellipsoid, places, lower, upper)
+    grid = Cells.around(task.environment.pieces, QUAD.bounding_ellipsoid, places, lower, upper, 2.0)
     first, second = list(routes(grid, [(places[0], places[1])], 2))
     across = [np.interp(4.0, route.legs[0][:, 0], route.legs[0][:, 1]) for route in (first, second)]
     assert side * across[0] < -0.7
@@ -127,7 +127,8 @@ def test_the_first_route_goes_around_the_nearer_side_and_the_next_around_the_oth
 def test_routes_that_differ_in_nothing_but_height_are_one() -> None:
     task = Task.of(hall(trunk(4.0, 0.0)), QUAD)
     places = np.array([ENDS[0].position, ENDS[1].position])
-    grid = Cells.around(task.environment.pieces, QUAD.bounding_ellipsoid, places, HALL.lower, HALL.upper)
+    lower, upper = HALL.lower, HALL.upper
+    grid = Cells.around(task.environment.pieces, QUAD.bounding_ellipsoid, places, lower, upper, 2.0)
     found = list(routes(grid, [(places[0], places[1])], 4))
     sides = [np.sign(route.legs[0][1:-1, 1].sum()) for route in found]
     assert sorted(sides) == [-1.0, 1.0]

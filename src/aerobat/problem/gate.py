@@ -19,6 +19,7 @@ from aerobat.declaration import (
     UnitVector,
     Vector3,
     VectorLike,
+    by_value,
     declared,
     from_table,
     in_degrees,
@@ -193,6 +194,7 @@ class Gate:
         return replace(self, normal=normal, up=up)
 
 
+@by_value
 @dataclass(frozen=True, eq=False)
 class GateWall(Obstacle):
     """The wall of a gate: a piece beside each side of the polygon that planners take for its opening.
