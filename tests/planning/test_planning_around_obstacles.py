@@ -134,6 +134,26 @@ def test_routes_that_differ_in_nothing_but_height_are_one() -> None:
     assert sorted(sides) == [-1.0, 1.0]
 
 
+def test_what_is_kept_clear_is_no_more_than_the_ends_leave() -> None:
+    reach = QUAD.bounding_ellipsoid.semi_axes[0]
+    beside = [ab.Box(position=(-reach - gap - 0.1, 0.0, 1.5), size=(0.2, 1.0, 1.0)) for gap in (0.03, 0.3)]
+    near, far = (Task.of(hall(box), QUAD, clearance=0.1).clearance for box in beside)
+    assert 0.0 < near < 0.03
+    assert far == 0.1
+
+
+@pytest.mark.slow
+def test_the_exact_search_plans_from_beside_an_obstacle() -> None:
+    flip = ab.load_problem("flip-roll")
+    reach = QUAD.bounding_ellipsoid.semi_axes[0]
+    post = ab.Box(position=(reach + 0.13, 0.0, 0.0), size=(0.2, 0.6, 0.6))
+    beside = replace(flip, environment=replace(flip.environment, obstacles=(post,)))
+    plan = ab.plan(beside, ab.Miqp(reserve=0.15, clearance=0.1), QUAD)
+    assert plan.planner == "miqp"
+    assert plan.certified
+    assert least_gap(plan) > 0.0
+
+
 def test_ways_around_obstacles_are_asked_of_free_knots_but_flips_of_the_exact_search() -> None:
     assert suited_planner(hall(), QUAD) == "miqp"
     assert suited_planner(hall(trunk(4.0, 0.0)), QUAD) == "free-knots"

@@ -92,18 +92,22 @@ def require_clear_ends(problem: Problem, vehicle: Vehicle | None) -> None:
         raise SpecError(
             f"'{problem.name}' has obstacles, which the body of a vehicle keeps clear of; give --vehicle"
         )
-    ends = problem.ends
-    positions = np.array([state.position for state in ends.values()]).reshape(-1, 3)
-    balance = force_balance(environment, vehicle)
-    thrusts = [balance.specific_thrust(state.velocity, state.acceleration) for state in ends.values()]
-    clearance = Clearance(environment.pieces.still, vehicle.bounding_ellipsoid)
-    least = clearance.least(positions, np.array(thrusts), np.zeros(len(ends)))
-    for end, left, name in zip(ends, *least, strict=True):
+    for end, left, name in zip(problem.ends, *gaps_at_ends(problem, vehicle), strict=True):
         if left < 0.0:
             raise SpecError(
                 f"{end}.position: the body of {vehicle.name} reaches {length(-left)} into '{name}' there; "
                 "move one of them"
             )
+
+
+def gaps_at_ends(problem: Problem, vehicle: Vehicle) -> tuple[list[float], list[str]]:
+    """Return the body's distance from what stands still at each end [m], and the name of the nearest."""
+    environment, ends = problem.surroundings, problem.ends.values()
+    positions = np.array([state.position for state in ends]).reshape(-1, 3)
+    balance = force_balance(environment, vehicle)
+    thrusts = [balance.specific_thrust(state.velocity, state.acceleration) for state in ends]
+    clearance = Clearance(environment.pieces.still, vehicle.bounding_ellipsoid)
+    return clearance.least(positions, np.array(thrusts), np.zeros(len(positions)))
 
 
 def _require(gate: Gate, stage: Stage, vehicle: Vehicle) -> None:

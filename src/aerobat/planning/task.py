@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 
 from aerobat.certification.envelope import Envelope
 from aerobat.environment import Environment
 from aerobat.flatness import force_balance
 from aerobat.limits.along import limits_along
 from aerobat.limits.limit import Limit
-from aerobat.planning.passages import PlacedStage, planned_passages, planned_waypoints
+from aerobat.planning.passages import PlacedStage, gaps_at_ends, planned_passages, planned_waypoints
 from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
@@ -19,6 +20,8 @@ from aerobat.vehicle import Vehicle
 
 # without a vehicle, stages that ask a fraction of its thrust assume what a hexarotor in the paper's class has
 ASSUMED_THRUST_TO_WEIGHT = 5.0
+SHARE = 0.5  # of the room that a narrow passage leaves to the body, which is kept clear
+LEAST_CLEARANCE = 0.001  # [m] that is kept clear in the narrowest: what lies between places is within it
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class Task:
     def of(
         cls, problem: Problem, vehicle: Vehicle | None = None, reserve: float = 0.0, clearance: float = 0.0
     ) -> Task:
-        """Return what a problem asks of a vehicle, or of none in particular.
+        """Return what a problem asks of a vehicle, or of none, with no more clearance than ends leave.
 
         Args:
             problem: Its stages are made for the vehicle's thrust and size.
@@ -49,7 +52,15 @@ class Task:
         """
         body_radius = 0.0 if vehicle is None else vehicle.body_radius
         stages = problem.stages(max_specific_thrust(problem, vehicle), body_radius)
-        return cls(problem, vehicle, stages, reserve, clearance)
+        asked = cls(problem, vehicle, stages, reserve, clearance)
+        if vehicle is None or not clearance or not problem.surroundings.obstacles:
+            return asked
+        left = min(gaps_at_ends(problem, vehicle)[0], default=inf)
+        return asked if left > clearance else asked.with_room(left)
+
+    def with_room(self, room: float) -> Task:
+        """Return the same, with no more clearance than is left where there is little room [m]."""
+        return replace(self, clearance=min(self.clearance, max(SHARE * room, LEAST_CLEARANCE)))
 
     @property
     def vehicle(self) -> Vehicle:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
-from math import ceil, sqrt
+from math import ceil, inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +23,6 @@ from aerobat.problem.stage import Stage
 ROUTES = 4  # of which refinement takes the fastest
 BEFORE = 0.3  # [m] beyond the body's reach, from which on a gate in a wall is flown along its normal
 CLOSEST = 0.5  # [m] from one corner of a route to the next
-SHARE = 0.5  # of the room that a narrow passage leaves to the body on its side, which is kept clear
-LEAST_CLEARANCE = 0.001  # [m] that is kept clear in the narrowest: what lies between places is within it
 # how near straight lines cut corners, of a cell, and times the duration of a closed form, in turn: slits are
 # reached from slow ones, windows by those that cut no corner
 STARTS = ((0.1, 1.4), (0.0, 1.4), (0.1, 1.8), (0.0, 1.0))
@@ -66,19 +64,16 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
         Cells.around(pieces, task.vehicle.bounding_ellipsoid, corners, lower, upper, late * hurried)
         for late in (LATE if pieces.moving else LATE[:1])
     ]
-    ends = float(pieces.still.distances(corners[[0, -1]]).min())
     walls = [gate for gate in (_in_wall(task, stage) for stage in task.stages.stages) if gate is not None]
-    narrowest = min([ends, *(gate.opening.inradius for gate in walls)])
+    narrowest = min((gate.opening.inradius for gate in walls), default=inf)
     body = task.vehicle.bounding_ellipsoid.revolved
     found = [(grid, way) for grid in grids for way in routes(grid, legs, ceil(count / len(grids)))]
     for turned, (slack, pace) in product(_turned(task) if found else (), STARTS):
         paths = []
         for flown, clear in _different(found, slack):
             room = min(narrowest, clear) - min(body.wide, body.high)
-            clearance = min(task.clearance, max(SHARE * room, LEAST_CLEARANCE))
             path = _along(turned or task, flown).time_scaled(pace)
-            own = replace(task, clearance=clearance)
-            paths.append(Guess(path, own, None if turned is None else replace(turned, clearance=clearance)))
+            paths.append(Guess(path, task.with_room(room), turned and turned.with_room(room)))
         yield paths
 
 
