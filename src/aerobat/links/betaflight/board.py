@@ -32,9 +32,7 @@ _PATIENCE = 0.1  # [s] for a line to take a frame
 _READ = 4096  # bytes of answers that are dropped at once
 _LIFT = 0.01  # [m] above where it stands, from which on a goal means to take off
 _DOWN = 0.05  # [m] above the ground, within which a goal beneath it ends the flight
-_ALOFT = (
-    0.3  # [m] above the ground, from which on motors are not stopped: the board's failsafe says what is done
-)
+_ALOFT = 0.3  # [m] above the ground, from which on motors are not stopped: the failsafe says what is done
 _PAUSE = 0.1  # [s] without goals, after which the outer loop begins anew
 
 
