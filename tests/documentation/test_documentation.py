@@ -42,6 +42,7 @@ def blocks(page: Path, language: str) -> list[str]:
 def run(arguments: list[str], folder: Path) -> str:
     """What a Python process prints that runs in a folder."""
     environment = {**os.environ, "COLUMNS": "120", "MPLBACKEND": "agg", "PYTHONUTF8": "1"}
+    environment["PYTHONPATH"] = str(ROOT / "examples")  # which pages tell to copy
     done = subprocess.run(
         [sys.executable, *arguments],
         cwd=folder,
