@@ -96,7 +96,7 @@ def _draw_block(
     path = panel(figure, left, bottom + 0.2, *PATH)
     reference = reference_poses(plan_reference(here.plan, here.vehicle))
     gates, stages = here.plan.problem.gates, here.plan.stages
-    note = draw_path(path, reference, actual_poses(here.flight), here.vehicle, gates, stages, VEHICLE)
+    note = draw_path(path, reference, actual_poses(here.flight), here.vehicle, gates, stages, size=VEHICLE)
     drawn = path.get_legend()
     assert drawn is not None, "a path has its start and its end"
     drawn.remove()  # the caption says it once for all

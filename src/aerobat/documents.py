@@ -102,6 +102,8 @@ def read_named_file(path: str | os.PathLike[str], max_size: int) -> bytes:
 
     Raises FieldError, about the whole of a field, where it cannot be read.
     """
+    if not str(path).isprintable():
+        raise FieldError("", f"must be the name of a file, got {shown(path)}")
     try:
         return read_whole(beside_document(path), max_size)
     except FileNotFoundError:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from aerobat import cli
+from aerobat.reporting.page import png
 
 
 def code(*arguments: object) -> int:
@@ -25,4 +26,4 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, st
 def without_pictures(patch: pytest.MonkeyPatch) -> None:
     """Have reports of plans and flights come with an empty picture, for tests of something else."""
     patch.setattr("aerobat.cli.runs.folder.report_figure", lambda *_: None)
-    patch.setattr("aerobat.cli.runs.folder.png", lambda _: b"")
+    patch.setattr("aerobat.cli.runs.folder.png", lambda figure: b"" if figure is None else png(figure))

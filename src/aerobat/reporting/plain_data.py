@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerobat.declaration import unknown_name, validated
-from aerobat.errors import import_extra
+from aerobat.declaration import shown, unknown_name, validated
+from aerobat.errors import SpecError, import_extra
 from aerobat.reporting.facts import Columns, Fact, Facts, facts
 
 if TYPE_CHECKING:
@@ -34,7 +34,10 @@ def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
     """
     pandas = import_extra("pandas", "to_dataframe needs pandas", "aerobat[pandas]")
     if isinstance(result, list):
-        return pandas.DataFrame([dict(_cells(plain(each))) for each in result])
+        several = [plain(each) for each in result]
+        if not all(isinstance(each, dict) for each in several):
+            raise SpecError(f"result must be a result, or a list of results, got {shown(result)}")
+        return pandas.DataFrame([dict(_cells(each)) for each in several])
     tables = {fact.key: fact.value for fact in facts(result) if fact.key and _is_table(fact.value)}
     if table is not None and table not in tables:
         raise unknown_name("table", table, list(tables))

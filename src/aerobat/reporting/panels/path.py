@@ -54,6 +54,7 @@ def draw_path(
     gates: Sequence[Gate],
     stages: Sequence[PlacedStage] = (),
     pieces: Sequence[ConvexPiece] = (),
+    size: float = SIZE,
 ) -> str:
     """Draw paths, the first vehicle along its path, the gates, obstacles, other stages, start and end.
 
@@ -65,11 +66,12 @@ def draw_path(
         gates: All gates of the problem; the picture holds each of them.
         stages: Of which those without a gate are marked by diamonds.
         pieces: Of obstacles, which are drawn where they are near.
+        size: Of the vehicle as drawn, relative to the path's extent.
 
     Returns:
         A note on how the vehicle is drawn.
     """
-    scale = enlargement(vehicle, SIZE * reference.extent)
+    scale = enlargement(vehicle, size * reference.extent)
     reach = scale * span(vehicle)
     paths = [poses.path for poses in (reference, *actual)]
     surfaces, points = surfaces_beside(pieces, [*paths, gate_corners(gates)])
