@@ -75,11 +75,25 @@ def test_the_clearance_is_the_distance_from_the_nearest_obstacle_however_far() -
     level = np.tile([1.0, 0.0, 0.0, 0.0], (4, 1))
     wide, high = body.semi_axes[1], body.semi_axes[2]
     offset = body.centre
-    found = clearances(places - offset, level, vehicle, pieces)
+    found = clearances(places - offset, level, vehicle, pieces, np.zeros(4))
     far = np.hypot(40.0, 1.0) - 0.5
     assert found[:2] == pytest.approx([1.0 - wide, 0.5 - high], abs=1e-5)
     assert far - wide - 1e-3 < found[2] < far - high
     assert found[3] < 0.0
+
+
+def test_the_clearance_from_what_moves_is_that_from_where_it_is_then() -> None:
+    vehicle, times = ab.load_vehicle("agile-quad"), np.array([0.0, 1.0, 2.5])
+    ball = ab.Sphere((3.0, 0.0, 0.0), 0.5, velocity=(0.0, 2.0, 0.0))
+    level, places = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)), np.zeros((3, 3))
+    found = clearances(places, level, vehicle, ab.Environment(obstacles=(ball,)).pieces, times)
+    still = [ab.Sphere((3.0, 2.0 * time, 0.0), 0.5) for time in times.tolist()]
+    then = [
+        clearances(places[:1], level[:1], vehicle, ab.Environment(obstacles=(each,)).pieces, times[:1])[0]
+        for each in still
+    ]
+    assert found == pytest.approx(then, abs=1e-9)
+    assert found[0] < found[1] < found[2]
 
 
 def test_a_report_has_the_clearance_where_there_are_obstacles_and_only_there() -> None:

@@ -36,14 +36,14 @@ NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and
 def draw_clearance(axes: Axes, poses: PoseHistory, vehicle: Vehicle, pieces: Pieces) -> None:
     """Draw the distance of the body from the nearest obstacle over time, below zero where they overlap."""
     rows = np.unique(np.linspace(0, len(poses.times) - 1, ROWS).round().astype(int))
-    distances = clearances(poses.position[rows], poses.q_world_body[rows], vehicle, pieces)
+    distances = clearances(poses.position[rows], poses.q_world_body[rows], vehicle, pieces, poses.times[rows])
     draw_series(axes, poses.times[rows], distances, INK)
     axes.axhline(0.0, color=FAINT, linewidth=0.8)
     lowest = max(1.1 * float(distances.min()), DEEPEST)
     axes.set(ylabel="clearance [m]", ylim=(min(0.0, lowest), None))
 
 
-def clearances(position: Array, q_world_body: Array, vehicle: Vehicle, pieces: Pieces) -> Array:
+def clearances(position: Array, q_world_body: Array, vehicle: Vehicle, pieces: Pieces, times: Array) -> Array:
     """Return the distances [m] of the body from the nearest of pieces, negative where they overlap, (T,).
 
     Args:
@@ -51,15 +51,17 @@ def clearances(position: Array, q_world_body: Array, vehicle: Vehicle, pieces: P
         q_world_body: The attitudes, (T, 4).
         vehicle: Whose body it is.
         pieces: Of which there is one at least.
+        times: At which they are where they are then [s], (T,).
     """
     body = vehicle.bounding_ellipsoid
     offsets, shapes = body.turned(q_world_body)
     centres, reach = position + offsets, float(body.semi_axes.max())
     found, pending, within = np.full(len(position), np.inf), np.arange(len(position)), NEAR
     while len(pending) and within < FAR:
-        bodies, numbers = pieces.near(centres[pending], reach, within)
+        bodies, numbers = pieces.near(centres[pending], reach, within, times[pending])
         rows = pending[bodies]
-        np.minimum.at(found, rows, pieces.separated(numbers, centres[rows], shapes[rows]).gaps)
+        apart = pieces.separated(numbers, centres[rows], shapes[rows], times=times[rows])
+        np.minimum.at(found, rows, apart.gaps)
         pending = pending[found[pending] > within]  # of others, none that is farther is nearer
         within *= 2.0
     return found
