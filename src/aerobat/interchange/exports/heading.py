@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from aerobat import so3
 from aerobat.arrays import Array
@@ -70,6 +69,8 @@ def _fitted(z: Array, axes: Array, powers: Array) -> Array:
         axes: The planned body's in the world, its columns, (samples, 3, 3).
         powers: Of normalised time, (samples, POWERS).
     """
+    from scipy.optimize import least_squares  # takes a quarter of a second, and no other format needs it
+
     guesses = np.linspace(-np.pi, np.pi, FIRST_GUESSES, endpoint=False)
     cost = (_turn(z, axes, np.broadcast_to(guesses[:, None], (FIRST_GUESSES, len(z)))) ** 2).sum(axis=1)
     best = np.zeros(POWERS)
