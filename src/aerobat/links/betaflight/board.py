@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
 import numpy as np
 
 from aerobat.control import Seen
@@ -11,7 +9,7 @@ from aerobat.control.laws.rates import Rates, RatesState
 from aerobat.control.parameters import controller_parameters
 from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.environment import Environment
-from aerobat.errors import BackendMissing, SpecError
+from aerobat.errors import SpecError, import_extra
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.quaternions import axes, to_body
@@ -48,10 +46,7 @@ class SerialLine:
 
         Raises SpecError where it cannot be had, BackendMissing without pyserial.
         """
-        if find_spec("serial") is None:
-            raise BackendMissing('boards need pyserial; install it with pip install "aerobat[board]"')
-        import serial
-
+        serial = import_extra("serial", "boards need pyserial", "aerobat[board]")
         self._address, self._broken = address, (OSError, serial.SerialException)
         try:
             self._line = serial.serial_for_url(address, baud, timeout=0, write_timeout=_PATIENCE)
