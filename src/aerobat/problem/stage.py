@@ -114,6 +114,11 @@ class Stage:
             return named_gate(gates, self.gate).position
         return None if self.ball is None else self.ball.centre
 
+    def position(self, gates: Sequence[Gate]) -> Array:
+        """The centre of its gate or ball, else what its conditions fix [m], NaN where nothing does, (3,)."""
+        centre = self.centre(gates)
+        return self.place if centre is None else centre
+
     @property
     def window(self) -> tuple[float, float]:
         """The earliest and the latest instant at which it may hold, as fractions of the duration."""

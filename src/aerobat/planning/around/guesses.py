@@ -98,8 +98,7 @@ def _places(task: Task) -> list[Leg] | None:
     """Where the start, each stage and the goal are entered and left [m]; None where one does not say."""
     found = [(task.problem.start.position, task.problem.start.position)]
     for stage in task.stages.stages:
-        centre = stage.centre(task.problem.gates)
-        place = stage.place if centre is None else centre
+        place = stage.position(task.problem.gates)
         if np.isnan(place).any():
             return None
         gate = _in_wall(task, stage)

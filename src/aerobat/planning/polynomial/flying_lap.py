@@ -6,13 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerobat.arrays import Array
 from aerobat.planning.polynomial.knots import path_along_normals
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.end_state import at_rest
 from aerobat.problem.maneuvers.line import Line
-from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.trajectory import Trajectory
 
@@ -29,7 +27,8 @@ def flying_lap(task: Task, order: int) -> WarmStart:
         order: The derivative of position whose square is minimized.
     """
     problem, sequence = task.problem, task.stages
-    places = [place for stage in sequence.stages if (place := _place(stage, problem)) is not None]
+    positions = [stage.position(problem.gates) for stage in sequence.stages]
+    places = [position for position in positions if not np.isnan(position).any()]
     lap = (Stage("seam"), *sequence.stages)
     laps = replace(sequence, stages=(*UNROLLED * lap, Stage("seam")), closed=False)
     open_ends = replace(problem, maneuver=Line(), start=at_rest(places[-1]), goal=at_rest(places[0]))
@@ -38,10 +37,3 @@ def flying_lap(task: Task, order: int) -> WarmStart:
     segments = slice(first, first + len(lap))
     middle = Trajectory(path.durations[segments], path.coefficients[segments], problem.heading)
     return WarmStart(middle, sequence.stages, tuple(middle.knots[1:-1].tolist()))
-
-
-def _place(stage: Stage, problem: Problem) -> Array | None:
-    """Where a stage is; None where it does not say."""
-    centre = stage.centre(problem.gates)
-    place = stage.place if centre is None else centre
-    return None if np.isnan(place).any() else place
