@@ -34,7 +34,7 @@ def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surfa
     still = [each for each in pieces if each.motion is None]
     near = [each for each in still if (each.box[0] <= upper).all() and (each.box[1] >= lower).all()]
     whole = [surface_of(piece) for piece in near]
-    parts = [*(_apart(near, whole) if len(near) <= MANY else whole)]
+    parts = _apart(near, whole) if len(near) <= MANY else whole
     margin = WHOLE * size
     found = (
         part

@@ -7,6 +7,7 @@ goes around. Where the thrust f = |f| n changes by δf, the turn changes by ∮ 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -42,7 +43,7 @@ class Closure:
         slopes[:, :, 2], slopes[:, :, 1] = by_thrust, balance.drag * by_thrust
         return slopes
 
-    @property
+    @cached_property
     def _weights(self) -> Array:
         """Weights on values at places that integrate polynomials along a segment, (p,)."""
         count = len(self.fractions)

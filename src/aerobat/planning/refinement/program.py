@@ -136,7 +136,7 @@ class RefinementProgram:
             rows.append((to_first + to_last, 1.0))
         return _stacked(rows, self.spline.segments)
 
-    @property
+    @cached_property
     def closure(self) -> Closure | None:
         """The constraint that a closed course ends in the attitude in which it begins; None of others."""
         return Closure(self.limits, self.fractions) if self._is_closed else None
