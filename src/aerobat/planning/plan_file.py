@@ -24,6 +24,7 @@ import numpy as np
 from aerobat.certification import Certificate
 from aerobat.declaration import PathName, from_table, to_table
 from aerobat.environment import Environment
+from aerobat.environment.obstacles import ConvexPiece
 from aerobat.errors import SpecError
 from aerobat.planning.assessment.assessment import Assessment, SecondOpinion
 from aerobat.planning.flyability import Flyability
@@ -147,16 +148,14 @@ def _in_full(environment: Environment) -> dict[str, Any]:
         "gravity": environment.gravity,
         "wind": environment.wind.tolist(),
         "ground": environment.ground,
-        "obstacles": [
-            {"name": piece.name, "points": piece.points.tolist(), "rounding": piece.rounding.tolist()}
-            | (
-                {}
-                if piece.motion is None
-                else {"motion": [each.tolist() for each in vars(piece.motion).values()]}
-            )
-            for piece in environment.pieces.pieces
-        ],
+        "obstacles": [_piece_in_full(piece) for piece in environment.pieces.pieces],
     }
+
+
+def _piece_in_full(piece: ConvexPiece) -> dict[str, Any]:
+    still = {"name": piece.name, "points": piece.points.tolist(), "rounding": piece.rounding.tolist()}
+    motion = piece.motion
+    return still if motion is None else still | {"motion": [motion.velocity.tolist(), motion.rows.tolist()]}
 
 
 def facts_adapter() -> Any:

@@ -25,15 +25,9 @@ def mujoco_scene(plan: Plan, rate: float) -> Content:
     Lost is what lies between them.
     """
     assert plan.vehicle is not None, "exports are of plans with a vehicle"
-    environment, vehicle = plan.problem.surroundings, plan.vehicle
-    scene = PlantScene(
-        airframe=first_numbers(airframe_parameters(Fleet.of([vehicle]))),
-        gravity=environment.gravity,
-        ground=environment.ground,
-        body=vehicle.bounding_ellipsoid,
-        gates=plan.problem.gates,
-        obstacles=environment.obstacles,
-    )
+    problem, vehicle = plan.problem, plan.vehicle
+    airframe = first_numbers(airframe_parameters(Fleet.of([vehicle])))
+    scene = PlantScene.of(problem.surroundings, problem.gates, airframe, vehicle.bounding_ellipsoid)
     root = fromstring(mujoco_model(scene))
     found = reference(plan, rate=rate)
     flat, lagging = found.setpoint.flat, [rotor.lag > 0.0 for rotor in vehicle.rotors]

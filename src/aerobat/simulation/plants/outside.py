@@ -234,12 +234,6 @@ def _told(inputs: LoopInput, motion: VehicleState) -> LoopInput:
 
 
 def _scene(setup: FlightSetup, gates: tuple[Gate, ...]) -> PlantScene:
-    fleet, environment = setup.fleet, setup.environment
-    return PlantScene(
-        airframe=first_numbers(setup.parts[-1].parameters.airframe),
-        gravity=environment.gravity,
-        ground=environment.ground,
-        body=Ellipsoid(fleet.semi_axes[0], fleet.body_centres[0]),
-        gates=gates,
-        obstacles=environment.obstacles,
-    )
+    airframe = first_numbers(setup.parts[-1].parameters.airframe)
+    body = Ellipsoid(setup.fleet.semi_axes[0], setup.fleet.body_centres[0])
+    return PlantScene.of(setup.environment, gates, airframe, body)
