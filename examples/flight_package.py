@@ -39,7 +39,7 @@ class Setpoints:
     acceleration: Array  # [m/s²] world, (T, 3)
     jerk: Array  # [m/s³] world, (T, 3)
     q_world_body: Array  # (T, 4)
-    omega_body: Array  # [rad/s] body, without spin about the thrust, (T, 3)
+    omega_body: Array  # [rad/s] body, without spin about the thrust but for the yaw, (T, 3)
     thrust: Array  # [N] of all rotors, along the body's z, (T,)
 
 
@@ -51,6 +51,7 @@ class FlightPackage:
     coefficients: Array  # [m] powers of normalised time rising, (S, degree + 1, 3)
     heading: float  # [rad] about the thrust at the start
     document: dict[str, Any]
+    yaw: Array | None = None  # [rad] beside the attitude without spin, (S, any), powers rising
 
     @property
     def duration(self) -> float:
@@ -77,14 +78,17 @@ class FlightPackage:
 
     def evaluate(self, times: ArrayLike, derivative: int = 0) -> Array:
         """d^k p/dt^k at times [s] (T,) in the plan, at a knot of the later segment, (T, 3)."""
+        return self._evaluated(self.coefficients, times, derivative)
+
+    def _evaluated(self, coefficients: Array, times: ArrayLike, derivative: int) -> Array:
         t = np.clip(np.atleast_1d(np.asarray(times, dtype=float)), 0.0, self.duration)
         knots = np.concatenate([[0.0], np.cumsum(self.durations)])
         segment = np.searchsorted(knots[1:-1], t, side="right")
         s = (t - knots[segment]) / self.durations[segment]
-        value = np.zeros((len(t), 3))
-        for power in range(self.coefficients.shape[1] - 1, derivative - 1, -1):
+        value = np.zeros((len(t), coefficients.shape[2]))
+        for power in range(coefficients.shape[1] - 1, derivative - 1, -1):
             factor = factorial(power) / factorial(power - derivative)
-            value = value * s[:, None] + factor * self.coefficients[segment, power]
+            value = value * s[:, None] + factor * coefficients[segment, power]
         return np.asarray(value / self.durations[segment, None] ** derivative)
 
     def setpoints(self, times: ArrayLike) -> Setpoints:
@@ -99,10 +103,13 @@ class FlightPackage:
         thrust = self._specific_thrust(grid, across)
         rows = np.searchsorted(grid, t)
         q = self._carried(_directions(thrust, UNDETERMINED * self.gravity))[rows]
+        yaw = np.zeros((len(self.durations), 1)) if self.yaw is None else self.yaw
+        turned, spin = (self._evaluated(yaw[..., None], t, k)[:, 0] for k in (0, 1))
+        q = _product(q, np.stack([np.cos(turned / 2), 0 * t, 0 * t, np.sin(turned / 2)], axis=1))
         rate = self.evaluate(t, 3) + across * self.evaluate(t, 2)
         f = np.maximum(np.linalg.norm(thrust[rows], axis=1), UNDETERMINED * self.gravity)
         turning = _rotated(_conjugate(q), rate) / f[:, None]
-        omega = np.stack([-turning[:, 1], turning[:, 0], np.zeros(len(t))], axis=1)
+        omega = np.stack([-turning[:, 1], turning[:, 0], spin], axis=1)
         b3 = _rotated(q, np.array([0.0, 0.0, 1.0]))
         airspeed = ((self.evaluate(t, 1) - self.wind) * b3).sum(axis=1)
         collective = mass * (thrust[rows] * b3).sum(axis=1) + (drag[2] - mass * across) * airspeed
@@ -160,7 +167,8 @@ def read_flight_package(path: str | os.PathLike[str]) -> FlightPackage:
     try:
         document = json.loads(content["document"].tobytes())
         heading = float(content["heading"])
-        package = FlightPackage(content["durations"], content["coefficients"], heading, document)
+        path = content["durations"], content["coefficients"], heading
+        package = FlightPackage(*path, document, content.get("yaw"))
         _require_whole(package)
     except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError):
         raise ValueError(f"{path} is damaged") from None
@@ -187,7 +195,9 @@ def _require_whole(package: FlightPackage) -> None:
     durations, coefficients, vehicle = package.durations, package.coefficients, package.document["vehicle"]
     segments, powers, axes = coefficients.shape
     shapes = [durations.shape == (segments,), axes == 3, package.wind.shape == (3,)]
-    numbers: list[Any] = [durations, coefficients, package.heading, package.gravity, package.wind]
+    yaw = np.zeros((segments, 1)) if package.yaw is None else package.yaw
+    shapes.append(yaw.ndim == 2 and len(yaw) == segments and yaw.shape[1] > 0)
+    numbers: list[Any] = [yaw, durations, coefficients, package.heading, package.gravity, package.wind]
     if vehicle is not None:
         drag = vehicle.get("drag_body", [0.0, 0.0, 0.0])
         shapes.append(len(drag) == 3)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat import so3
-from aerobat.arrays import Array
+from aerobat.arrays import Array, xyz
 from aerobat.certification.enclosure import chebyshev
 from aerobat.kernels import flatness
 from aerobat.so3 import UP
@@ -78,6 +78,12 @@ class ThrustDirectionRates:
         """ω and ω' in the axes of a body whose frame is at these angles φ (P, N), each (P, N, 3)."""
         back = np.exp(-1j * angle)
         return _flat(back * self.omega), _flat(back * self.omega_dot)
+
+    def turning(self, angle: Array, yaw: Array) -> tuple[Array, Array]:
+        """ω and ω' of a body that is turned from that frame by a yaw, with two derivatives, (P, N, 3)."""
+        still, still_dot = map(xyz, self.body(angle + yaw[..., 0]))
+        omega, omega_dot = flatness.spun(still, still_dot, tuple(np.moveaxis(yaw[..., 1:], -1, 0)))
+        return np.stack(omega, axis=-1), np.stack(omega_dot, axis=-1)
 
 
 def _axes_about(direction: Array) -> Array:

@@ -216,8 +216,10 @@ def interpolated(
     series = curve.series(values)
     seconds = pieces.seconds(curve.trajectory)
     rates = ThrustDirectionRates.along(values[..., 1:, :], series[:, 0, 1], seconds, basis)
-    omega, omega_dot = rates.body(rates.carried(curve.trajectory.heading))
-    bound = accuracy(curve.norms(series, pieces), seconds, curve.sums[pieces.interval], vehicle)
+    angle, yaw = rates.carried(curve.trajectory.heading), curve.yaw_on(pieces)
+    omega, omega_dot = rates.body(angle) if yaw is None else rates.turning(angle, yaw)
+    sums = curve.sums[pieces.interval]
+    bound = accuracy(curve.norms(series, pieces), seconds, sums, vehicle, curve.turns(pieces))
     # errors of the frame's angle add up from piece to piece
     own_error = (bound.twist_remainder + basis.lebesgue * bound.twist_rounding)[:, None]
     angle_error = np.cumsum(own_error, axis=0)

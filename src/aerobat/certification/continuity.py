@@ -6,6 +6,7 @@ Where rotors lag behind their commands, their thrusts may not either.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.environment import Environment
 from aerobat.flatness import has_unequal_drag, reference
 from aerobat.flatness.unequal_drag import UnequalDrag
-from aerobat.trajectory import Trajectory
+from aerobat.trajectory import Trajectory, polynomial
 from aerobat.vehicle import Vehicle
 
 NEGLIGIBLE_JUMP = 1e-6  # of the largest value at knots: less than any controller or solver can tell
@@ -65,6 +66,7 @@ def discontinuities(
         ("velocity", "m/s", _jump(velocity), _tolerance(trajectory, velocity, 1), everywhere),
         ("thrust direction", "rad", _jump(b3), turn, determined),
         ("body rate", "rad/s", _jump(db3), spin, determined),
+        *_yaw_checks(curve),
         ("rotor thrusts", "N", thrust, np.zeros_like(thrust), determined),
     )
     jumps: dict[int, Discontinuity] = {}
@@ -73,6 +75,14 @@ def discontinuities(
             time = float(trajectory.knots[knot + 1])
             jumps.setdefault(int(knot), Discontinuity(name, unit, float(norm[knot]), time))
     return tuple(jumps[knot] for knot in sorted(jumps))
+
+
+def _yaw_checks(curve: ThrustCurve) -> Iterator[tuple[str, str, Array, float, Array]]:
+    """The jumps of yaw and its rate at inner knots, with what is negligible, everywhere."""
+    for name, unit, yaw in zip(("attitude", "body rate"), ("rad", "rad/s"), curve.yaw, strict=False):
+        ends = polynomial.evaluate(yaw[:, None], np.array([0.0, 1.0]))
+        size = max(1.0, float(np.abs(ends).max()))
+        yield name, unit, _jump(ends), NEGLIGIBLE_JUMP * size, np.full(len(ends) - 1, True)
 
 
 def _unequal_directions(curve: ThrustCurve, ends: Array) -> tuple[Array, Array]:

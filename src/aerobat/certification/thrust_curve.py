@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification.enclosure import chebyshev
+from aerobat.certification.enclosure.interpolation_error import Turns
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness.references import lateral_drag, specific_thrust
@@ -30,6 +31,7 @@ class ThrustCurve:
     rates: Array  # velocity to snap in powers of normalised time, (S, K, 12)
     sums: Array  # sums of the absolute values of what v, f, f', f'' are summed from, (S, 4)
     basis: chebyshev.Basis
+    yaw: tuple[Array, ...]  # and its two derivatives, in powers of normalised time, (S, any, 1); () without
 
     @classmethod
     def of(
@@ -38,7 +40,7 @@ class ThrustCurve:
         """The curve of a vehicle on a trajectory. Raises SpecError for derivatives beyond all reason.
 
         Args:
-            trajectory: The path; its heading does not matter here.
+            trajectory: The path; its heading does not matter here, its yaw does.
             vehicle: Its drag counts.
             environment: Its gravity and wind count.
             degree: Of interpolation, at least; the polynomials' own if that is higher.
@@ -54,8 +56,10 @@ class ThrustCurve:
         drag = lateral_drag(vehicle)
         thrust = flatness.specific_thrust(environment.gravity, drag, airspeed, acceleration, jerk, snap)
         sums = np.stack([airspeed, *thrust], axis=1)
-        basis = chebyshev.basis(max(degree, size))
-        return cls(trajectory, vehicle, environment, rates.reshape(*rates.shape[:2], 12), sums, basis)
+        turned = () if trajectory.yaw is None else tuple(trajectory.yaw_polynomials(k) for k in range(3))
+        basis = chebyshev.basis(max(degree, size, *(yaw.shape[1] for yaw in turned)))
+        flat = rates.reshape(*rates.shape[:2], 12)
+        return cls(trajectory, vehicle, environment, flat, sums, basis, turned)
 
     def at(self, segment: NDArray[np.intp], s: Array) -> Array:
         """v, f, f', f'' at normalised times s (..., k) of segments (...), (..., k, 4, 3)."""
@@ -67,8 +71,21 @@ class ThrustCurve:
 
     def on(self, pieces: Subintervals) -> Array:
         """v, f, f', f'' at the basis's nodes on pieces of segments, (P, K + 1, 4, 3)."""
-        s = pieces.start[:, None] + pieces.length[:, None] * (1 + self.basis.nodes) / 2
-        return self.at(pieces.interval, s)
+        return self.at(pieces.interval, pieces.positions(self.basis.nodes))
+
+    def yaw_on(self, pieces: Subintervals) -> Array | None:
+        """Any yaw and two derivatives at the basis's nodes on pieces of segments, (P, K + 1, 3)."""
+        s = pieces.positions(self.basis.nodes)
+        found = [polynomial.evaluate(yaw[pieces.interval, None], s) for yaw in self.yaw]
+        return np.concatenate(found, axis=-1) if found else None
+
+    def turns(self, pieces: Subintervals) -> Turns | None:
+        """What the proof has to know of the yaw on pieces, if there is any."""
+        values = self.yaw_on(pieces)
+        if values is None:
+            return None
+        sums = np.stack([np.abs(yaw[pieces.interval, :, 0]).sum(axis=1) for yaw in self.yaw], axis=-1)
+        return Turns(np.abs(self.basis.analysis @ values), chebyshev.EVALUATION_ROUNDING * sums)
 
     def series(self, values: Array) -> Array:
         """Chebyshev series of v, f, f', f'' from `on`, in the order of their terms, (P, K + 1, 4, 3)."""

@@ -109,8 +109,9 @@ class _Motion:
     def of(cls, curve: ThrustCurve, pieces: Subintervals) -> _Motion:
         """The motion of a vehicle, and the attitude of its reference."""
         trajectory = curve.trajectory
-        basis = chebyshev.basis(2 * QUATERNION_DEGREE + max(trajectory.degree, 1))
-        s = pieces.start[:, None] + pieces.length[:, None] * (1 + basis.nodes) / 2
+        sizes = [yaw.shape[1] for yaw in curve.yaw]
+        basis = chebyshev.basis(2 * QUATERNION_DEGREE + max(trajectory.degree, 1, *sizes))
+        s = pieces.positions(basis.nodes)
         world, sums = [], []
         for k in range(1, 6):
             rates = polynomial.differentiate(trajectory.coefficients, k)[pieces.interval]
@@ -121,13 +122,25 @@ class _Motion:
         world[0] = world[0] - wind
         sums[0] = sums[0] + np.linalg.norm(wind)
         nodes, analysis = _guess_nodes()
-        inside = pieces.start[:, None] + pieces.length[:, None] * (1 + nodes) / 2
-        times = trajectory.knots[pieces.interval, None] + inside * trajectory.durations[pieces.interval, None]
+        times = (
+            trajectory.knots[pieces.interval, None]
+            + pieces.positions(nodes) * trajectory.durations[pieces.interval, None]
+        )
         times = np.append(0.0, times)
         found = reference(trajectory, curve.vehicle, times, environment=curve.environment)
         start, q = np.split(found.setpoint.q_world_body, [1])
         attitude = analysis @ q.reshape(len(pieces), -1, 4)
         return cls(curve, pieces, basis, np.stack(world, axis=2), np.stack(sums, axis=1), attitude, start[0])
+
+    @cached_property
+    def yaw(self) -> tuple[Bounded, ...] | None:
+        """The yaw's rate and its two derivatives; None without a yaw."""
+        if not self.curve.yaw:
+            return None
+        polynomials = (self.curve.trajectory.yaw_polynomials(k) for k in (1, 2, 3))
+        at = self.pieces.interval, self.pieces.positions(self.basis.nodes)
+        values = (polynomial.evaluate(yaw[at[0], None], at[1])[..., 0] for yaw in polynomials)
+        return tuple(self.polynomials(each).bounded() for each in values)
 
     @cached_property
     def drag(self) -> Array:
@@ -194,7 +207,8 @@ class _Motion:
         """The largest angle [rad] between the polynomial's attitude and R, (P,); infinite if unknown.
 
         Let θ be the rotation between them in body axes, with the defects ε₁ = b1·α, ε₂ = b2·β and σ = ω_z.
-        To first order θ_y = (ε₁ + θ_z α_y)/α_z, θ_x = (θ_z β_x − ε₂)/β_z and |θ_z'| ≤ |σ| + |ω| |(θ_x, θ_y)|.
+        To first order θ_y = (ε₁ + θ_z α_y)/α_z, θ_x = (θ_z β_x − ε₂)/β_z and |θ_z'| ≤ |σ| + |ω| |(θ_x, θ_y)|,
+        ω across the thrust; with a yaw, σ = ω_z less its rate.
         """
         square = self.squared.least()[:, 0]
 
@@ -213,7 +227,8 @@ class _Motion:
             lowest = np.where(np.minimum(*least) > 0.0, np.minimum(*least), 0.0)
             tilt = np.hypot(*defect) / lowest  # without any spin
             lever = np.hypot(*slope) / lowest  # of an angle about the thrust
-            omega = 1.01 * np.hypot(*rate) / lowest
+            turn = self.yaw[0].bound[:, 0] if self.yaw is not None else 0.0
+            omega = 1.01 * (np.hypot(*rate) + turn * np.hypot(*slope)) / lowest
             seconds = self.pieces.seconds(self.curve.trajectory)
             driven = seconds * (sup(self._spin) + omega * tilt)
             grown = np.exp(seconds * omega * lever)
@@ -226,12 +241,13 @@ class _Motion:
 
     @cached_property
     def _spin(self) -> Array:
-        """ω_z times `squared` at the nodes [rad/s], (P, N)."""
+        """ω_z, less what it shall be, times `squared` at the nodes [rad/s], (P, N)."""
         seconds = self.pieces.seconds(self.curve.trajectory)[:, None]
         slopes = np.asarray(series_of.chebder(self.attitude, axis=1))
         dw, dx, dy, dz = np.moveaxis(self._at_nodes[:, :-1] @ slopes, -1, 0) * 2 / seconds
         w, x, y, z = self.quaternion
-        return np.asarray(2 * (w * dz - x * dy + y * dx - z * dw))
+        spin = np.asarray(2 * (w * dz - x * dy + y * dx - z * dw))
+        return spin if self.yaw is None else spin - self.yaw[0].values * self.squared.values
 
     @cached_property
     def _handed_over(self) -> Array:
@@ -251,12 +267,13 @@ class _Motion:
         alpha, beta = ([self.body(*self.dragged(c, k)) for k in range(4 if rated else 3)] for c in (cx, cy))
         gamma = [self.body(*self.dragged(cz, k)) for k in range(2)]
         inverse = self._inverse(cx, alpha[0][2]), self._inverse(cy, beta[0][2])
-        omega, omega_dot = kernel.body_rates(inverse, alpha, beta)
+        turn, change = (None, None) if self.yaw is None else (self.yaw[:2], self.yaw[2])
+        omega, omega_dot = kernel.body_rates(inverse, alpha, beta, turn)
         thrust, thrust_rate = kernel.collective(vehicle.mass, gamma, omega)
         inertia, rate = vehicle.inertia.tolist(), (thrust_rate, 0.0, 0.0, 0.0)
         moment = flatness.moment(inertia, omega, omega_dot)
         if rated:
-            jerk = kernel.angular_jerk(inverse, alpha, beta, omega, omega_dot)
+            jerk = kernel.angular_jerk(inverse, alpha, beta, omega, omega_dot, change)
             rate = (thrust_rate, *flatness.moment_and_rate(inertia, omega, omega_dot, jerk)[1])
         upright, wrench = self.axis(UP), (thrust, *moment)
         found = [_weighted(share, wrench) for share in mixer(vehicle)]

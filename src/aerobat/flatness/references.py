@@ -69,8 +69,8 @@ def reference(
 
     The attitude starts, at the trajectory's start, as the smallest rotation from upright to the thrust,
     turned about the thrust by the trajectory's heading. From there the attitude is carried along without
-    spin, so that it does not depend on the times. Raises SpecError unless one of times and rate is given,
-    rising and in the trajectory.
+    spin but for the trajectory's yaw, so that it does not depend on the times. Raises SpecError unless one of
+    times and rate is given, rising and in the trajectory.
 
     Args:
         trajectory: The path and its heading, or a plan.
@@ -86,11 +86,12 @@ def reference(
     trajectory = as_trajectory(trajectory)
     times = _rising(trajectory.sample(rate) if rate is not None else times)
     flat = trajectory.flat(times)
+    yaw = None if trajectory.yaw is None else trajectory.yaw_rates(times)
     if not has_unequal_drag(vehicle):
         path, at = _mean_frames(trajectory, vehicle, environment, times)
-        return _assembled(times, flat, path, at, vehicle, environment, None)
+        return _assembled(times, flat, path, at, vehicle, environment, None, yaw)
     path, at, turned = _turned_frames(trajectory, vehicle, environment, times)
-    return _assembled(times, flat, path, at, vehicle, environment, turned.at(times))
+    return _assembled(times, flat, path, at, vehicle, environment, turned.at(times), yaw)
 
 
 @validated
@@ -267,6 +268,7 @@ def _assembled(
     vehicle: Vehicle,
     environment: Environment,
     angle: Array | None,
+    yaw: Array | None = None,
 ) -> Reference:
     """The reference at `nodes` of a path of frames.
 
@@ -277,7 +279,8 @@ def _assembled(
         nodes: Where the times are among them, (T,).
         vehicle: What flies.
         environment: Where.
-        angle: From these frames to those of unequal drag [rad], (T,); None of equal drag.
+        angle: From these frames to those of unequal drag [rad], yaw included, (T,); None of equal drag.
+        yaw: Beside these frames [rad], with two derivatives, (T, 3); None without.
     """
     thrust, q, determined = (
         _thrust(flat, vehicle, environment),
@@ -285,13 +288,19 @@ def _assembled(
         path.determined[nodes],
     )
     airspeed = flat.velocity - environment.wind
+    spin = None if yaw is None else yaw.T[1:]
+    turned = q if yaw is None else so3.multiply(q, so3.about_axis(so3.UP, yaw[:, 0]))
     if angle is None:
+        q = turned
         omega, omega_dot = body_rates(thrust, q, determined)
+        if spin is not None:
+            rates = kernel.spun(xyz(omega), xyz(omega_dot), tuple(spin))
+            omega, omega_dot = (np.stack(rate, axis=-1) for rate in rates)
         wrench = wrench_for(thrust, airspeed, omega, omega_dot, vehicle)
     else:
         drag, balance = UnequalDrag.of(vehicle, environment), thrust[:, 0]
-        q = np.where(determined[:, None], body_attitudes(q, angle, flat, drag, balance), q)
-        omega, omega_dot, specific = body_motion(q, flat, drag, balance)
+        q = np.where(determined[:, None], body_attitudes(q, angle, flat, drag, balance), turned)
+        omega, omega_dot, specific = body_motion(q, flat, drag, balance, spin)
         omega, omega_dot = (np.where(determined[:, None], rate, 0.0) for rate in (omega, omega_dot))
         moment = kernel.moment(vehicle.inertia.tolist(), xyz(omega), xyz(omega_dot))
         wrench = Wrench(vehicle.mass * specific, np.stack(moment, axis=-1))

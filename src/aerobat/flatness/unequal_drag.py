@@ -119,11 +119,14 @@ class FrameAngle:
         velocity, acceleration, jerk = np.moveaxis(motion_on(trajectory, pieces, nodes(), 3), 2, 0)
         local = _Local.of(drag, velocity - drag.wind, acceleration, jerk, q_mean)
         seconds = pieces.seconds(trajectory)
+        yaw = trajectory.yaw_polynomials(1)[pieces.interval, None]
+        yaw_rate = polynomial.evaluate(yaw, pieces.positions(nodes()))[..., 0]
         angle = np.zeros(local.norm.shape)
         for _ in range(ROUNDS):
-            rate = local.spin(angle)
+            rate = local.spin(angle, yaw_rate)
             series = chebyshev.chebint(rate @ analysis().T, lbnd=-1, axis=1) * seconds[:, None] / 2
             series[1:, 0] += np.cumsum(series.sum(axis=1))[:-1]
+            series[:, 0] += trajectory.yaw_polynomials(0)[0, 0, 0]
             last, angle = angle, series @ chebyshev.chebvander(nodes(), NODES).T
             if np.abs(angle - last).max() <= SETTLED * max(1.0, np.abs(angle).max()):
                 break
@@ -158,7 +161,9 @@ def body_attitudes(q_mean: Array, angle: Array, flat: FlatState, drag: UnequalDr
     return so3.multiply(near, so3.normalize(q))
 
 
-def body_motion(q: Array, flat: FlatState, drag: UnequalDrag, balance: Array) -> tuple[Array, Array, Array]:
+def body_motion(
+    q: Array, flat: FlatState, drag: UnequalDrag, balance: Array, yaw: Array | None
+) -> tuple[Array, Array, Array]:
     """Body rates [rad/s], their derivatives [rad/s²], body axes, and specific collective thrust [m/s²].
 
     Args:
@@ -166,6 +171,7 @@ def body_motion(q: Array, flat: FlatState, drag: UnequalDrag, balance: Array) ->
         flat: The motion, (...).
         drag: Of the vehicle.
         balance: Mean-drag specific thrust, world [m/s²], (..., 3).
+        yaw: The rate of the turn about the thrust axis [rad/s] and its derivative, (2, ...), if there is any.
     """
     airspeed = flat.velocity - drag.wind
     kappa = drag.counted(balance, airspeed)
@@ -175,8 +181,10 @@ def body_motion(q: Array, flat: FlatState, drag: UnequalDrag, balance: Array) ->
     motion = ((thrust, air), (jerk, accelerated), (snap, jerk))
     alpha = [add_scaled(x, mean + kappa, below) for x, below in motion]
     beta = [add_scaled(x, mean - kappa, below) for x, below in motion]
-    rates = kernel.body_rates((1.0 / alpha[0][2], 1.0 / beta[0][2]), alpha, beta)
-    omega, omega_dot = (np.stack([x, y, np.zeros_like(x)], axis=-1) for x, y, _ in rates)
+    rates = kernel.body_rates(
+        (1.0 / alpha[0][2], 1.0 / beta[0][2]), alpha, beta, None if yaw is None else tuple(yaw)
+    )
+    omega, omega_dot = (np.stack([x, y, z + np.zeros_like(x)], axis=-1) for x, y, z in rates)
     return omega, omega_dot, thrust[2] + drag.coefficients[2] * air[2]
 
 
@@ -208,8 +216,8 @@ class _Local:
         kappa = drag.counted(thrust, airspeed)
         return cls(kappa, norm, rising, across, air, air_along, accelerated, accelerated_along)
 
-    def spin(self, angle: Array) -> Array:
-        """ψ' [rad/s] at angles ψ."""
+    def spin(self, angle: Array, yaw_rate: Array) -> Array:
+        """ψ' [rad/s] at angles ψ, of a body that turns about its thrust axis at yaw rates [rad/s]."""
         back = np.exp(-1j * angle)
         change, air, accelerated = (
             _vector(back * across, along)
@@ -223,13 +231,12 @@ class _Local:
         alpha, beta = (add_scaled(thrust, sign * self.difference, air) for sign in (1.0, -1.0))
         body: Axes = kernel.nearest_axes(np.sqrt, alpha, beta)
         rising = add_scaled(change, self.difference, accelerated)
-        return np.asarray(kernel.frame_spin((self.norm, change), (alpha, rising), body))
+        return np.asarray(kernel.frame_spin((self.norm, change), (alpha, rising), body, yaw_rate))
 
 
 def motion_on(trajectory: Trajectory, pieces: Subintervals, at: Array, orders: int) -> Array:
     """Velocity and so on, `orders` derivatives, at positions in [-1, 1] on pieces, (P, N, orders, 3)."""
-    s = pieces.start[:, None] + pieces.length[:, None] * (1 + at) / 2
-    found = []
+    s, found = pieces.positions(at), []
     for k in range(1, orders + 1):
         rates = polynomial.differentiate(trajectory.coefficients, k)[pieces.interval, None]
         values = polynomial.evaluate(rates, s)

@@ -13,6 +13,8 @@ into axes that are given relative to the upright ones.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from aerobat.kernels.ops import Matrix, Scalar, Vector
 from aerobat.kernels.vectors import add, add_scaled, cross, dot, scale, transform
 
@@ -31,6 +33,15 @@ def body_rates(b3: Vector, jerk: Vector, snap: Vector) -> tuple[Vector, Vector]:
     """
     omega = cross(b3, jerk)
     return omega, add_scaled(cross(b3, snap), -2.0 * dot(b3, jerk), omega)
+
+
+def spun(omega: Vector, omega_dot: Vector, yaw: Sequence[Scalar]) -> tuple[Vector, Vector]:
+    """Return ω and ω' of a body that also turns about b3, from those across b3 in its axes.
+
+    `yaw` is the rate [rad/s] at which it turns, and the rate's derivative [rad/s²].
+    """
+    (x, y, _), (dx, dy, _), (rate, acceleration) = omega, omega_dot, yaw
+    return (x, y, rate), (dx + rate * y, dy - rate * x, acceleration)
 
 
 def tilted(b3: Vector, across: Vector) -> tuple[Scalar, Scalar]:

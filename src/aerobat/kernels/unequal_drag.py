@@ -4,10 +4,12 @@ Let v be the airspeed, c the drag per mass in body axes and h = a + g e3. Thrust
 
     b1·α = 0,   b2·β = 0,     α = h + c_x v,   β = h + c_y v.
 
-Both equations leave one angle open. The body never spins about b3: b1' = −ω_y b3, b2' = ω_x b3, and in body
-axes
+Both equations leave one angle open. Unless it is told to, the body never spins about b3: b1' = −ω_y b3,
+b2' = ω_x b3, and in body axes
 
     ω_x = −β'_y/β_z,   ω_y = α'_x/α_z,   ω_z = 0,   T = m γ_z,     γ = h + c_z v.
+
+With a yaw rate ω_z = s, α'_x has s α_y more, and β'_y has s β_x less.
 
 Vectors below are in body axes and come with their derivatives in the world: α, α', α'', …
 """
@@ -34,7 +36,10 @@ def nearest_axes(sqrt: Callable[[Scalar], Scalar], alpha: Vector, beta: Vector) 
 
 
 def body_rates(
-    inverse: tuple[Scalar, Scalar], alpha: Sequence[Vector], beta: Sequence[Vector]
+    inverse: tuple[Scalar, Scalar],
+    alpha: Sequence[Vector],
+    beta: Sequence[Vector],
+    yaw: Sequence[Scalar] | None = None,
 ) -> tuple[Vector, Vector]:
     """Return ω [rad/s] and ω' [rad/s²].
 
@@ -42,13 +47,21 @@ def body_rates(
         inverse: 1/α_z and 1/β_z.
         alpha: α, α', α''.
         beta: β, β', β''.
+        yaw: ω_z and ω_z'; without, no spin.
     """
     per_alpha, per_beta = inverse
     wx, wy = -1.0 * beta[1][1] * per_beta, alpha[1][0] * per_alpha
+    if yaw is not None:
+        wx, wy = wx + yaw[0] * beta[0][0] * per_beta, wy + yaw[0] * alpha[0][1] * per_alpha
     both = wx * wy
     dwx = -1.0 * (beta[2][1] + 2.0 * wx * beta[1][2] + both * beta[0][0]) * per_beta
     dwy = (alpha[2][0] - 2.0 * wy * alpha[1][2] + both * alpha[0][1]) * per_alpha
-    return (wx, wy, 0.0), (dwx, dwy, 0.0)
+    if yaw is None:
+        return (wx, wy, 0.0), (dwx, dwy, 0.0)
+    spin, change = yaw
+    dwx = dwx + (2.0 * spin * beta[1][0] - spin * wy * beta[0][2] + change * beta[0][0]) * per_beta
+    dwy = dwy + (2.0 * spin * alpha[1][1] + spin * wx * alpha[0][2] + change * alpha[0][1]) * per_alpha
+    return (wx, wy, spin), (dwx, dwy, change)
 
 
 def angular_jerk(
@@ -57,6 +70,7 @@ def angular_jerk(
     beta: Sequence[Vector],
     omega: Vector,
     omega_dot: Vector,
+    change: Scalar | None = None,
 ) -> Vector:
     """Return ω'' [rad/s³].
 
@@ -66,19 +80,26 @@ def angular_jerk(
         beta: β to β'''.
         omega: ω.
         omega_dot: ω'.
+        change: ω_z''; without, no spin.
     """
     per_alpha, per_beta = inverse
-    (wx, wy, _), (dwx, dwy, _) = omega, omega_dot
-    both, change = wx * wy, dwx * wy + wx * dwy
+    (wx, wy, s), (dwx, dwy, ds) = omega, omega_dot
+    both, both_rate = wx * wy, dwx * wy + wx * dwy
     rising_beta = beta[1][2] + wy * beta[0][0]  # β_z'
     rising_alpha = alpha[1][2] - wx * alpha[0][1]  # α_z'
     x = beta[3][1] + wx * beta[2][2] + 2.0 * dwx * beta[1][2]
     x = x + 2.0 * wx * (beta[2][2] - wx * beta[1][1] + wy * beta[1][0])
-    x = x + change * beta[0][0] + both * (beta[1][0] - wy * beta[0][2]) + dwx * rising_beta
+    x = x + both_rate * beta[0][0] + both * (beta[1][0] - wy * beta[0][2]) + dwx * rising_beta
     y = alpha[3][0] - wy * alpha[2][2] - 2.0 * dwy * alpha[1][2]
     y = y - 2.0 * wy * (alpha[2][2] - wx * alpha[1][1] + wy * alpha[1][0])
-    y = y + change * alpha[0][1] + both * (alpha[1][1] + wx * alpha[0][2]) - dwy * rising_alpha
-    return -1.0 * x * per_beta, y * per_alpha, 0.0
+    y = y + both_rate * alpha[0][1] + both * (alpha[1][1] + wx * alpha[0][2]) - dwy * rising_alpha
+    if change is None:
+        return -1.0 * x * per_beta, y * per_alpha, 0.0
+    x = x - 3.0 * (s * beta[2][0] + ds * beta[1][0]) + 2.0 * s * (wy * beta[1][2] - s * beta[1][1])
+    x = x + (2.0 * ds * wy + s * dwy) * beta[0][2] + s * wy * rising_beta - change * beta[0][0]
+    y = y + 3.0 * (s * alpha[2][1] + ds * alpha[1][1]) + 2.0 * s * (wx * alpha[1][2] - s * alpha[1][0])
+    y = y + (2.0 * ds * wx + s * dwx) * alpha[0][2] + s * wx * rising_alpha + change * alpha[0][1]
+    return -1.0 * x * per_beta, y * per_alpha, change
 
 
 def collective(mass: Scalar, gamma: Sequence[Vector], omega: Vector) -> tuple[Scalar, Scalar]:
@@ -87,8 +108,10 @@ def collective(mass: Scalar, gamma: Sequence[Vector], omega: Vector) -> tuple[Sc
     return mass * now[2], mass * (change[2] - omega[0] * now[1] + omega[1] * now[0])
 
 
-def frame_spin(thrust: tuple[Scalar, Vector], alpha: tuple[Vector, Vector], body: Axes) -> Scalar:
-    """Return the rate [rad/s] at which axes on the mean-drag thrust turn about it beside a body of no spin.
+def frame_spin(
+    thrust: tuple[Scalar, Vector], alpha: tuple[Vector, Vector], body: Axes, yaw_rate: Scalar = 0.0
+) -> Scalar:
+    """Return the rate [rad/s] at which axes on the mean-drag thrust turn about it beside a body.
 
     Those axes are x, y and z here, z along the mean-drag specific thrust, and b1 stays across y.
 
@@ -96,11 +119,12 @@ def frame_spin(thrust: tuple[Scalar, Vector], alpha: tuple[Vector, Vector], body
         thrust: Norm of the mean-drag specific thrust, and its derivative.
         alpha: α and α'.
         body: b1, b2 and b3 as of `nearest_axes`.
+        yaw_rate: ω_z [rad/s].
     """
     norm, change = thrust
-    b1, _, b3 = body
-    pitch = dot(b1, alpha[1]) / dot(b3, alpha[0])
-    return -1.0 * (change[1] / norm * b1[2] + pitch * b3[1]) / b1[0]
+    b1, b2, b3 = body
+    pitch = (dot(b1, alpha[1]) + yaw_rate * dot(b2, alpha[0])) / dot(b3, alpha[0])
+    return -1.0 * (change[1] / norm * b1[2] + pitch * b3[1] - yaw_rate * b2[1]) / b1[0]
 
 
 class DraggedBody(NamedTuple):

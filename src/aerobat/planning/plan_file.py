@@ -1,10 +1,10 @@
 """Plans as files: everything that a plan is, in one file that whatever follows can read.
 
 A .plan file is a NumPy .npz archive without pickles. Its arrays `durations` (S,), `coefficients`
-(S, degree + 1, 3) and `heading` are the trajectory's, bit for bit. The rest is in `document`, as UTF-8 JSON:
-the problem and the vehicle as the tables of their files, the environment in full, and how the plan was made;
-its stages, attempts, certificate, flyability, recoveries, assessment and tube; frames, and the version of
-Aerobat that wrote the file. `digest` is the SHA-256 of all of that.
+(S, degree + 1, 3), `heading` and, where it has one, `yaw` are the trajectory's, bit for bit. The rest is in
+`document`, as UTF-8 JSON: the problem and the vehicle as the tables of their files, the environment in full,
+and how the plan was made; its stages, attempts, certificate, flyability, recoveries, assessment and tube;
+frames, and the version of Aerobat that wrote the file. `digest` is the SHA-256 of all of that.
 
 A file proves nothing: a plan that is read has its certificate, flyability and assessment worked out anew.
 Results that take seconds are taken from the file only where the digest says that nothing was changed.
@@ -35,10 +35,11 @@ from aerobat.problem.problem import Problem
 from aerobat.simulation.autopilot import Recoveries
 from aerobat.storage import digest_of, format_of, read_arrays, whole_file
 from aerobat.trajectory import Trajectory
+from aerobat.trajectory.files import trajectory_in
 from aerobat.vehicle import Vehicle
 
 FORMAT = "aerobat-plan-1"  # another number where something goes, or means something else
-REVISION = 5  # of it: one more wherever something is added
+REVISION = 6  # of it: one more wherever something is added
 WORKED_OUT = {"certificate", "flyability", "assessment"}  # from a plan's path whenever they are read
 ASKED_FOR = {"recoveries", "opinion", "tube"}  # results that take seconds
 MAX_EVIDENCE = 2**23  # bytes of a document: that of twenty gates has some hundred thousand
@@ -102,6 +103,7 @@ def write_plan_file(
         "durations": trajectory.durations,
         "coefficients": trajectory.coefficients,
         "heading": np.asarray(trajectory.heading),
+        **({} if trajectory.yaw is None else {"yaw": trajectory.yaw}),
         "document": np.frombuffer(json.dumps(document).encode(), dtype=np.uint8),
     }
     with whole_file(path) as temporary, temporary.open("wb") as file:
@@ -130,7 +132,7 @@ def read_plan_file(path: PathName) -> tuple[Problem, Trajectory, Vehicle | None,
         vehicle = document["vehicle"]
         return (
             from_table(Problem, document["problem"]),
-            Trajectory(content["durations"], content["coefficients"], float(content["heading"])),
+            trajectory_in(content),
             None if vehicle is None else from_table(Vehicle, vehicle),
             {name: value for name, value in vars(facts).items() if name not in left_out},
         )

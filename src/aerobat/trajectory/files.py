@@ -2,32 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
+from aerobat.arrays import Array
 from aerobat.declaration import PathName, validated
 from aerobat.errors import SpecError
 from aerobat.storage import format_of, read_arrays, whole_file
 from aerobat.trajectory.piecewise import Carrier, Trajectory, as_trajectory
 
-_FORMAT = "aerobat-trajectory-2"
+_FORMAT = "aerobat-trajectory-3"
+_WITHOUT_YAW = "aerobat-trajectory-2"  # as one without is written
 _WITHOUT_HEADING = "aerobat-trajectory-1"  # read with heading 0
 
 
 @validated
 def save_trajectory(trajectory: Trajectory | Carrier, path: PathName) -> None:
-    """Write durations (S,), coefficients (S, degree + 1, 3) and heading as an .npz file, whole or not at all.
+    """Write durations (S,), coefficients (S, degree + 1, 3), heading and any yaw (S, any) as an .npz file.
 
-    Raises SpecError when the file cannot be written.
+    It is written whole or not at all. Raises SpecError when the file cannot be written.
     """
     trajectory = as_trajectory(trajectory)
+    content: dict[str, Any] = {
+        "format": _WITHOUT_YAW if trajectory.yaw is None else _FORMAT,
+        "durations": trajectory.durations,
+        "coefficients": trajectory.coefficients,
+        "heading": trajectory.heading,
+        **({} if trajectory.yaw is None else {"yaw": trajectory.yaw}),
+    }
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        np.savez(
-            file,
-            format=_FORMAT,
-            durations=trajectory.durations,
-            coefficients=trajectory.coefficients,
-            heading=trajectory.heading,
-        )
+        np.savez(file, **content)
 
 
 @validated
@@ -35,12 +41,17 @@ def load_trajectory(path: PathName) -> Trajectory:
     """Read what `save_trajectory` wrote, exactly. Raises SpecError, one sentence, for any other file."""
     content = read_arrays(path, "trajectory")
     found = format_of(content)
-    if found not in (_FORMAT, _WITHOUT_HEADING):
+    if found not in (_FORMAT, _WITHOUT_YAW, _WITHOUT_HEADING):
         raise SpecError(f"trajectory file {path}: it holds {found}, not {_FORMAT}; give a trajectory's file")
     try:
-        heading = content["heading"] if found == _FORMAT else np.zeros(())
-        return Trajectory(content["durations"], content["coefficients"], heading)  # type: ignore[arg-type]
+        return trajectory_in({"heading": np.zeros(())} | content if found == _WITHOUT_HEADING else content)
     except KeyError as error:
         raise SpecError(f"trajectory file {path}: it has no array {error.args[0]!r}; save it again") from None
     except SpecError as error:
         raise SpecError(f"trajectory file {path}: {error}") from None
+
+
+def trajectory_in(arrays: Mapping[str, Array]) -> Trajectory:
+    """The trajectory that a file's arrays hold. Raises KeyError for one that is missing."""
+    durations, coefficients, heading = (arrays[name] for name in ("durations", "coefficients", "heading"))
+    return Trajectory(durations, coefficients, float(heading), arrays.get("yaw"))

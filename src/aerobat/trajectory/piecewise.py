@@ -62,12 +62,14 @@ class Trajectory:
     positive, numbers that are not finite or that no motion has, and shapes that do not match.
 
     At the start the attitude is the smallest rotation from upright to the thrust, turned about it by the
-    heading, and from there it is carried along without spin.
+    heading, and from there it is carried along without spin. `yaw` turns the body beside that about its
+    thrust axis, by polynomials in the same s.
     """
 
     durations: Array  # [s], (S,)
     coefficients: Array  # [m], (S, degree + 1, 3), powers of normalised time rising
     heading: Angle = 0.0  # [rad] about the thrust axis at the start
+    yaw: Array | None = None  # [rad] beside what is carried, (S, any), powers rising; None: no spin
 
     def __post_init__(self) -> None:
         """Copy, check and write-protect the arrays."""
@@ -86,6 +88,11 @@ class Trajectory:
                 "cut long polynomials into segments"
             )
         _check_magnitude(durations, coefficients)
+        if self.yaw is not None:
+            yaw = frozen(self.yaw, "yaw", (None, None))
+            if yaw.ndim != 2 or len(yaw) != len(durations) or not 0 < yaw.shape[1] <= MAX_DEGREE + 1:
+                raise SpecError(f"yaw must have the shape ({len(durations)}, degree + 1), got {yaw.shape}")
+            object.__setattr__(self, "yaw", yaw)
         object.__setattr__(self, "durations", durations)
         object.__setattr__(self, "coefficients", coefficients)
         object.__setattr__(self, "heading", float(self.heading))
@@ -169,6 +176,20 @@ class Trajectory:
         """Position to snap at the times t [s] (...). Raises SpecError as `evaluate` does."""
         segment, s = self._locate(t)
         return FlatState(*(polynomial.evaluate(self._rates(k)[segment], s) for k in range(5)))
+
+    def yaw_rates(self, t: ArrayLike) -> Array:
+        """The yaw beside what is carried along [rad] and two derivatives at times (...), (..., 3)."""
+        segment, s = self._locate(t)
+        return np.stack(
+            [polynomial.evaluate(self.yaw_polynomials(k)[segment], s)[..., 0] for k in range(3)], -1
+        )
+
+    def yaw_polynomials(self, derivative: int) -> Array:
+        """Coefficients of a derivative of the yaw [rad/s^k] on each segment, (S, K, 1)."""
+        yaw = np.zeros((self.segments, 1)) if self.yaw is None else self.yaw
+        return (
+            polynomial.differentiate(yaw[..., None], derivative) / self.durations[:, None, None] ** derivative
+        )
 
     def on_segments(self, s: ArrayLike, derivative: int = 0) -> Array:
         """d^k p/dt^k at the normalised times s (k,) of every segment, (S, k, 3).

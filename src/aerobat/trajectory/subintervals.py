@@ -64,6 +64,10 @@ class Subintervals:
         """Durations [s] of parts of a trajectory's segments, (n,)."""
         return np.asarray(self.length * trajectory.durations[self.interval])
 
+    def positions(self, at: Array) -> Array:
+        """Return places (n,) in [-1, 1] on each part in the time of its interval, from 0 to 1, (parts, n)."""
+        return np.asarray(self.start[:, None] + self.length[:, None] * (1 + at) / 2)
+
     def times(self, trajectory: Trajectory, position: Array) -> Array:
         """Times [s] of positions in [-1, 1] on each part of a trajectory's segments, (n,) -> (n,)."""
         s = self.start + self.length * (1 + position) / 2

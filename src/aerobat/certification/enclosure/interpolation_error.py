@@ -14,7 +14,7 @@ The rest follows, as DERIVATION.md has it; complex vectors have their Hermitian 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,13 +55,30 @@ class EllipseBounds:
     curl: Array  # of that angle's imaginary part [rad]
 
 
+@dataclass(frozen=True)
+class Turns:
+    """The yaw beside a frame without spin, its rate and that's derivative, along P pieces."""
+
+    terms: Array  # magnitudes of their Chebyshev coefficients, (P, K + 1, 3)
+    rounding: Array  # in their values, at most, (P, 3)
+
+    @property
+    def on_ellipses(self) -> Array:
+        """Bounds of the yaw's imaginary part and of both rates, (P, R, 3)."""
+        terms = self.terms + self.rounding[:, None]
+        larger = growth(terms.shape[1] - 1, RHO)
+        return np.stack([terms[..., 0] @ np.sqrt(larger**2 - 1), *(terms.T[1:].swapaxes(1, 2) @ larger)], -1)
+
+
 def regular(norms: Array) -> NDArray[np.bool_]:
     """Tell on which pieces the smallest ellipse is off the zeros of f·f; norms as from `ThrustCurve`."""
     thrust = norms[..., 1]
     return _off_zero(thrust[:, 0], thrust[:, 1:] @ growth(thrust.shape[1] - 1, RHO[1:2])[1:, 0])
 
 
-def accuracy(norms: Array, seconds: Array, sums: Array, vehicle: Vehicle) -> InterpolationError:
+def accuracy(
+    norms: Array, seconds: Array, sums: Array, vehicle: Vehicle, turns: Turns | None = None
+) -> InterpolationError:
     """Bound the error of interpolation on regular pieces.
 
     Args:
@@ -69,12 +86,19 @@ def accuracy(norms: Array, seconds: Array, sums: Array, vehicle: Vehicle) -> Int
         seconds: How long the pieces are [s], (P,).
         sums: Of the absolute values that v, f, f', f'' are evaluated from, (P, 4).
         vehicle: What flies.
+        turns: Its yaw beside the frame without spin, if there is any.
     """
-    around = on_ellipses(norms, seconds / 2, vehicle)
+    around = on_ellipses(norms, seconds / 2, vehicle, turns)
     real = MagnitudeBounds(*(bound[:, 0] for bound in vars(around.magnitudes).values()))
     min_thrust = norms[:, 0, 1] - norms[:, 1:, 1].sum(axis=1)
     speed = norms[..., 0].sum(axis=1)
     rounded = first_order(real, min_thrust, speed, EVALUATION_ROUNDING * sums, vehicle)
+    if turns is not None:
+        off, rate, acceleration = turns.rounding.T
+        omega = rounded.omega + off * real.omega + rate
+        omega_dot = rounded.omega_dot + off * real.omega_dot + acceleration
+        omega_dot += turns.on_ellipses[:, 0, 1] * rounded.omega + rate * real.omega
+        rounded = replace(rounded, omega=omega, omega_dot=omega_dot)
     decay, rate_decay = tails(norms.shape[1] - 1, RHO[1:])
     bounds = np.where(around.regular[..., None], quantities.bounds(vehicle, around.magnitudes), np.inf)
     twist = np.where(around.regular, around.twist, np.inf)
@@ -96,7 +120,7 @@ def accuracy(norms: Array, seconds: Array, sums: Array, vehicle: Vehicle) -> Int
     )
 
 
-def on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> EllipseBounds:
+def on_ellipses(norms: Array, half: Array, vehicle: Vehicle, turns: Turns | None = None) -> EllipseBounds:
     """Bounds from the norms (P, K + 1, 4) of the terms of v, f, f', f'' on pieces `half` (P,) [s] a side."""
     larger = growth(norms.shape[1] - 1, RHO)
     speed, _, jerk, snap = (norms[..., k] @ larger for k in range(4))
@@ -108,10 +132,16 @@ def on_ellipses(norms: Array, half: Array, vehicle: Vehicle) -> EllipseBounds:
     ratio = (mean + away) / root  # |f|/|n|, at most
     twist = half[:, None] * away * jerk / (2 * root**2)
     curl = twist * (RHO + 1 / RHO) / 2  # the angle's imaginary part, gathered from the real line on
+    if turns is not None:
+        turned, rate, acceleration = np.moveaxis(turns.on_ellipses, -1, 0)
+        curl = curl + turned
     usable &= curl < MAX_FRAME_ANGLE
     frame = (1 + away * mean / root**2) * np.exp(np.where(usable, curl, 0.0))  # |x|, |y|, at most
     omega = frame * jerk / root
     omega_dot = frame * (snap + 2 * ratio * jerk**2 / root) / root
+    if turns is not None:
+        omega_dot = np.hypot(omega_dot + rate * omega, acceleration)
+        omega = np.hypot(omega, rate)
     grown = away * (2 * mean + away) / (mean + root)  # |n − c|, at most
     axial = abs(axial_drag(vehicle))
     thrust = vehicle.mass * (np.where(RHO > 1, grown, mean + away) + axial * ratio * speed)

@@ -158,7 +158,10 @@ class _Run:
     def difference(self, other: _Run) -> str:
         """Return how another run differs, in words; nothing where it does not."""
         own, its = self.plan.trajectory, other.plan.trajectory
-        if not _same(own.durations, its.durations) or not _same(own.coefficients, its.coefficients):
+        same = _same(own.durations, its.durations) and _same(own.coefficients, its.coefficients)
+        if same and own != its:
+            return "the plan's heading is another"
+        if not same:
             return f"the plan takes {its.duration:.9g} s, there {own.duration:.9g} s"
         if self.flight is None or other.flight is None:
             return ""

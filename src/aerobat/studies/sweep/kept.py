@@ -111,6 +111,7 @@ def _plan_table(plan: Plan) -> dict[str, Any]:
         "durations": trajectory.durations.tolist(),
         "coefficients": trajectory.coefficients.tolist(),
         "heading": trajectory.heading,
+        **({} if trajectory.yaw is None else {"yaw": trajectory.yaw.tolist()}),
     }
 
 
