@@ -34,7 +34,7 @@ class Gentle:
         ends = np.stack([problem.start.derivatives(5), problem.goal.derivatives(5)])
         recorder = Recorder(progress)
         for duration in np.arange(self.step, 20.0, self.step).tolist():
-            path = ab.minimum_effort(ends, [duration], heading=problem.heading)
+            path = ab.minimum_effort(ends, [duration], heading=problem.heading.start)
             found = ab.certify(path, vehicle, problem.environment, envelope)
             recorder.record(
                 Attempt(duration, found.certified, "certified", str(found), None, 0, 0.0, None, found.margin)

@@ -182,8 +182,8 @@ def test_typed_angles_are_written_as_they_were_typed(tmp_path: Path) -> None:
 
 def test_a_heading_is_given_in_degrees_or_radians_not_both() -> None:
     table = to_table(ab.load_problem("line"))
-    assert from_table(ab.Problem, table | {"heading": 1.0}).heading == 1.0
-    assert from_table(ab.Problem, table | {"heading_deg": 180}).heading == np.pi
+    assert from_table(ab.Problem, table | {"heading": 1.0}).heading == ab.Heading(1.0)
+    assert from_table(ab.Problem, table | {"heading_deg": 180}).heading == ab.Heading(np.pi)
     with pytest.raises(SpecError, match="heading and heading_deg are both given"):
         from_table(ab.Problem, table | {"heading": 1.0, "heading_deg": 3.0})
 

@@ -22,7 +22,7 @@ from aerobat.optimization.deadline import within_time
 from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
-from aerobat.problem import Gate, Maneuver, Problem, Stage, StageSequence, at_rest
+from aerobat.problem import Gate, Heading, Maneuver, Problem, Stage, StageSequence, at_rest
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -41,13 +41,13 @@ def between_holds(method: PlanMethod[P]) -> PlanMethod[P]:
             return method(self, problem, vehicle, progress)
         planner = _without_start(self)
         found: list[Plan | Stage] = []
-        heading = problem.heading
+        heading = problem.heading.start
         with within_time(getattr(self, "time_limit", None)):
             for part in _parts(problem):
                 if isinstance(part, Stage):
                     found.append(part)
                     continue
-                each = method(planner, replace(part, heading=heading), vehicle, progress)
+                each = method(planner, replace(part, heading=Heading(heading)), vehicle, progress)
                 found.append(each)
                 heading = heading if vehicle is None else _heading_at_end(each, vehicle)
         joined = _joined(problem, found)
@@ -132,7 +132,7 @@ def _joined(problem: Problem, found: Sequence[Plan | Stage]) -> Plan:
     same = statuses.pop() if len(statuses) == 1 else "feasible"
     return Plan(
         problem,
-        Trajectory(durations, coefficients, problem.heading),
+        Trajectory(durations, coefficients, problem.heading.start),
         plans[0].planner,
         order=plans[0].order,
         status="time_limit" if "time_limit" in statuses else same,

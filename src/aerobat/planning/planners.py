@@ -20,6 +20,7 @@ from aerobat.declaration import Label, Registry, placed, shown, suggest_for, val
 from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.courses import is_course, on_open_courses
+from aerobat.planning.heading import with_heading
 from aerobat.planning.holds import between_holds
 from aerobat.planning.passages import require_clear_ends, require_openings
 from aerobat.planning.recorder import Progress
@@ -96,7 +97,8 @@ def plan(
         name = getattr(method, "kind", type(method).__name__)
         wrong = SpecError(f"planner '{name}' returned {shown(found)} from plan(), not a Plan")
         raise placed(wrong, method.plan)
-    return found if vehicle is None or found.vehicle is not None else found.for_vehicle(vehicle)
+    found = found if vehicle is None or found.vehicle is not None else found.for_vehicle(vehicle)
+    return with_heading(found, getattr(method, "reserve", 0.0))
 
 
 def _option_of(name: str) -> str:

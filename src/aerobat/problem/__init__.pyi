@@ -3,6 +3,7 @@ from .condition import Attitude, Condition, ForceBalance, LinearBound, Quantity
 from .end_state import EndState, at_rest
 from .files import as_problem, load_problem, problem_names, problem_text, write_problem
 from .gate import Gate, tilted_gate
+from .heading import Heading
 from .maneuvers import (
     BarrelRoll,
     Corkscrew,
@@ -48,6 +49,7 @@ __all__ = [
     "Gate",
     "GatePassage",
     "HalfFlip",
+    "Heading",
     "Hold",
     "Immelmann",
     "InvertedPass",

@@ -14,7 +14,6 @@ from pydantic import AfterValidator, PlainValidator
 
 from aerobat.arrays import Array
 from aerobat.declaration import (
-    Angle,
     Corner,
     Derivative,
     FieldError,
@@ -38,6 +37,7 @@ from aerobat.errors import OwnCodeError, SpecError
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.end_state import EndState
 from aerobat.problem.gate import Gate, named_gate
+from aerobat.problem.heading import Heading, as_heading
 from aerobat.problem.maneuvers.line import Line
 from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver
 from aerobat.problem.stage import StageSequence
@@ -137,13 +137,14 @@ class Problem:
     maneuver: Annotated[Maneuver, PlainValidator(MANEUVERS.read)] = Line()  # what happens on the way
     gates: tuple[Gate, ...] = ()  # openings to pass
     limits: Limits = field(default_factory=Limits)  # bounds on the path
-    heading: Angle = 0.0  # [rad] about the thrust axis at the start, carried along without spin
+    # where the body's x axis points along the way; an angle: at the start, then carried along without spin
+    heading: Annotated[Heading, PlainValidator(as_heading)] = Heading()
     environment: Environment = field(default_factory=Environment)  # where it is flown
     tolerance: Tolerance = Tolerance()  # how exactly flights keep to it beside gates and radii
     description: str = ""  # what it is, for people
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {
-        "heading_deg": "[deg] `heading` in degrees",
+        "heading_deg": "[deg] `start` of `heading` in degrees",
         "gate": "the only one of `gates`",
     }
 
@@ -180,12 +181,23 @@ class Problem:
                 raise SpecError("gate and gates are both given; give all gates as tables [[gates]]")
             with within_field("gate"):
                 table["gates"] = (from_table(Gate, table.pop("gate")),)
-        return in_radians(table, "heading")
+        if "heading_deg" in table:
+            angle = {"start": in_radians({"heading_deg": table.pop("heading_deg")}, "heading")["heading"]}
+            if "heading" in table and not isinstance(table["heading"], Mapping):
+                raise SpecError("heading and heading_deg are both given; give one of them")
+            if {"start", "start_deg"} & table.get("heading", {}).keys():
+                raise FieldError("heading_deg", "stands beside heading's own start; drop either")
+            table["heading"] = angle | table.get("heading", {})
+        return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
         """Write the heading in degrees where those say exactly the same; what is short comes first."""
         table.setdefault("maneuver", to_table(self.maneuver))
-        return in_degrees(table, "heading")
+        heading = table.get("heading", {})
+        if set(heading) == {"start_deg"}:
+            del table["heading"]
+            return {"heading_deg": heading["start_deg"]} | table
+        return table
 
     def _check_given_ends(self, sequence: StageSequence) -> None:
         """Refuse an end that is missing, and of a closed course what gives it one."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.planning import Assessment, Attempt, Flyability, Plan, Tube
 from aerobat.planning.flyability import FlownPassage
+from aerobat.planning.heading import heading_error
 from aerobat.planning.time_limit import best_by_limit
 from aerobat.reporting.facts import REPORT, WARNING, Fact, Facts, facts, fields_of, kept, picture, said
 from aerobat.simulation.autopilot import Recoveries
@@ -42,6 +43,12 @@ def _(plan: Plan) -> Iterator[Fact]:
     beside = "" if found is None or found.poor else _beside_least(found)
     yield Fact("duration_s", plan.duration, "duration", f"{plan.duration:.2f} s{beside}", level=REPORT)
     yield Fact("rescue", plan.rescue, "rescue", level=REPORT)
+    off = heading_error(plan)
+    if off is not None:
+        most, usual = degrees(off.largest), degrees(off.median)
+        text = f"{plan.problem.heading.mode}, {usual:.2g}° off, at worst {most:.3g}° at {off.time:.2f} s"
+        yield Fact("heading_error_deg", most, "heading", text, level=REPORT)
+        yield from kept(heading_error_median_deg=usual, heading_error_time_s=off.time)
     dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
     yield said("search", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts")
     cost = ""

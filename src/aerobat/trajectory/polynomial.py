@@ -49,6 +49,15 @@ def hermite(left: Array, right: Array) -> Array:
     return np.concatenate([low, high], axis=-2)
 
 
+def restricted(coefficients: Array, start: Array, length: Array) -> Array:
+    """p(start + length s): coefficients (n, K, D) of parts of each polynomial's own [0, 1], (n,) each."""
+    powers = np.arange(coefficients.shape[-2])
+    binomial = np.array([[math.comb(high, low) for high in powers] for low in powers], dtype=float)
+    rising = np.maximum(powers - powers[:, None], 0)
+    shift = binomial * start[:, None, None] ** rising * length[:, None, None] ** powers[:, None]
+    return np.asarray(shift @ coefficients)
+
+
 def gram(degree: int, derivative: int) -> Array:
     """Q with ∫₀¹ (dᵏp/dsᵏ)² ds = cᵀ Q c for the coefficients c of one component, (K, K)."""
     powers = np.arange(degree + 1)

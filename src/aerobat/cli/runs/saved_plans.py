@@ -15,7 +15,7 @@ from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_rows
 from aerobat.interchange.robots import SUFFIXES
 from aerobat.planning import Plan
-from aerobat.problem import EndState, Problem, problem_names
+from aerobat.problem import EndState, Heading, Problem, problem_names
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
 
@@ -74,7 +74,7 @@ def _plan_of_path(path: Path, trajectory: Trajectory, options: PlanningOptions) 
         for end in (0.0, trajectory.duration)
     )
     name = re.sub(r"[^\w .-]|^\W+", "-", path.stem).lstrip(" .-") or MADE_BY
-    problem = Problem(name=name, start=start, goal=goal, heading=trajectory.heading)
+    problem = Problem(name=name, start=start, goal=goal, heading=Heading(trajectory.heading))
     vehicle.require_hover(problem.environment.gravity)
     plan = Plan(problem=problem, trajectory=trajectory, planner=MADE_BY, status="as it is").for_vehicle(
         vehicle

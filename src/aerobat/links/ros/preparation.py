@@ -78,7 +78,7 @@ def _prepared(request: ManeuverRequest) -> Prepared:
 
 def _from_here(request: ManeuverRequest) -> tuple[Problem, Array]:
     """The problem that begins where the vehicle hovers, and where its origin lies in the world [m]."""
-    asked = replace(request.problem, heading=request.yaw)
+    asked = replace(request.problem, heading=replace(request.problem.heading, start=request.yaw))
     if request.in_world:
         return replace(asked, start=at_rest(request.position)), np.zeros(3)
     offset = request.position - asked.start.position

@@ -115,7 +115,7 @@ class Attempts:
         formulation = self.formulation
         assert answer.x is not None
         return Trajectory.from_inputs(
-            formulation.initial, formulation.inputs(answer.x, dt), dt, formulation.problem.heading
+            formulation.initial, formulation.inputs(answer.x, dt), dt, formulation.problem.heading.start
         )
 
     def placed(self, judged: Judged[Placement]) -> tuple[PlacedStage, ...]:

@@ -35,5 +35,5 @@ def flying_lap(task: Task, order: int) -> WarmStart:
     path = path_along_normals(replace(task, problem=open_ends, stages=laps), order)
     first = 1 + len(lap) * (UNROLLED // 2)  # the knot at which the middle lap begins
     segments = slice(first, first + len(lap))
-    middle = Trajectory(path.durations[segments], path.coefficients[segments], problem.heading)
+    middle = Trajectory(path.durations[segments], path.coefficients[segments], problem.heading.start)
     return WarmStart(middle, sequence.stages, tuple(middle.knots[1:-1].tolist()))

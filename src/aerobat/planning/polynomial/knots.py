@@ -100,7 +100,7 @@ def stretched_path(task: Task, order: int) -> Trajectory:
     allowed = -EXCEEDED * float(vehicle.thrust_ranges.max())
 
     def path(steps: int) -> Trajectory:
-        return minimum_effort(fixed, durations * PACE**steps, heading=task.problem.heading)
+        return minimum_effort(fixed, durations * PACE**steps, heading=task.problem.heading.start)
 
     def too_fast(steps: int) -> bool:
         return sampled_margin(path(steps), vehicle, task.environment).margin < allowed

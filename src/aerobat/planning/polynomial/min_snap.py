@@ -219,4 +219,4 @@ class _ClosedForm:
         """The closed form through stages, with the drag of velocities there [m/s], (K - 2, 3)."""
         config, durations = self.planning.config, self.planning.scaled(self.duration)
         fixed = fixed_at_knots(task, config.order, velocities)
-        return minimum_effort(fixed, durations, config.rule, task.problem.heading)
+        return minimum_effort(fixed, durations, config.rule, task.problem.heading.start)

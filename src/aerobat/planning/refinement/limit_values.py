@@ -168,7 +168,8 @@ class LimitValues:
 
     def _axes(self, times: Array, derivatives: Array) -> Array:
         """Body axes in the world, as columns, (m, 3, 3)."""
-        vehicle, environment, heading = self.task.vehicle, self.task.environment, self.task.problem.heading
+        vehicle, environment = self.task.vehicle, self.task.environment
+        heading = self.task.problem.heading.start
         position, velocity, acceleration, jerk, snap = np.moveaxis(derivatives[:, :5], 1, 0)
         if has_unequal_drag(vehicle):
             flat = FlatState(position, velocity, acceleration, jerk, snap)

@@ -145,7 +145,7 @@ class Spline:
     def trajectory(self, x: Array) -> Trajectory:
         """The path of variables (n,)."""
         data, _, _, durations = self._data(x)
-        return Trajectory(durations, TO_COEFFICIENTS @ data, self.task.problem.heading)
+        return Trajectory(durations, TO_COEFFICIENTS @ data, self.task.problem.heading.start)
 
     def derivatives(self, x: Array, places: Array) -> Array:
         """Derivatives of position (S, p, 6, 3) at places, (S, p, 6, 10) or (p, 6, 10) as `basis` has them."""

@@ -42,7 +42,7 @@ class SolvedMotion:
     def trajectory(self) -> Trajectory:
         """The motion's trajectory."""
         elements = self.program.control.elements
-        mesh, heading = self.program.mesh, elements.task.problem.heading
+        mesh, heading = self.program.mesh, elements.task.problem.heading.start
         return trajectory_of(elements.body, mesh, self.motion, heading)
 
     @property

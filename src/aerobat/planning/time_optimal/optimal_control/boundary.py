@@ -74,7 +74,7 @@ class FixedEnds:
             if not end.free_attitude:
                 motion.states[RATES, node] = 0.0
         upright = so3.smallest_rotation(UP, self.start.thrust / np.linalg.norm(self.start.thrust))
-        heading = so3.about_axis(UP, np.array(self.elements.task.problem.heading))
+        heading = so3.about_axis(UP, np.array(self.elements.task.problem.heading.start))
         motion.states[ATTITUDE, 0] = so3.multiply(upright, heading)
         fixed = INPUTS if continuous else 1
         motion.starts[:fixed, 0] = self.start.inputs[:fixed]

@@ -1,0 +1,148 @@
+"""Where the body's x axis points along the way, which is asked beside the path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from enum import StrEnum
+from math import degrees, inf, isclose, radians
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field, PlainValidator, Strict
+
+from aerobat import so3
+from aerobat.arrays import Array, frozen
+from aerobat.declaration import (
+    Angle,
+    FieldError,
+    PartialVector,
+    TiltLimit,
+    declared,
+    from_table,
+    in_degrees,
+    in_radians,
+    number,
+    shown,
+)
+from aerobat.errors import SpecError
+from aerobat.problem.condition import free
+from aerobat.so3 import UP
+from aerobat.states import FlatState
+from aerobat.trajectory import minimum_effort
+
+NEAR = 0.1  # [m] within which a point has no direction to speak of
+SLOW = 0.5  # [m/s] below which a velocity has none
+
+
+class HeadingMode(StrEnum):
+    """What the heading follows."""
+
+    FREE = "free"  # nothing: it is carried along without spin
+    FIXED = "fixed"  # the start's
+    TOWARDS = "towards"  # a point
+    VELOCITY = "along-velocity"
+    SPLINE = "spline"  # angles at fractions of the duration
+
+
+def _rows(value: Any) -> Array:
+    try:
+        rows = frozen(value, "knots_deg")
+    except SpecError:
+        rows = np.empty(0)
+    if rows.ndim != 2 or rows.shape[1] != 2:
+        raise FieldError("", f"must be rows [fraction of the duration, degrees], got {shown(value)}")
+    if not (np.diff(rows[:, 0], prepend=-1e-12, append=1.0 + 1e-12) > 0.0).all():
+        raise FieldError("", f"must have rising fractions from 0 to 1, got {rows[:, 0].tolist()}")
+    return rows
+
+
+Knots = Annotated[
+    Array, PlainValidator(_rows), Field(description="rows of a fraction of the duration and an angle")
+]
+
+
+@declared
+class Heading:
+    """Where the body's x axis points along the way: a turn about the thrust axis beside what tilts it.
+
+    A heading is an angle about the thrust axis from where the smallest rotation from upright would leave the
+    body's x axis. A plan follows it as closely as the rotors allow, and smoothly across where nothing is
+    asked: upside down, beside the point, or without a velocity.
+    """
+
+    start: Angle = 0.0  # [rad] about the thrust axis at the start
+    mode: Annotated[HeadingMode, Strict(False)] = HeadingMode.FREE  # what is followed from there on
+    point: PartialVector = field(default_factory=free)  # [m] world; what `towards` looks at
+    # [-, deg] of `spline`: fractions of the duration, and headings then; it begins with the start's
+    knots_deg: Knots = field(default_factory=lambda: np.zeros((0, 2)))
+    tolerance: TiltLimit = inf  # [rad] that the heading of a plan may be off where it is asked
+
+    SHORTHANDS: ClassVar[Mapping[str, str]] = {
+        "start_deg": "[deg] `start` in degrees",
+        "tolerance_deg": "[deg] `tolerance` in degrees",
+    }
+
+    def __post_init__(self) -> None:
+        """Check."""
+        for name, mode, given in (
+            ("point", HeadingMode.TOWARDS, not np.isnan(self.point).any()),
+            ("knots_deg", HeadingMode.SPLINE, len(self.knots_deg) > 0),
+        ):
+            if given != (self.mode is mode):
+                complaint = f'is for mode = "{mode}"; drop it' if given else f"is missing for {mode}; add it"
+                raise FieldError(name, complaint)
+        knots = self.knots_deg
+        if len(knots) and knots[0, 0] == 0.0 and not isclose(radians(knots[0, 1]), self.start, abs_tol=1e-9):
+            begin = f"begins with {knots[0, 1]:g}°, start_deg is {degrees(self.start):g}"
+            raise FieldError("knots_deg", f"{begin}; give both alike, or leave that row out")
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        """Replace the angles in degrees."""
+        return in_radians(in_radians(table, "start"), "tolerance")
+
+    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write angles in degrees where those say exactly the same."""
+        return in_degrees(in_degrees(table, "start"), "tolerance")
+
+    def asked(self, fractions: Array, flat: FlatState, b3: Array) -> Array:
+        """Where the body's x axis shall point, world, (T, 3), the shorter the less it matters.
+
+        Args:
+            fractions: Of the duration that have passed, (T,).
+            flat: The motion then.
+            b3: The thrust axis then, (T, 3).
+        """
+        upright = (1.0 + b3[:, 2:]) / 2.0
+        if self.mode is HeadingMode.TOWARDS:
+            return upright * _softened(self.point - flat.position, NEAR)
+        if self.mode is HeadingMode.VELOCITY:
+            return upright * _softened(flat.velocity, SLOW)
+        angle = self._angles(fractions)
+        level = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
+        return upright * so3.rotate(so3.smallest_rotation(UP, b3), level)
+
+    def _angles(self, fractions: Array) -> Array:
+        """The headings [rad] of a spline through the knots, which begins and ends at rest."""
+        rows = self.knots_deg[self.knots_deg[:, :1].ravel() > 0.0]
+        if not len(rows):
+            return np.full(len(fractions), self.start)
+        knots = np.append(0.0, rows[:, 0])
+        fixed = np.full((len(knots), 3, 3), np.nan)
+        fixed[:, 0] = np.append(self.start, np.radians(rows[:, 1]))[:, None]
+        fixed[[0, -1], 1:] = 0.0
+        spline = minimum_effort(fixed, np.diff(knots))
+        return spline.evaluate(np.minimum(fractions, knots[-1]))[:, 0]
+
+
+def as_heading(value: Any) -> Heading:
+    """A heading, of itself, of a table, or of the angle [rad] that it begins with."""
+    if isinstance(value, Heading):
+        return value
+    return from_table(Heading, value if isinstance(value, Mapping) else {"start": number(value, "")})
+
+
+def _softened(vectors: Array, small: float) -> Array:
+    """Vectors (T, 3) of length one, less where they are not much longer than `small`."""
+    return np.asarray(vectors / np.sqrt(np.sum(vectors**2, axis=-1, keepdims=True) + small**2))
