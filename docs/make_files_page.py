@@ -40,6 +40,7 @@ from aerobat.problem import (
     Figure,
     Gate,
     GatePassage,
+    Heading,
     Limits,
     Maneuver,
     Problem,
@@ -57,6 +58,7 @@ WRITTEN = "## The files of a run"  # from here on the page is written by hand
 
 PLACES = {  # where each class stands in a file
     EndState: "`[start]` and `[goal]`",
+    Heading: "`[heading]`: where the body's x axis points along the way; [how](how-to/heading.md)",
     Gate: "`[[gates]]`, or `[gate]` for a single one",
     Wall: "`wall` of a gate, an obstacle around its opening; `wall = true` for one of the usual size",
     Limits: "`[limits]`, at the ends of intervals and, planned with a vehicle, between them",
@@ -197,7 +199,7 @@ def page() -> str:
     by_hand = PAGE.read_text(encoding="utf-8").partition(WRITTEN)[2]
     parts = [INTRODUCTION, "## Problem (`aerobat fly problem.toml`)\n", preset("problem", "flip-roll")]
     parts += [table(Problem)]
-    parts += [section(cls) for cls in (EndState, Gate, Wall, Limits, Environment)]
+    parts += [section(cls) for cls in (EndState, Heading, Gate, Wall, Limits, Environment)]
     parts += [OBSTACLE_KINDS, *(kind(name, OBSTACLES[name]) for name in OBSTACLES), section(Tolerance)]
     parts += ["### Maneuvers\n", "`[maneuver]` has a `kind`, and what that kind takes:\n"]
     parts += [kind(name, cls) for name, cls in registered_maneuvers().items() if of_package(cls)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,15 +96,21 @@ def test_a_jump_of_the_yaw_or_of_its_rate_is_no_flight(powers: tuple[float, ...]
     assert ab.certify(replace(path, yaw=yaw), VEHICLE).discontinuities[0].quantity == name
 
 
-def test_a_plan_is_flown_and_kept_with_its_yaw(tmp_path: object) -> None:
+@pytest.mark.parametrize("plant", [None, "mujoco"])
+def test_a_plan_is_flown_with_its_yaw(plant: str | None) -> None:
     plan = shared_plan("half-flip")
     plan = replace(plan, trajectory=turning(plan.trajectory, 2.0))
     assert plan.certified
-    flight = ab.fly(plan)
+    flight = ab.fly(plan, plant=plant)
     asked = ab.reference(plan, times=flight.times).setpoint
     np.testing.assert_array_equal(flight.setpoint.q_world_body, asked.q_world_body)
     assert np.linalg.norm(flight.states.position - asked.flat.position, axis=1).max() < 1e-3
     assert np.rad2deg(so3.angle_between(flight.states.q_world_body, asked.q_world_body)).max() < 0.5
+
+
+def test_files_keep_a_yaw(tmp_path: Path) -> None:
+    plan = shared_plan("half-flip")
+    plan = replace(plan, trajectory=turning(plan.trajectory, 2.0))
     plan.save(f"{tmp_path}/turning.plan")
     assert ab.load_plan(f"{tmp_path}/turning.plan").trajectory == plan.trajectory
     ab.save_trajectory(plan.trajectory, f"{tmp_path}/turning.npz")

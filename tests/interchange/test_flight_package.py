@@ -20,6 +20,7 @@ from aerobat.storage import digest_of
 from flight_package import read_flight_package
 from places import CASES, ROOT
 from shared_plans import shared_plan
+from turning_paths import turning
 
 SCHEMA = ROOT / "docs" / "plan.schema.json"
 EARLIER = CASES / "plans" / "revision-0.plan"  # written before there were revisions
@@ -40,14 +41,14 @@ print(setpoints.position[1].tolist())
 
 @pytest.fixture(scope="module")
 def windy() -> ab.Plan:
-    """A half-flip in wind, with drag and a heading, not what it was planned for."""
+    """A half-flip in wind, with drag, a heading and a yaw, not what it was planned for."""
     plan = shared_plan("half-flip")
     environment = ab.Environment(gravity=9.7, wind=(1.0, -2.0, 0.5))
     return replace(
         plan,
         problem=replace(plan.problem, environment=environment),
         vehicle=replace(plan.vehicle, drag_body=(0.2, 0.2, 0.05)),
-        trajectory=replace(plan.trajectory, heading=0.8),
+        trajectory=turning(replace(plan.trajectory, heading=0.8), 2.0),
     )
 
 

@@ -80,7 +80,7 @@ class ThrustCurve:
         return np.concatenate(found, axis=-1) if found else None
 
     def turns(self, pieces: Subintervals) -> Turns | None:
-        """What the proof has to know of the yaw on pieces, if there is any."""
+        """Magnitudes of any yaw on pieces."""
         values = self.yaw_on(pieces)
         if values is None:
             return None

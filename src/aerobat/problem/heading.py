@@ -1,4 +1,4 @@
-"""Where the body's x axis points along the way, which is asked beside the path."""
+"""Headings that are asked beside a path: directions of the body's x axis along the way."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ Knots = Annotated[
 
 @declared
 class Heading:
-    """Where the body's x axis points along the way: a turn about the thrust axis beside what tilts it.
+    """The direction of the body's x axis along the way, by a turn about the thrust axis.
 
     A heading is an angle about the thrust axis from where the smallest rotation from upright would leave the
     body's x axis. A plan follows it as closely as the rotors allow, and smoothly across where nothing is
@@ -74,7 +74,7 @@ class Heading:
     start: Angle = 0.0  # [rad] about the thrust axis at the start
     mode: Annotated[HeadingMode, Strict(False)] = HeadingMode.FREE  # what is followed from there on
     point: PartialVector = field(default_factory=free)  # [m] world; what `towards` looks at
-    # [-, deg] of `spline`: fractions of the duration, and headings then; it begins with the start's
+    # of `spline`: fractions of the duration, and headings [deg] then; it begins with the start's
     knots_deg: Knots = field(default_factory=lambda: np.zeros((0, 2)))
     tolerance: TiltLimit = inf  # [rad] that the heading of a plan may be off where it is asked
 
@@ -107,7 +107,7 @@ class Heading:
         return in_degrees(in_degrees(table, "start"), "tolerance")
 
     def asked(self, fractions: Array, flat: FlatState, b3: Array) -> Array:
-        """Where the body's x axis shall point, world, (T, 3), the shorter the less it matters.
+        """Directions that the body's x axis shall have, world, (T, 3), the shorter the less they matter.
 
         Args:
             fractions: Of the duration that have passed, (T,).

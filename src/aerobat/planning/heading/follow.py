@@ -78,7 +78,7 @@ def with_heading(plan: Plan, reserve: float) -> Plan:
 
 @dataclass(frozen=True)
 class HeadingError:
-    """How far a plan's heading is off what is asked, where that is asked."""
+    """The distance of a plan's heading from what is asked, where that is asked."""
 
     largest: float  # [rad]
     time: float  # [s] of that
@@ -182,12 +182,12 @@ class _YawProgram:
 
     @cached_property
     def rows(self) -> list[Array]:
-        """What the yaw and its derivatives are at the places, (m, v) each."""
+        """The yaw and its derivatives at the places by the free variables, (m, v) each."""
         return [self.following.spline.rows(PLACES, k) @ self.free for k in range(ORDERS)]
 
     @cached_property
     def fixed(self) -> Array:
-        """What is added to them, (4, m)."""
+        """The part of them that is fixed, (4, m)."""
         return np.array([self.following.spline.rows(PLACES, k) @ self.added for k in range(ORDERS)])
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What a yaw asks of the vehicle at instants of a path, beside the limits that it has to keep."""
+"""Demands of a yaw on the vehicle at instants of a path, beside the limits that it has to keep."""
 
 from __future__ import annotations
 

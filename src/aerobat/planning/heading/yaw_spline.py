@@ -38,7 +38,7 @@ class YawSpline:
 
     @cached_property
     def seconds(self) -> Array:
-        """How long the parts are [s], (n,)."""
+        """Durations of the parts [s], (n,)."""
         return self.parts.seconds(self.path)
 
     @cached_property
@@ -64,7 +64,7 @@ class YawSpline:
         return np.asarray((self.cut_path.knots[:-1, None] + s * self.seconds[:, None]).ravel())
 
     def rows(self, s: Array, derivative: int) -> Array:
-        """What a derivative of the yaw is at these times by all variables, (n k, 3 (n + 1))."""
+        """A derivative of the yaw at these times by all variables, (n k, 3 (n + 1))."""
         count, width = len(self.seconds), 2 * PER_KNOT
         powers = polynomial.differentiate(np.eye(width)[:, :, None], derivative)[:, None]
         values = polynomial.evaluate(powers, s)[..., 0].T  # (k, 6) of the coefficients
