@@ -12,7 +12,7 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.declaration import from_table, to_table
 from aerobat.errors import Infeasible, SpecError
-from aerobat.planning.heading import heading_error, with_heading
+from aerobat.planning.heading.follow import heading_error, with_heading
 from aerobat.planning.heading.yaw_spline import YawSpline
 from aerobat.trajectory import Trajectory
 from shared_plans import shared_plan
@@ -87,7 +87,7 @@ def test_a_lap_that_follows_its_velocity_closes() -> None:
 
 def test_a_tolerance_that_is_not_kept_is_refused_in_a_sentence() -> None:
     with pytest.raises(Infeasible, match=r"off what is asked at .* s, more than heading\.tolerance_deg = 5"):
-        following("line", mode="towards", point=(5.0, 5.0, 0.0), tolerance=np.deg2rad(5.0))
+        following("line", mode="towards", point=(5.0, 5.0, 0.0), tolerance_deg=5.0)
 
 
 def test_without_a_vehicle_no_heading_is_followed() -> None:
@@ -99,9 +99,9 @@ def test_without_a_vehicle_no_heading_is_followed() -> None:
     "heading",
     [
         {"mode": "towards", "point": [1.0, 2.0, 3.0]},
-        {"mode": "spline", "knots_deg": [[0.0, 30.0], [1.0, 90.0]], "start_deg": 30.0},
+        {"mode": "spline", "knots_deg": [[0.0, 30.0], [1.0, 90.0]], "start": np.pi / 6},
         {"mode": "fixed", "tolerance_deg": 5.0},
-        {"start_deg": 20.0},
+        {"start": 1.0},
     ],
 )
 def test_a_problem_with_a_heading_is_its_table(heading: dict[str, Any]) -> None:
@@ -117,7 +117,7 @@ def test_a_problem_with_a_heading_is_its_table(heading: dict[str, Any]) -> None:
         ({"point": [1.0, 2.0, 3.0]}, r'heading\.point is for mode = "towards"; drop it'),
         ({"mode": "spline", "knots_deg": [[0.5, 1.0], [0.2, 3.0]]}, "rising fractions from 0 to 1"),
         ({"mode": "spline", "knots_deg": [1.0]}, "must be rows"),
-        ({"mode": "spline", "knots_deg": [[0.0, 10.0]]}, "begins with 10°, start_deg is 0"),
+        ({"mode": "spline", "knots_deg": [[0.0, 10.0]]}, "begins with 10°, heading_deg is 0"),
     ],
 )
 def test_a_heading_that_makes_no_sense_is_refused(wrong: dict[str, Any], sentence: str) -> None:

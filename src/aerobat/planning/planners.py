@@ -20,7 +20,7 @@ from aerobat.declaration import Label, Registry, placed, shown, suggest_for, val
 from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.courses import is_course, on_open_courses
-from aerobat.planning.heading import with_heading
+from aerobat.planning.heading.follow import with_heading
 from aerobat.planning.holds import between_holds
 from aerobat.planning.passages import require_clear_ends, require_openings
 from aerobat.planning.recorder import Progress

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import field
 from enum import StrEnum
 from math import degrees, inf, isclose, radians
-from typing import Annotated, Any, ClassVar
+from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field, PlainValidator, Strict
 
 from aerobat import so3
@@ -16,12 +17,10 @@ from aerobat.arrays import Array, frozen
 from aerobat.declaration import (
     Angle,
     FieldError,
+    Limit,
     PartialVector,
-    TiltLimit,
     declared,
     from_table,
-    in_degrees,
-    in_radians,
     number,
     shown,
 )
@@ -36,7 +35,7 @@ SLOW = 0.5  # [m/s] below which a velocity has none
 
 
 class HeadingMode(StrEnum):
-    """What the heading follows."""
+    """Modes of a heading, by what it follows."""
 
     FREE = "free"  # nothing: it is carried along without spin
     FIXED = "fixed"  # the start's
@@ -45,7 +44,7 @@ class HeadingMode(StrEnum):
     SPLINE = "spline"  # angles at fractions of the duration
 
 
-def _rows(value: Any) -> Array:
+def _rows(value: ArrayLike) -> Array:
     try:
         rows = frozen(value, "knots_deg")
     except SpecError:
@@ -76,12 +75,7 @@ class Heading:
     point: PartialVector = field(default_factory=free)  # [m] world; what `towards` looks at
     # of `spline`: fractions of the duration, and headings [deg] then; it begins with the start's
     knots_deg: Knots = field(default_factory=lambda: np.zeros((0, 2)))
-    tolerance: TiltLimit = inf  # [rad] that the heading of a plan may be off where it is asked
-
-    SHORTHANDS: ClassVar[Mapping[str, str]] = {
-        "start_deg": "[deg] `start` in degrees",
-        "tolerance_deg": "[deg] `tolerance` in degrees",
-    }
+    tolerance_deg: Limit = inf  # [deg] that the heading of a plan may be off where it is asked
 
     def __post_init__(self) -> None:
         """Check."""
@@ -94,17 +88,8 @@ class Heading:
                 raise FieldError(name, complaint)
         knots = self.knots_deg
         if len(knots) and knots[0, 0] == 0.0 and not isclose(radians(knots[0, 1]), self.start, abs_tol=1e-9):
-            begin = f"begins with {knots[0, 1]:g}°, start_deg is {degrees(self.start):g}"
+            begin = f"begins with {knots[0, 1]:g}°, heading_deg is {degrees(self.start):g}"
             raise FieldError("knots_deg", f"{begin}; give both alike, or leave that row out")
-
-    @classmethod
-    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace the angles in degrees."""
-        return in_radians(in_radians(table, "start"), "tolerance")
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write angles in degrees where those say exactly the same."""
-        return in_degrees(in_degrees(table, "start"), "tolerance")
 
     def asked(self, fractions: Array, flat: FlatState, b3: Array) -> Array:
         """Directions that the body's x axis shall have, world, (T, 3), the shorter the less they matter.
@@ -136,7 +121,7 @@ class Heading:
         return spline.evaluate(np.minimum(fractions, knots[-1]))[:, 0]
 
 
-def as_heading(value: Any) -> Heading:
+def as_heading(value: object) -> Heading:
     """A heading, of itself, of a table, or of the angle [rad] that it begins with."""
     if isinstance(value, Heading):
         return value

@@ -185,8 +185,8 @@ class Problem:
             angle = {"start": in_radians({"heading_deg": table.pop("heading_deg")}, "heading")["heading"]}
             if "heading" in table and not isinstance(table["heading"], Mapping):
                 raise SpecError("heading and heading_deg are both given; give one of them")
-            if {"start", "start_deg"} & table.get("heading", {}).keys():
-                raise FieldError("heading_deg", "stands beside heading's own start; drop either")
+            if "start" in table.get("heading", {}):
+                raise FieldError("heading_deg", "stands beside heading.start; drop either")
             table["heading"] = angle | table.get("heading", {})
         return table
 
@@ -194,9 +194,10 @@ class Problem:
         """Write the heading in degrees where those say exactly the same; what is short comes first."""
         table.setdefault("maneuver", to_table(self.maneuver))
         heading = table.get("heading", {})
-        if set(heading) == {"start_deg"}:
-            del table["heading"]
-            return {"heading_deg": heading["start_deg"]} | table
+        angle = in_degrees({"heading": heading["start"]}, "heading") if "start" in heading else {}
+        if "heading_deg" in angle:
+            del heading["start"]
+            return angle | {key: value for key, value in table.items() if key != "heading" or value}
         return table
 
     def _check_given_ends(self, sequence: StageSequence) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.planning import Assessment, Attempt, Flyability, Plan, Tube
 from aerobat.planning.flyability import FlownPassage
-from aerobat.planning.heading import heading_error
+from aerobat.planning.heading.follow import heading_error
 from aerobat.planning.time_limit import best_by_limit
 from aerobat.reporting.facts import REPORT, WARNING, Fact, Facts, facts, fields_of, kept, picture, said
 from aerobat.simulation.autopilot import Recoveries

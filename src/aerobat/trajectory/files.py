@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array
 from aerobat.declaration import PathName, validated
@@ -25,7 +25,7 @@ def save_trajectory(trajectory: Trajectory | Carrier, path: PathName) -> None:
     It is written whole or not at all. Raises SpecError when the file cannot be written.
     """
     trajectory = as_trajectory(trajectory)
-    content: dict[str, Any] = {
+    content: dict[str, ArrayLike] = {
         "format": _WITHOUT_YAW if trajectory.yaw is None else _FORMAT,
         "durations": trajectory.durations,
         "coefficients": trajectory.coefficients,
@@ -33,7 +33,7 @@ def save_trajectory(trajectory: Trajectory | Carrier, path: PathName) -> None:
         **({} if trajectory.yaw is None else {"yaw": trajectory.yaw}),
     }
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, **content)
+        np.savez(file, allow_pickle=False, **content)
 
 
 @validated

@@ -64,11 +64,11 @@ def with_heading(plan: Plan, reserve: float) -> Plan:
         sentence = f"no turn is proven that follows the heading: {why}; leave more with --reserve"
         raise Infeasible(Reason(sentence, ("heading", "reserve")))
     error = heading_error(found)
-    if error is not None and error.largest > heading.tolerance:
+    if error is not None and degrees(error.largest) > heading.tolerance_deg:
         raise Infeasible(
             Reason(
                 f"the heading is {degrees(error.largest):.3g}° off what is asked at {error.time:.2f} s, more "
-                f"than heading.tolerance_deg = {degrees(heading.tolerance):.3g}; allow more, start nearer to "
+                f"than heading.tolerance_deg = {heading.tolerance_deg:g}; allow more, start nearer to "
                 "it (heading_deg), or leave the rotors more with --reserve",
                 ("heading.tolerance_deg", "heading_deg", "reserve"),
             )
