@@ -86,7 +86,7 @@ class MavlinkOptions(MissionOptions, RunOptions):
         float | None, Parameter(group=linking, validator=validators.Number(gt=0, lt=1))
     ] = None
     """The part of its thrust at which the vehicle hovers, by which thrusts are scaled. Default: what it says,
-    its parameter MPC_THR_HOVER."""
+    by PX4's parameter MPC_THR_HOVER or ArduPilot's MOT_THST_HOVER."""
 
     vehicle: Annotated[str | None, Parameter(group=linking)] = None
     """The name of the vehicle that is there. A plan that is certified for another one is refused."""
@@ -108,6 +108,9 @@ class MavlinkOptions(MissionOptions, RunOptions):
 @dataclass(frozen=True, kw_only=True)
 class MavlinkVehicleOptions(EndOptions):
     """Options of a simulated vehicle that speaks MAVLink."""
+
+    dialect: Annotated[Literal["px4", "ardupilot"], Parameter(group=linking)] = "px4"
+    """The autopilot that clients take it for."""
 
     listen: Annotated[str, Parameter(group=linking)] = "udp:127.0.0.1:14540"
     """The address of the vehicle: udp:HOST:PORT waits there, udpout:HOST:PORT sends there first, as PX4
