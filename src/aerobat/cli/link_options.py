@@ -59,7 +59,7 @@ class RosNodeOptions(EndOptions):
     """The generation of ROS."""
 
     goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
-    """The topic of goals."""
+    """The topic of goals; or, as crazyswarm2:/cf231, a Crazyflie of crazyswarm2's server to stand in for."""
 
     odometry: Annotated[str, Parameter(group=linking)] = "/aerobat/odometry"
     """The topic of the vehicle's state."""
@@ -148,7 +148,11 @@ class RosOptions(MissionOptions, RosNodeOptions):
 
     goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
     """The topic of goals; or a Betaflight board that is flown by rates and thrust instead, its receiver's
-    protocol and its line, as msp:/dev/ttyACM0, crsf:/dev/ttyUSB0 or msp:socket://HOST:PORT."""
+    protocol and its line, as msp:/dev/ttyACM0, crsf:/dev/ttyUSB0 or msp:socket://HOST:PORT; or a Crazyflie of
+    crazyswarm2's server, as crazyswarm2:/cf231, whose odometry is /cf231/odom."""
+
+    onboard: Annotated[bool, Parameter(group=linking, negative="")] = False
+    """Plans are uploaded to a Crazyflie and flown by itself, rather than streamed to it."""
 
     rate: Annotated[float, Parameter(group=linking, validator=validators.Number(gte=50, lte=250))] = 100.0
     """Goals a second."""

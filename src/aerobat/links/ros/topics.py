@@ -90,12 +90,12 @@ def _joints(goal: PathGoal) -> tuple[JointMotion, JointMotion]:
 
 def _read_point(point: Any) -> PathGoal:
     twists = [
-        (_vector(found[0].linear), _vector(found[0].angular)) if found else (_ZERO, _ZERO)
+        (vector(found[0].linear), vector(found[0].angular)) if found else (_ZERO, _ZERO)
         for found in (point.velocities, point.accelerations)
     ]
     (velocity, omega), (acceleration, omega_dot) = twists
-    jerk = _vector(point.accelerations[1].linear) if len(point.accelerations) > 1 else _ZERO
-    place, q = _vector(point.transforms[0].translation), _quaternion(point.transforms[0].rotation)
+    jerk = vector(point.accelerations[1].linear) if len(point.accelerations) > 1 else _ZERO
+    place, q = vector(point.transforms[0].translation), quaternion(point.transforms[0].rotation)
     return PathGoal(place, velocity, acceleration, jerk, q, omega, omega_dot)
 
 
@@ -103,9 +103,11 @@ def _norm(goal: PathGoal) -> float:
     return float(np.linalg.norm(goal.q_world_body))
 
 
-def _vector(message: Any) -> Array:
+def vector(message: Any) -> Array:
+    """A Vector3 or a Point of either ROS, (3,)."""
     return np.array([message.x, message.y, message.z])
 
 
-def _quaternion(message: Any) -> Array:
+def quaternion(message: Any) -> Array:
+    """A Quaternion of either ROS, (w, x, y, z)."""
     return np.array([message.w, message.x, message.y, message.z])
