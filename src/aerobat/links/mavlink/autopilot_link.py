@@ -11,7 +11,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.links.goals import AttitudeGoal, Mode, Observed, PositionGoal, observed
-from aerobat.links.mavlink.connection import Connection, dialect
+from aerobat.links.mavlink.connection import Connection, MavlinkMessage, dialect
 from aerobat.links.mavlink.dialects import ARMED, CUSTOM_MODE_ENABLED, PX4, Dialect, dialect_of
 from aerobat.links.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
 
@@ -56,7 +56,7 @@ class AutopilotLink:
         self.dialect: Dialect = PX4  # once it is known, the autopilot's
         self.parameters: dict[str, float] = {}
         self.complaints: dict[str, None] = {}  # what ails it, each once
-        self._attitude: Any = None  # the last message of it
+        self._attitude: MavlinkMessage = None  # the last message of it
         self.told: list[str] = []  # sentences for whoever listens, who empties it
         self._left_out: set[str] = set()  # why states were, each told once
 
@@ -147,7 +147,7 @@ class AutopilotLink:
             nan,
         )
 
-    def _is_ours(self, message: Any) -> bool:
+    def _is_ours(self, message: MavlinkMessage) -> bool:
         """True for messages of the autopilot: the one that is wanted, or the first that is heard."""
         if message.get_srcComponent() != _AUTOPILOT:
             return False
@@ -168,12 +168,12 @@ class AutopilotLink:
     def _send(self, name: str, *fields: Any) -> None:
         self._connection.send(getattr(self._mavlink, f"MAVLink_{name}_message")(*fields))
 
-    def _take_heartbeat(self, message: Any) -> None:
+    def _take_heartbeat(self, message: MavlinkMessage) -> None:
         self.mode = self.dialect.mode_of(message.custom_mode)
         self.armed = bool(message.base_mode & ARMED)
         self.beat = self._now
 
-    def _take_extended_sys_state(self, message: Any) -> None:
+    def _take_extended_sys_state(self, message: MavlinkMessage) -> None:
         self.landed = message.landed_state == 1
 
     def _ask_time(self) -> None:
@@ -182,25 +182,25 @@ class AutopilotLink:
         self._asked = dict([*self._asked.items(), (question, self._now)][-_SYNCHRONIZATIONS:])
         self._send("timesync", 0, question)
 
-    def _take_timesync(self, message: Any) -> None:
+    def _take_timesync(self, message: MavlinkMessage) -> None:
         """Take the answer to a question of ours; those to other clients come here too."""
         sent = self._asked.pop(message.ts1, None)
         if sent is not None and message.tc1 > 0:
             self._times.append((self._now - sent, 1e-9 * message.tc1 - 0.5 * (self._now + sent)))
 
-    def _take_param_value(self, message: Any) -> None:
+    def _take_param_value(self, message: MavlinkMessage) -> None:
         if isfinite(message.param_value):
             self.parameters[str(message.param_id)] = float(message.param_value)
 
-    def _take_statustext(self, message: Any) -> None:
+    def _take_statustext(self, message: MavlinkMessage) -> None:
         self.told.append(f"the vehicle: {message.text}")
         if message.severity <= _WARNING:
             self.complaints[str(message.text)] = None
 
-    def _take_attitude_quaternion(self, message: Any) -> None:
+    def _take_attitude_quaternion(self, message: MavlinkMessage) -> None:
         self._attitude = message
 
-    def _state(self, message: Any) -> list[Observed]:
+    def _state(self, message: MavlinkMessage) -> list[Observed]:
         """Return a state by our clock, if it is newer than the last and can be one.
 
         Nothing is returned before the vehicle's clock is known. Where a message takes longer one way than the
@@ -233,7 +233,7 @@ class AutopilotLink:
             self.told.append(f"states are left out that are {reason}")
 
 
-def _of_odometry(message: Any, offset: float) -> Observed | None:
+def _of_odometry(message: MavlinkMessage, offset: float) -> Observed | None:
     """A state that one message tells, by a clock that is behind the vehicle's by so much [s]."""
     return observed(
         1e-6 * message.time_usec - offset,
@@ -244,12 +244,14 @@ def _of_odometry(message: Any, offset: float) -> Observed | None:
     )
 
 
-def _apart(position: Any, attitude: Any) -> float:
+def _apart(position: MavlinkMessage, attitude: MavlinkMessage) -> float:
     """The time from an attitude to a position [s]."""
     return 1e-3 * float(position.time_boot_ms - attitude.time_boot_ms)
 
 
-def _of_position(position: Any, attitude: Any, age: float, offset: float) -> Observed | None:
+def _of_position(
+    position: MavlinkMessage, attitude: MavlinkMessage, age: float, offset: float
+) -> Observed | None:
     """A state that two messages tell: the attitude turns on by its rates to when the position was so."""
     rates = swap_body((attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed))
     told = np.array(swap_attitude((attitude.q1, attitude.q2, attitude.q3, attitude.q4)))

@@ -12,7 +12,7 @@ CUSTOM_MODE_ENABLED = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 
 
-class Setting(NamedTuple):
+class RequiredBits(NamedTuple):
     """Bits of a parameter without which no set-point is flown as it is meant."""
 
     mask: int
@@ -31,7 +31,7 @@ class Dialect:
     hover_thrust: str  # the parameter by whose value thrusts are scaled: the part at which it hovers
     silence: str  # the parameter of the time [s] after which a silent client is taken for lost
     states: Mapping[str, int]  # messages to be asked for, and every how many states each is needed
-    settings: Mapping[str, Setting]  # parameters that have to have a value
+    settings: Mapping[str, RequiredBits]  # parameters that have to have a value
     leads_off: bool  # whether set-points lead it off the ground; else an order to take off does
     refused: int  # MAV_RESULT of an order that is not obeyed
     refusal: str  # how its sentences on a refused arming begin
@@ -68,8 +68,10 @@ ARDUPILOT = Dialect(
     silence="GUID_TIMEOUT",
     states={"LOCAL_POSITION_NED": 1, "ATTITUDE_QUATERNION": 1, "EXTENDED_SYS_STATE": 20},
     settings={
-        "GUID_OPTIONS": Setting(8, 8, "thrusts are taken for climb rates"),
-        "ATC_ANGLE_BOOST": Setting(1, 0, "thrust is changed with the tilt, and none is left upside down"),
+        "GUID_OPTIONS": RequiredBits(8, 8, "thrusts are taken for climb rates"),
+        "ATC_ANGLE_BOOST": RequiredBits(
+            1, 0, "thrust is changed with the tilt, and none is left upside down"
+        ),
     },
     leads_off=False,
     refused=4,  # failed

@@ -11,7 +11,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.links.autopilot.vehicle import POINT_TIMEOUT, SimulatedVehicle
 from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
-from aerobat.links.mavlink.connection import Connection, dialect
+from aerobat.links.mavlink.connection import Connection, MavlinkMessage, dialect
 from aerobat.links.mavlink.dialects import ARMED, CUSTOM_MODE_ENABLED, PX4, Dialect
 from aerobat.links.mavlink.frames import (
     from_global,
@@ -50,7 +50,7 @@ class FrontEnd:
             self.dialect.silence: POINT_TIMEOUT,
             **{name: float(setting.bits) for name, setting in self.dialect.settings.items()},
         }
-        self._streams: dict[int, tuple[Callable[[], Any], float]] = {
+        self._streams: dict[int, tuple[Callable[[], MavlinkMessage], float]] = {
             message.id: (make, interval)
             for message, make, interval in (
                 (self._mavlink.MAVLink_heartbeat_message, self._heartbeat, 0.5),
@@ -100,7 +100,7 @@ class FrontEnd:
     def _microseconds(self) -> int:
         return round(1e6 * (self.vehicle.time - self._began))
 
-    def _heartbeat(self) -> Any:
+    def _heartbeat(self) -> MavlinkMessage:
         armed = ARMED if self.vehicle.armed else 0
         state = 4 if self.vehicle.armed else 3  # active, or on standby
         kinds = {4: 2, 6: 13, 8: 14}  # quadrotor, hexarotor, octorotor
@@ -120,33 +120,33 @@ class FrontEnd:
         guided = self._guided and self.vehicle.mode in (Mode.HOLD, Mode.TAKEOFF)
         return Mode.OFFBOARD if guided else self.vehicle.mode
 
-    def _sys_status(self) -> Any:
+    def _sys_status(self) -> MavlinkMessage:
         sensors = 0x2F | 0x0C00 | 1 << 28  # gyro, accelerometer, magnetometer, GPS, control, may be armed
         return self._mavlink.MAVLink_sys_status_message(
             sensors, sensors, sensors, 100, 16000, -1, 100, 0, 0, 0, 0, 0, 0
         )
 
-    def _extended_state(self) -> Any:
+    def _extended_state(self) -> MavlinkMessage:
         landed = 1 if self.vehicle.landed else {Mode.TAKEOFF: 3, Mode.LAND: 4}.get(self.vehicle.mode, 2)
         return self._mavlink.MAVLink_extended_sys_state_message(0, landed)
 
-    def _home(self) -> Any:
+    def _home(self) -> MavlinkMessage:
         latitude, longitude, altitude = to_global((0.0, 0.0, 0.0))
         return self._mavlink.MAVLink_home_position_message(
             latitude, longitude, round(1e3 * altitude), 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
         )
 
-    def _gps(self) -> Any:
+    def _gps(self) -> MavlinkMessage:
         latitude, longitude, altitude = to_global(self._position)
         return self._mavlink.MAVLink_gps_raw_int_message(
             self._microseconds, 3, latitude, longitude, round(1e3 * altitude), 100, 100, 0, 0, 12
         )
 
-    def _local_position(self) -> Any:
+    def _local_position(self) -> MavlinkMessage:
         place, velocity = swap_world(self._position), swap_world(self._velocity)
         return self._mavlink.MAVLink_local_position_ned_message(self._milliseconds, *place, *velocity)
 
-    def _attitude(self) -> Any:
+    def _attitude(self) -> MavlinkMessage:
         state = self.vehicle.state
         q, rates = (
             swap_attitude(tuple(state.q_world_body.tolist())),
@@ -154,7 +154,7 @@ class FrontEnd:
         )
         return self._mavlink.MAVLink_attitude_quaternion_message(self._milliseconds, *q, *rates)
 
-    def _global_position(self) -> Any:
+    def _global_position(self) -> MavlinkMessage:
         latitude, longitude, altitude = to_global(self._position)
         velocity = (round(100 * v) for v in swap_world(self._velocity))
         heights = round(1e3 * altitude), round(1e3 * self._position[2])
@@ -162,7 +162,7 @@ class FrontEnd:
             self._milliseconds, latitude, longitude, *heights, *velocity, self._heading
         )
 
-    def _odometry(self) -> Any:
+    def _odometry(self) -> MavlinkMessage:
         state = self.vehicle.state
         velocity = so3.unrotate(state.q_world_body, state.velocity)
         unknown = (nan, *(0.0,) * 20)
@@ -195,18 +195,18 @@ class FrontEnd:
 
     # what is taken
 
-    def _take_timesync(self, message: Any) -> None:
+    def _take_timesync(self, message: MavlinkMessage) -> None:
         if message.tc1 == 0:
             self._send("timesync", round(1e9 * (self.vehicle.time - self._began)), message.ts1)
 
-    def _take_param_request_read(self, message: Any) -> None:
+    def _take_param_request_read(self, message: MavlinkMessage) -> None:
         self._give_parameter(str(message.param_id))
 
-    def _take_param_request_list(self, message: Any) -> None:
+    def _take_param_request_list(self, message: MavlinkMessage) -> None:
         for name in self.parameters:
             self._give_parameter(name)
 
-    def _take_param_set(self, message: Any) -> None:
+    def _take_param_set(self, message: MavlinkMessage) -> None:
         if message.param_id == _TAKEOFF_HEIGHT and 0.5 <= message.param_value <= 100.0:
             self.parameters[message.param_id] = float(message.param_value)
         self._give_parameter(str(message.param_id))
@@ -216,13 +216,13 @@ class FrontEnd:
             index = list(self.parameters).index(name)
             self._send("param_value", name.encode(), self.parameters[name], 9, len(self.parameters), index)
 
-    def _take_command_long(self, message: Any) -> None:
+    def _take_command_long(self, message: MavlinkMessage) -> None:
         self._obey(message, (1e7 * message.param5, 1e7 * message.param6, message.param7))
 
-    def _take_command_int(self, message: Any) -> None:
+    def _take_command_int(self, message: MavlinkMessage) -> None:
         self._obey(message, (message.x, message.y, message.z))
 
-    def _obey(self, message: Any, place: tuple[float, float, float]) -> None:
+    def _obey(self, message: MavlinkMessage, place: tuple[float, float, float]) -> None:
         """Do what a command says, and acknowledge it: accepted, denied, or not known.
 
         `place`: latitude and longitude [1e-7 °] and altitude [m].
@@ -309,7 +309,7 @@ class FrontEnd:
         self._connection.send(self._streams[identity][0]())
         return True
 
-    def _take_set_position_target_local_ned(self, message: Any) -> None:
+    def _take_set_position_target_local_ned(self, message: MavlinkMessage) -> None:
         """A point with its velocity and acceleration; of velocity alone, from where the vehicle is."""
         mask = message.type_mask
         state = self.vehicle.state
@@ -327,7 +327,7 @@ class FrontEnd:
             self.vehicle.follow_point(PositionGoal(position, velocity, acceleration, yaw))
             self._obey_set_points(not self.vehicle.landed)
 
-    def _take_set_attitude_target(self, message: Any) -> None:
+    def _take_set_attitude_target(self, message: MavlinkMessage) -> None:
         """An attitude with its rates and thrust; without the attitude it is not followed."""
         if message.type_mask & _IGNORED_ATTITUDE:
             return

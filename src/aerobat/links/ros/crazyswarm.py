@@ -13,7 +13,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.interchange.exports.crazyflie import AXES
-from aerobat.interchange.ros import NANOSECONDS, Messages
+from aerobat.interchange.ros import NANOSECONDS, Messages, RosMessage
 from aerobat.links.commander import Doing
 from aerobat.links.goals import PathPiece
 from aerobat.links.ros.maneuver_node import Tick
@@ -42,7 +42,7 @@ class Ros2(Middleware, Protocol):
     def client(self, service: str, kind: str) -> Callable[..., None]:
         """What asks a service that is there, by its request's fields; its answer is not waited for."""
 
-    def serve(self, service: str, kind: str, take: Callable[[Any], None]) -> None:
+    def serve(self, service: str, kind: str, take: Callable[[RosMessage], None]) -> None:
         """Offer a service whose answer is empty."""
 
 
@@ -115,7 +115,7 @@ class Crazyflie:
         ]
         self._ask["upload_trajectory"](trajectory_id=_TRAJECTORY, piece_offset=0, pieces=pieces)
 
-    def _full_state(self, piece: PathPiece, stamp: int) -> Any:
+    def _full_state(self, piece: PathPiece, stamp: int) -> RosMessage:
         """The goal that begins; body rates are in the body's axes there."""
         goal = piece.begin
         omega_body = so3.unrotate(goal.q_world_body, np.asarray(goal.omega))
@@ -127,5 +127,5 @@ class Crazyflie:
             acc=self._messages.vector("Vector3", goal.acceleration),
         )
 
-    def _duration(self, seconds: float) -> Any:
+    def _duration(self, seconds: float) -> RosMessage:
         return self._messages.time("Duration", round(seconds * NANOSECONDS))

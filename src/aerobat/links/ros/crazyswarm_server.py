@@ -14,7 +14,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.interchange.exports.crazyflie import AXES, PIECE, as_path
-from aerobat.interchange.ros import NANOSECONDS
+from aerobat.interchange.ros import NANOSECONDS, RosMessage
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.goals import Mode, PathGoal, PathPiece
 from aerobat.links.path_follower import PathForwarder
@@ -35,7 +35,7 @@ class CrazyswarmServer(VehicleNode):
     def __init__(self, ros: Ros2, vehicle: SimulatedVehicle, name: str, **settings: Any) -> None:
         """Offer the services of a name, as in /cf231; see `VehicleNode` for the settings."""
         super().__init__(ros, vehicle, goal=f"{name}/goal", odometry=f"{name}/odom", **settings)
-        self._trajectories: dict[int, list[Any]] = {}
+        self._trajectories: dict[int, list[RosMessage]] = {}
         self._flown: tuple[SetpointStream, float] | None = None  # and when it began [s]
         nowhere = PathGoal(_ZERO, _ZERO, _ZERO, _ZERO, so3.IDENTITY, _ZERO, _ZERO)
         self._last = nowhere, -np.inf  # the last full state, and its stamp [s]
@@ -63,7 +63,7 @@ class CrazyswarmServer(VehicleNode):
             if self.vehicle.mode is not Mode.OFFBOARD:
                 self.vehicle.go_offboard()
 
-    def _take_full_state(self, message: Any) -> None:
+    def _take_full_state(self, message: RosMessage) -> None:
         self._flown = None
         pose, twist = message.pose, message.twist
         q = topics.quaternion(pose.orientation)
@@ -86,28 +86,28 @@ class CrazyswarmServer(VehicleNode):
         jerk, turning = goal.acceleration - before.acceleration, goal.omega - before.omega
         return goal._replace(jerk=jerk / elapsed, omega_dot=turning / elapsed)
 
-    def _takeoff(self, request: Any) -> None:
+    def _takeoff(self, request: RosMessage) -> None:
         self.vehicle.arm()
         self.vehicle.take_off(request.height - self.vehicle.state.position[2])
 
-    def _land(self, request: Any) -> None:
+    def _land(self, request: RosMessage) -> None:
         self._flown = None
         self.vehicle.land()
 
-    def _go_to(self, request: Any) -> None:
+    def _go_to(self, request: RosMessage) -> None:
         self._flown = None
         here = self.vehicle.state.position if request.relative else _ZERO
         self.vehicle.go_to(here + topics.vector(request.goal), None if request.relative else request.yaw)
 
-    def _notify_setpoints_stop(self, request: Any) -> None:
+    def _notify_setpoints_stop(self, request: RosMessage) -> None:
         if self.vehicle.mode is Mode.OFFBOARD and self._flown is None:
             self.vehicle.hold()
 
-    def _upload_trajectory(self, request: Any) -> None:
+    def _upload_trajectory(self, request: RosMessage) -> None:
         known = self._trajectories.setdefault(request.trajectory_id, [])
         known[request.piece_offset :] = request.pieces
 
-    def _start_trajectory(self, request: Any) -> None:
+    def _start_trajectory(self, request: RosMessage) -> None:
         uploaded = self._trajectories.get(request.trajectory_id, [])
         if not uploaded or request.timescale != 1.0 or request.reversed:
             self._say("trajectories are flown once uploaded, forwards, in their own time; none begins")

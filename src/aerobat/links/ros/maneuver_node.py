@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
-from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages
+from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, RosMessage
 from aerobat.links.commander import Commander, Doing
 from aerobat.links.goals import Observed, PathGoal, PathPiece, yaw_of
 from aerobat.links.mission import Mission, MissionSettings, Phase
@@ -159,7 +159,7 @@ class ManeuverNode:
             self._say(sentence)
             self._send_report(self._messages.make(topics.KIND_OF_REPORT, data=sentence))
 
-    def _take_odometry(self, message: Any) -> None:
+    def _take_odometry(self, message: RosMessage) -> None:
         """Take a state, unless it cannot be one."""
         seen = topics.read_odometry(message, self.origin)
         if seen is None:
