@@ -9,7 +9,7 @@ import socket
 import struct
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ import pytest
 import aerobat as ab
 from aerobat.links.mavlink import connection
 from aerobat.links.mavlink.connection import LossyConnection, dialect
+from aerobat.links.mavlink.dialects import DIALECTS
 from command_lines import run
 from mavlink_sky import SteppedClock, Wire, flip
 from places import SUPPORT
@@ -68,13 +69,14 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.process
-def test_two_processes_fly_the_flip_through_its_gate_over_udp(plan: Path) -> None:
+@pytest.mark.parametrize("name", DIALECTS)
+def test_two_processes_fly_the_flip_through_its_gate_over_udp(name: str, plan: Path) -> None:
     """With 1 % of the messages lost and 20 ms of delay, either way.
 
     A machine that does not keep up gives a flight up, and lands: then it is flown again, slower.
     """
     for speed in SPEEDS:
-        report, said = flown(plan, speed)
+        report, said = flown(plan, speed, name)
         assert report["ended"] == "landed", said
         if not report["aborted"]:
             break
@@ -86,9 +88,11 @@ def test_two_processes_fly_the_flip_through_its_gate_over_udp(plan: Path) -> Non
     assert gate["clearance"] > 0.0
 
 
-def flown(plan: Path, speed: str) -> tuple[dict[str, Any], str]:
+def flown(plan: Path, speed: str, name: str) -> tuple[dict[str, Any], str]:
     """What came of a flight in two processes, and what was said of it."""
-    with simulated_vehicle("--loss", "0.01", "--delay", "0.02", "--speed", speed) as address:
+    with simulated_vehicle(
+        "--loss", "0.01", "--delay", "0.02", "--speed", speed, "--dialect", name
+    ) as address:
         command = [
             sys.executable,
             "-m",
@@ -118,6 +122,36 @@ def test_mavsdk_takes_off_goes_somewhere_flies_offboard_and_lands() -> None:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     words = [line for line in done.stdout.splitlines() if "[" not in line]
     assert words == ["took off", "went there", "flew offboard", "landed"], done.stderr
+
+
+@pytest.mark.peer
+@pytest.mark.process
+def test_pymavlinks_own_client_takes_the_vehicle_for_a_copter_and_flies_it() -> None:
+    """Its table of modes follows from the heartbeat."""
+    from pymavlink import mavutil
+
+    def heard(kind: str, is_so: Callable[[Any], bool]) -> None:
+        for _ in range(300):
+            message = copter.recv_match(type=kind, blocking=True, timeout=2.0)
+            assert message is not None
+            if is_so(message):
+                return
+        raise AssertionError(kind)
+
+    with simulated_vehicle("--speed", "3", "--dialect", "ardupilot") as address:
+        copter = mavutil.mavlink_connection(address.replace("udp:", "udpout:"), dialect="common")
+        copter.mav.heartbeat_send(6, 8, 0, 0, 4)
+        copter.wait_heartbeat()
+        copter.set_mode("GUIDED")
+        heard("HEARTBEAT", lambda _: copter.flightmode == "GUIDED")
+        copter.arducopter_arm()
+        copter.motors_armed_wait()
+        order = copter.target_system, 1, mavutil.mavlink.MAV_CMD_NAV_TAKEOFF
+        copter.mav.command_long_send(*order, 0, *[0] * 6, 5.0)
+        heard("LOCAL_POSITION_NED", lambda place: place.z < -4.9)
+        copter.set_mode("LAND")
+        copter.motors_disarmed_wait()
+        copter.close()
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from aerobat.errors import SpecError
 from aerobat.links.goals import Mode
 from aerobat.links.mavlink.client import ClientSettings, ClientStage
 from aerobat.links.mavlink.connection import dialect
+from aerobat.links.mavlink.dialects import ARDUPILOT, DIALECTS
 from aerobat.links.mission import MissionSettings, Phase, require_flyable
 from mavlink_sky import ORIGIN, Sky, flip, over_a_link
 
@@ -27,15 +28,16 @@ def test_the_phases_follow_each_other_and_are_told() -> None:
     assert sky.said[1:5] == expected
 
 
+@pytest.mark.parametrize("name", DIALECTS)
 @pytest.mark.parametrize(
     ("loss", "delay", "bound"),
     [(0.01, 0.02, 0.04), pytest.param(0.05, 0.03, 0.12, marks=pytest.mark.slow)],
 )
 def test_a_flip_goes_through_its_gate_over_a_link_that_loses_and_delays(
-    loss: float, delay: float, bound: float
+    loss: float, delay: float, bound: float, name: str
 ) -> None:
     """And what the client reports, from what it heard, is what happened."""
-    sky = over_a_link(loss, delay)
+    sky = over_a_link(loss, delay, name=name)
     sky.run(lambda: sky.client.done)
     report = sky.client.report()
     assert report.is_success, str(report)
@@ -50,9 +52,10 @@ def test_a_flip_goes_through_its_gate_over_a_link_that_loses_and_delays(
     np.testing.assert_allclose(sky.position[:2], 0.0, atol=0.1)
 
 
+@pytest.mark.parametrize("name", DIALECTS)
 @pytest.mark.parametrize("instant", [1.06, *(pytest.param(t, marks=pytest.mark.slow) for t in (0.3, 1.7))])
-def test_a_client_killed_at_any_instant_of_the_flip_leaves_a_hover(instant: float) -> None:
-    sky = over_a_link()
+def test_a_client_killed_at_any_instant_of_the_flip_leaves_a_hover(instant: float, name: str) -> None:
+    sky = over_a_link(name=name)
     sky.run_into_the_plan(instant)
     sky.client_lives = False
     sky.run_for(6.0)
@@ -220,13 +223,13 @@ def test_an_error_over_its_bound_gives_the_plan_up() -> None:
     assert not sky.vehicle.crashed
 
 
-def test_a_pilot_who_takes_over_is_not_interfered_with() -> None:
+@pytest.mark.parametrize(("name", "pilots"), [("px4", 1 << 16), ("ardupilot", 0), ("ardupilot", 6)])
+def test_a_pilot_who_takes_over_is_not_interfered_with(name: str, pilots: int) -> None:
     """A heartbeat with a mode that is none of ours: from then on nothing is sent that moves the vehicle."""
-    sky = over_a_link()
+    sky = over_a_link(name=name)
     sky.run_into_the_plan(0.05)
-    manual = 1 << 16
     sky.front_end._heartbeat = lambda: None  # type: ignore[method-assign]
-    beat = sky.front_end._mavlink.MAVLink_heartbeat_message(2, 12, 129, manual, 4, 3)
+    beat = sky.front_end._mavlink.MAVLink_heartbeat_message(2, 12, 129, pilots, 4, 3)
     sent: list[str] = []
     sky.client.link._take_heartbeat(beat)
     sky.cable.send = lambda message: sent.append(message.get_type())  # type: ignore[method-assign]
@@ -360,8 +363,54 @@ def test_a_pilot_who_takes_over_after_an_abort_is_not_interfered_with() -> None:
 def test_a_vehicle_that_cannot_be_armed_is_told_in_a_sentence() -> None:
     sky = Sky()
     sky.vehicle.crashed = True
-    with pytest.raises(SpecError, match="the vehicle does not arm"):
+    with pytest.raises(
+        SpecError, match=r"^the vehicle does not arm: Arming denied: it lies where it crashed$"
+    ):
         sky.run(lambda: sky.client.done)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("GUID_OPTIONS", 65.0, r"GUID_OPTIONS is 65: thrusts are taken for climb rates; set it to 73"),
+        ("ATC_ANGLE_BOOST", 1.0, "none is left upside down; set it to 0"),
+    ],
+)
+def test_a_copter_that_would_fly_other_thrusts_is_refused_before_it_is_armed(
+    name: str, value: float, words: str
+) -> None:
+    sky = Sky(speaks=ARDUPILOT)
+    sky.front_end.parameters[name] = value
+    with pytest.raises(SpecError, match=words):
+        sky.run(lambda: sky.client.done)
+    assert not sky.vehicle.armed
+
+
+def test_what_keeps_a_copter_from_arming_is_told_as_it_says() -> None:
+    sky = Sky(speaks=ARDUPILOT)
+    sky.vehicle.arm = lambda: False  # type: ignore[method-assign]
+
+    def change(message: Any) -> list[Any]:
+        if message.get_type() == "STATUSTEXT":
+            message.text = "PreArm: Need Position Estimate"
+        return [message]
+
+    sky.cable.change = change
+    with pytest.raises(SpecError, match=r"^the vehicle does not arm: PreArm: Need Position Estimate$"):
+        sky.run(lambda: sky.client.done)
+
+
+def test_a_copter_takes_off_by_an_order_and_one_that_does_not_is_told_to_land() -> None:
+    """Set-points lead it nowhere from the ground, and it arms in the mode GUIDED alone."""
+    sky = Sky(speaks=ARDUPILOT)
+    sky.cable.send(dialect().MAVLink_command_long_message(1, 1, 400, 0, 1.0, *[0.0] * 6))
+    sky.run_for(0.2)
+    assert not sky.vehicle.armed
+    sky.vehicle.take_off = lambda height: False  # type: ignore[method-assign]
+    with pytest.raises(SpecError, match="the vehicle does not take off"):
+        sky.run(lambda: sky.client.done)
+    assert sky.vehicle.landed
+    assert not sky.vehicle.armed
 
 
 @pytest.mark.slow

@@ -11,6 +11,9 @@ from hypothesis import strategies as st
 
 from aerobat import so3
 from aerobat.links.goals import Mode
+from aerobat.links.mavlink.autopilot_link import _of_position
+from aerobat.links.mavlink.connection import dialect
+from aerobat.links.mavlink.dialects import ARDUPILOT, PX4, dialect_of
 from aerobat.links.mavlink.frames import (
     from_global,
     swap_attitude,
@@ -19,7 +22,6 @@ from aerobat.links.mavlink.frames import (
     swap_yaw,
     to_global,
 )
-from aerobat.links.mavlink.modes import custom_mode, mode_of
 
 NUMBERS = st.floats(-50.0, 50.0)
 VECTORS = st.tuples(NUMBERS, NUMBERS, NUMBERS)
@@ -63,7 +65,32 @@ def test_places_come_back_from_latitude_and_longitude_within_their_digits(place:
 
 
 def test_modes_are_px4s_numbers() -> None:
-    assert custom_mode(Mode.OFFBOARD) == 6 << 16
-    assert custom_mode(Mode.HOLD) == 4 << 16 | 3 << 24
-    assert [mode_of(custom_mode(mode)) for mode in Mode] == list(Mode)
-    assert mode_of(1 << 16) is None  # manual
+    assert PX4.custom_mode(Mode.OFFBOARD) == 6 << 16
+    assert PX4.custom_mode(Mode.HOLD) == 4 << 16 | 3 << 24
+    assert [PX4.mode_of(PX4.custom_mode(mode)) for mode in Mode] == list(Mode)
+    assert PX4.mode_of(1 << 16) is None  # manual
+
+
+def test_modes_are_copters_numbers_as_pymavlink_has_them() -> None:
+    from pymavlink.mavutil import mode_mapping_acm
+
+    names = {Mode.HOLD: "BRAKE", Mode.LAND: "LAND", Mode.OFFBOARD: "GUIDED"}
+    assert {mode: mode_mapping_acm[ARDUPILOT.custom_mode(mode)] for mode in ARDUPILOT.modes} == names
+    assert ARDUPILOT.mode_of(6) is None  # RTL
+    assert (dialect_of(3), dialect_of(12), dialect_of(0)) == (ARDUPILOT, PX4, PX4)
+
+
+@given(QUATERNIONS, st.tuples(*[st.floats(-20.0, 20.0)] * 3), st.integers(-50, 50))
+def test_an_attitude_of_another_instant_turns_on_to_that_of_the_position(
+    q: tuple[float, ...], rates: tuple[float, ...], apart: int
+) -> None:
+    make = dialect()
+    turned = so3.multiply(np.array(q), so3.exp(1e-3 * apart * np.array(rates)))
+    told = make.MAVLink_attitude_quaternion_message(1000, *swap_attitude(q), *swap_body(rates))
+    place = make.MAVLink_local_position_ned_message(1000 + apart, 1.0, 2.0, -3.0, 0.1, 0.2, 0.3)
+    seen = _of_position(place, told, 1e-3 * apart, 0.5)
+    assert seen is not None
+    assert seen.time == pytest.approx(0.5 + 1e-3 * apart)
+    assert abs(turned @ np.array(seen.body.q_world_body)) == pytest.approx(1.0, abs=1e-9)
+    np.testing.assert_allclose(seen.body.position, (2.0, 1.0, 3.0))
+    np.testing.assert_allclose(seen.body.velocity, (0.2, 0.1, -0.3), atol=1e-12)

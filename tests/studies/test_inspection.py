@@ -132,7 +132,7 @@ def test_a_fault_of_the_inner_loop_is_named_by_its_log(
 ) -> None:
     found = ab.inspect_flight(flown(), by_rates()[0])
     assert found.fault is not None
-    assert found.fault.cause == cause
+    assert found.cause == found.fault.cause == cause
     assert re.search(evidence, found.fault.evidence)
     assert found.fault.evidence in f"{found.verdict} {' '.join(found.remarks)}"
     np.testing.assert_allclose(sum(found.errors.values()), found.error, atol=1e-4)

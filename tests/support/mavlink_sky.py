@@ -14,6 +14,7 @@ from aerobat.arrays import Array
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.mavlink.client import Client, ClientSettings
 from aerobat.links.mavlink.connection import LossyConnection, dialect
+from aerobat.links.mavlink.dialects import DIALECTS, PX4, Dialect
 from aerobat.links.mavlink.front_end import FrontEnd
 from aerobat.links.mission import MissionSettings, Phase
 from shared_plans import shared_plan
@@ -29,10 +30,11 @@ def flip() -> ab.Plan:
 
 
 @cache
-def _reached(phase: Phase, loss: float, delay: float) -> Sky:
+def _reached(phase: Phase, loss: float, delay: float, name: str) -> Sky:
     """A flight whose mission is just in a phase, SETTLE or MANEUVER."""
     before = phase is Phase.SETTLE
-    sky = Sky(loss=loss, delay=delay) if before else _reached(Phase.SETTLE, loss, delay).branched()
+    fresh = Sky(loss=loss, delay=delay, speaks=DIALECTS[name]) if before else None
+    sky = fresh or _reached(Phase.SETTLE, loss, delay, name).branched()
     sky.run(lambda: sky.client.mission.phase is phase)
     return sky
 
@@ -42,9 +44,10 @@ def over_a_link(
     delay: float = 0.02,
     settings: MissionSettings | None = None,
     phase: Phase = Phase.MANEUVER,
+    name: str = "px4",
 ) -> Sky:
-    """The flip, just begun over a link that loses so many and takes so long [s], either way."""
-    sky = _reached(phase, loss, delay).branched()
+    """The flip, just begun over a link that loses so many and takes so long [s], either way, in a dialect."""
+    sky = _reached(phase, loss, delay, name).branched()
     if settings is not None:
         sky.client.mission.settings = settings
     return sky
@@ -129,6 +132,7 @@ class Sky:
         seed: int = 0,
         mission: MissionSettings | None = None,
         settings: ClientSettings | None = None,
+        speaks: Dialect = PX4,
     ) -> None:
         plan = flip() if plan is None else plan
         flying = plan.vehicle if vehicle is None else vehicle
@@ -140,7 +144,7 @@ class Sky:
         self.said: list[str] = []
         self.cable = Cable(client_end)
         self.vehicle = SimulatedVehicle(flying, plan.problem.environment)
-        self.front_end = FrontEnd(self.vehicle, lossy)
+        self.front_end = FrontEnd(self.vehicle, lossy, speaks=speaks)
         self.client = Client(
             plan,
             self.cable,

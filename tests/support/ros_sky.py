@@ -6,11 +6,12 @@ import copy
 from collections import defaultdict, deque
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
-from functools import cache
+from dataclasses import replace
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import aerobat as ab
 from aerobat import so3
@@ -23,6 +24,8 @@ from aerobat.links.commander import Doing
 from aerobat.links.goals import PathPiece
 from aerobat.links.mission import Phase
 from aerobat.links.ros import topics
+from aerobat.links.ros.crazyswarm import Crazyflie
+from aerobat.links.ros.crazyswarm_server import CrazyswarmServer
 from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings
 from aerobat.links.ros.middleware import Answer
 from aerobat.links.ros.preparation import MANEUVERS
@@ -34,6 +37,23 @@ VEHICLE_STEPS, NODE_STEPS = 2, 5  # between ticks of either: 250 and 100 a secon
 BEGAN = 1_700_000_000 * 10**9  # [ns] ROS time at first
 
 TYPES = {1: get_typestore(Stores.ROS1_NOETIC), 2: get_typestore(Stores.ROS2_HUMBLE)}
+CRAZYFLIE_INTERFACES = {  # as crazyswarm2 has them
+    "FullState": "std_msgs/Header header\ngeometry_msgs/Pose pose\ngeometry_msgs/Twist twist\n"
+    "geometry_msgs/Vector3 acc",
+    "TrajectoryPolynomialPiece": "float32[] poly_x\nfloat32[] poly_y\nfloat32[] poly_z\n"
+    "float32[] poly_yaw\nbuiltin_interfaces/Duration duration",
+    "Takeoff": "uint8 group_mask\nfloat32 height\nbuiltin_interfaces/Duration duration",
+    "Land": "uint8 group_mask\nfloat32 height\nbuiltin_interfaces/Duration duration",
+    "GoTo": "uint8 group_mask\nbool relative\ngeometry_msgs/Point goal\nfloat32 yaw\n"
+    "builtin_interfaces/Duration duration",
+    "UploadTrajectory": "uint8 trajectory_id\nuint32 piece_offset\n"
+    "crazyflie_interfaces/TrajectoryPolynomialPiece[] pieces",
+    "StartTrajectory": "uint8 group_mask\nuint8 trajectory_id\nfloat32 timescale\nbool reversed\n"
+    "bool relative",
+    "NotifySetpointsStop": "uint8 group_mask\nuint32 remain_valid_millisecs",
+}
+for name, fields in CRAZYFLIE_INTERFACES.items():
+    TYPES[2].register(get_types_from_msg(fields, f"crazyflie_interfaces/msg/{name}"))
 
 
 class Graph:
@@ -72,6 +92,11 @@ class Graph:
                         take(message)
 
 
+def request_of(service: str) -> str:
+    """The kind of message by which a service's requests travel here."""
+    return service.replace("/srv/", "/msg/")
+
+
 class Sender:
     """What sends messages of a topic."""
 
@@ -89,7 +114,8 @@ class Ros:
         self._graph = graph
 
     def make(self, kind: str, /, **given: Any) -> Any:
-        return StoredTypes(TYPES[self._graph.generation])(kind, **given)
+        arrays = {name: np.array(x, np.float32) for name, x in given.items() if name.startswith("poly_")}
+        return StoredTypes(TYPES[self._graph.generation])(kind, **{**given, **arrays})
 
     def time(self) -> int:
         return self._graph.time
@@ -102,6 +128,15 @@ class Ros:
 
     def offer(self, service: str, take: Callable[[Answer], None]) -> None:
         self._graph.services[service] = take
+
+    def client(self, service: str, kind: str) -> Callable[..., None]:
+        return partial(self._ask, service, request_of(kind))
+
+    def _ask(self, service: str, request: str, **given: Any) -> None:
+        self.publisher(service, request)(self.make(request, **given))
+
+    def serve(self, service: str, kind: str, take: Callable[[Any], None]) -> None:
+        self.subscribe(service, request_of(kind), take)
 
     def work_until(self, instant: int, patience: float = np.inf) -> None:
         raise AssertionError("nothing waits here")
@@ -152,16 +187,23 @@ class Sky:
         generation: int = 2,
         settings: NodeSettings | None = None,
         flying: ab.Vehicle | None = None,
+        crazyflie: str = "",
     ) -> None:
         planned = ab.load_vehicle(vehicle)
         self.graph = Graph(generation)
         self.said: list[str] = []
         self.vehicle = SimulatedVehicle(planned if flying is None else flying, Environment())
-        self.vehicle_node = VehicleNode(Ros(self.graph), self.vehicle, say=self.note)
+        ros, taken = Ros(self.graph), None
+        if crazyflie:
+            self.vehicle_node: VehicleNode = CrazyswarmServer(ros, self.vehicle, crazyflie, say=self.note)
+            settings = replace(settings or NodeSettings(), odometry=f"{crazyflie}/odom")
+            taken = Crazyflie(ros, crazyflie).take
+        else:
+            self.vehicle_node = VehicleNode(ros, self.vehicle, say=self.note)
         planner = ab.Miqp(reserve=0.15)
         maneuvers = {name: (ab.load_problem(problem), planner) for name, problem in MANEUVERS.items()}
         settings = NodeSettings() if settings is None else settings
-        self.node = ManeuverNode(Ros(self.graph), planned, maneuvers, AtOnce(), settings, self.note)
+        self.node = ManeuverNode(Ros(self.graph), planned, maneuvers, AtOnce(), settings, self.note, taken)
         self.node_lives = self.vehicle_runs = True
         self.goals: list[PathPiece] = []
         self.shown: list[Any] = []  # arrays of markers
@@ -288,6 +330,18 @@ def _aloft(vehicle: str, generation: int) -> Sky:
 def aloft(vehicle: str = "agile-quad", generation: int = 2) -> Sky:
     """A vehicle that has taken off and hovers."""
     return _aloft(vehicle, generation).branched()
+
+
+@cache
+def _crazyflie_aloft(in_pieces: bool) -> Sky:
+    sky = Sky("crazyflie", crazyflie="/cf231", settings=NodeSettings(in_pieces=in_pieces))
+    sky.take_off()
+    return sky
+
+
+def crazyflie_aloft(in_pieces: bool) -> Sky:
+    """A Crazyflie behind crazyswarm2's server that has taken off and hovers."""
+    return _crazyflie_aloft(in_pieces).branched()
 
 
 @cache

@@ -59,7 +59,7 @@ class RosNodeOptions(EndOptions):
     """The generation of ROS."""
 
     goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
-    """The topic of goals."""
+    """The topic of goals; or, as crazyswarm2:/cf231, a Crazyflie of crazyswarm2's server to stand in for."""
 
     odometry: Annotated[str, Parameter(group=linking)] = "/aerobat/odometry"
     """The topic of the vehicle's state."""
@@ -86,7 +86,7 @@ class MavlinkOptions(MissionOptions, RunOptions):
         float | None, Parameter(group=linking, validator=validators.Number(gt=0, lt=1))
     ] = None
     """The part of its thrust at which the vehicle hovers, by which thrusts are scaled. Default: what it says,
-    its parameter MPC_THR_HOVER."""
+    by PX4's parameter MPC_THR_HOVER or ArduPilot's MOT_THST_HOVER."""
 
     vehicle: Annotated[str | None, Parameter(group=linking)] = None
     """The name of the vehicle that is there. A plan that is certified for another one is refused."""
@@ -108,6 +108,9 @@ class MavlinkOptions(MissionOptions, RunOptions):
 @dataclass(frozen=True, kw_only=True)
 class MavlinkVehicleOptions(EndOptions):
     """Options of a simulated vehicle that speaks MAVLink."""
+
+    dialect: Annotated[Literal["px4", "ardupilot"], Parameter(group=linking)] = "px4"
+    """The autopilot that clients take it for."""
 
     listen: Annotated[str, Parameter(group=linking)] = "udp:127.0.0.1:14540"
     """The address of the vehicle: udp:HOST:PORT waits there, udpout:HOST:PORT sends there first, as PX4
@@ -145,7 +148,11 @@ class RosOptions(MissionOptions, RosNodeOptions):
 
     goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
     """The topic of goals; or a Betaflight board that is flown by rates and thrust instead, its receiver's
-    protocol and its line, as msp:/dev/ttyACM0, crsf:/dev/ttyUSB0 or msp:socket://HOST:PORT."""
+    protocol and its line, as msp:/dev/ttyACM0, crsf:/dev/ttyUSB0 or msp:socket://HOST:PORT; or a Crazyflie of
+    crazyswarm2's server, as crazyswarm2:/cf231, whose odometry is /cf231/odom."""
+
+    onboard: Annotated[bool, Parameter(group=linking, negative="")] = False
+    """Plans are uploaded to a Crazyflie and flown by itself, rather than streamed to it."""
 
     rate: Annotated[float, Parameter(group=linking, validator=validators.Number(gte=50, lte=250))] = 100.0
     """Goals a second."""

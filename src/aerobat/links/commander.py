@@ -87,6 +87,13 @@ class Commander:
         """The reason why the last mission was given up; empty where it was not."""
         return "" if self.mission is None else self.mission.reason
 
+    def way(self, now: float) -> tuple[Array, float, float] | None:
+        """Where a way to a hover or to the ground ends [m], its yaw [rad], and its time left [s]."""
+        if self._way is None:
+            return None
+        path, began, yaw = self._way
+        return path.evaluate(path.duration), yaw, began + path.duration - now
+
     def observe(self, seen: Observed) -> None:
         """Take note of a state."""
         if self.seen is not None and seen.time <= self.seen.time:

@@ -32,7 +32,7 @@ RECOVERED = 1.0  # [m] of the lowest point of a recovery from any instant of it,
 def mavlink(
     plan: Path, options: Annotated[MavlinkOptions, Parameter(name="*")] = MavlinkOptions()
 ) -> ExitCode:
-    """Fly a plan on an autopilot over MAVLink: PX4, or `aerobat link mavlink-vehicle`.
+    """Fly a plan on an autopilot over MAVLink: PX4, ArduPilot, or `aerobat link mavlink-vehicle`.
 
     Arms, takes off, goes to the plan's start, streams attitude, rates and thrust along the plan, holds where
     it ends, and lands. Whatever goes wrong on the way, the vehicle is told to hover, then to land. Read
@@ -86,7 +86,7 @@ def mavlink_vehicle(
     /,
     options: Annotated[MavlinkVehicleOptions, Parameter(name="*")] = MavlinkVehicleOptions(),
 ) -> None:
-    """Simulate a vehicle that MAVLink clients take for a PX4: `aerobat link mavlink`, ground stations.
+    """Simulate a vehicle that MAVLink clients take for PX4 or ArduPilot: `aerobat link mavlink` and others.
 
     It stands on the ground until it is armed, and runs until it is interrupted. A client that falls silent
     while it is obeyed leaves it hovering.
@@ -100,6 +100,7 @@ def mavlink_vehicle(
     from aerobat.links.autopilot.vehicle import SimulatedVehicle
     from aerobat.links.clock import WallClock
     from aerobat.links.mavlink.connection import LossyConnection, connect
+    from aerobat.links.mavlink.dialects import DIALECTS
     from aerobat.links.mavlink.front_end import SYSTEM, FrontEnd
 
     connection = connect(options.listen, listen=True, system=SYSTEM)
@@ -109,7 +110,7 @@ def mavlink_vehicle(
         connection = LossyConnection(
             connection, clock, loss=options.loss, delay=options.delay, seed=options.seed
         )
-    front_end = FrontEnd(simulated, connection, say)
+    front_end = FrontEnd(simulated, connection, say, DIALECTS[options.dialect])
     say(f"{found.name} listens on {options.listen}")
     end = float("inf") if options.seconds is None else options.seconds
     try:

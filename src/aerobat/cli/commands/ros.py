@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from math import inf
 from pathlib import Path
@@ -18,7 +18,9 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.betaflight.board import board_at
-from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings
+from aerobat.links.ros.crazyswarm import PREFIX, Crazyflie, Ros2
+from aerobat.links.ros.crazyswarm_server import CrazyswarmServer
+from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings, Tick
 from aerobat.links.ros.middleware import Middleware, PacedClock
 from aerobat.links.ros.preparation import MANEUVERS, ManeuverRequest, prepare
 from aerobat.links.ros.run import RVIZ, run
@@ -45,14 +47,15 @@ def ros(*problems: str, options: Annotated[RosOptions, Parameter(name="*")] = Ro
     problems
         Names that `aerobat show` lists, or problems' TOML files, to be services too, of their names.
     """
-    vehicle = named_vehicle(options.vehicle)
+    vehicle, crazyflie = named_vehicle(options.vehicle), _crazyflie(options.goal)
     settings = NodeSettings(
         rate=options.rate,
         takeoff_height=options.takeoff_height,
         in_world=options.world,
         with_jerk=options.jerk,
         goal=options.goal,
-        odometry=options.odometry,
+        in_pieces=options.onboard,
+        odometry=f"{crazyflie}/odom" if crazyflie else options.odometry,
         mission=options.mission,
     )
     services = {**MANEUVERS, **{_service(name): name for name in problems}}
@@ -62,9 +65,13 @@ def ros(*problems: str, options: Annotated[RosOptions, Parameter(name="*")] = Ro
         maneuvers[service] = problem, _planner(problem, vehicle, options)
     environment = next(iter(maneuvers.values()))[0].environment
     board = board_at(options.goal, vehicle, environment, 1.0 / options.rate)
-    take = None if board is None else board.take
     middleware = _joined("aerobat", options.generation, sim_time=options.sim_time)
+    take: Callable[[Tick], None] | None = None
     try:
+        if crazyflie:
+            take = Crazyflie(_ros2(middleware), crazyflie).take
+        elif board is not None:
+            take = lambda tick: board.take(*tick[:3])  # noqa: E731 - what a board needs of it
         # two, so that none of them is this one
         with processes(2, forked=False) as executor:
             _rehearse(executor, vehicle, maneuvers, settings)
@@ -97,14 +104,12 @@ def ros_vehicle(
     clock = None if options.speed is None else PacedClock(options.speed)
     middleware = _joined("aerobat_vehicle", options.generation, clock)
     try:
-        node = VehicleNode(
-            middleware,
-            SimulatedVehicle(found, Environment()),
-            goal=options.goal,
-            odometry=options.odometry,
-            rate=options.rate,
-            clock=clock,
-            say=say,
+        simulated, crazyflie = SimulatedVehicle(found, Environment()), _crazyflie(options.goal)
+        topics = {"goal": options.goal, "odometry": options.odometry}
+        node = (
+            CrazyswarmServer(_ros2(middleware), simulated, crazyflie, rate=options.rate, clock=clock, say=say)
+            if crazyflie
+            else VehicleNode(middleware, simulated, **topics, rate=options.rate, clock=clock, say=say)
         )
         say(f"{found.name} stands on the ground, and obeys {options.goal}")
         run(node, middleware, _VEHICLE_RATE, options.seconds or inf)
@@ -144,6 +149,20 @@ def _joined(
     from aerobat.links.ros.rospy_middleware import RospyMiddleware
 
     return RospyMiddleware(name, clock)
+
+
+def _crazyflie(goal: str) -> str:
+    """The name of a Crazyflie behind crazyswarm2's server that is a node's goal, else nothing."""
+    return goal.removeprefix(PREFIX) if goal.startswith(PREFIX) else ""
+
+
+def _ros2(middleware: Middleware) -> Ros2:
+    """The same, if it is of ROS 2. Raises SpecError otherwise."""
+    from aerobat.links.ros.rclpy_middleware import RclpyMiddleware
+
+    if not isinstance(middleware, RclpyMiddleware):
+        raise SpecError("crazyswarm2 is a server of ROS 2; leave --ros 1 out")
+    return middleware
 
 
 def _service(name: str) -> str:

@@ -7,6 +7,8 @@ numbers are a CSV in the layout of uav_trajectories, which Crazyswarm reads.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from aerobat.errors import SpecError
@@ -26,12 +28,19 @@ PIECES = ("trajectory.bin", "trajectory.csv")
 AXES = ("x", "y", "z", "yaw")
 HEADER = ",".join(["duration", *(f"{axis}^{power}" for axis in AXES for power in range(POWERS))])
 READING = "pieces of float32 coefficients"
+Pieces: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.void]]"  # of the type PIECE
 
 
 def crazyflie_pieces(plan: Plan, rate: float) -> Content:
-    """The pieces as bytes and as CSV. Lost is what a refit and float32 cost, and heading that no yaw can say.
+    """The pieces as bytes and as CSV, without a rate: it has no rows; see `fitted_pieces`."""
+    pieces, loss = fitted_pieces(plan)
+    return Content(dict(zip(PIECES, (pieces.tobytes(), _csv(pieces)), strict=True)), loss)
 
-    Without a rate: it has no rows. Raises SpecError where 31 pieces do not follow the path, or it is too far.
+
+def fitted_pieces(plan: Plan) -> tuple[Pieces, Loss]:
+    """The pieces of a plan. Lost is what a refit and float32 cost, and heading that no yaw can say.
+
+    Raises SpecError where 31 pieces do not follow the path, or it is too far.
     """
     fitted = refit(plan.trajectory, MAX_PIECES)
     if not np.abs(fitted.coefficients[:, 0]).max() <= MAX_EXTENT:
@@ -49,15 +58,18 @@ def crazyflie_pieces(plan: Plan, rate: float) -> Content:
             f"{MAX_PIECES} pieces of degree {DEGREE}, as many as the Crazyflie holds, miss the path by "
             f"{length(loss.position)}, {length(MAX_ERROR)} at most allowed; plan less at a time"
         )
-    return Content(dict(zip(PIECES, (pieces.tobytes(), _csv(pieces)), strict=True)), loss)
+    return pieces, loss
 
 
-def as_path(pieces: np.ndarray[tuple[int], np.dtype[np.void]]) -> Trajectory:
-    """The path of pieces of the type PIECE, as the vehicle has it but for its arithmetic's rounding."""
+def as_path(pieces: Pieces, heading: float = 0.0) -> Trajectory:
+    """The path of pieces of the type PIECE, as the vehicle has it but for its arithmetic's rounding.
+
+    The heading [rad] is the path's all along.
+    """
     durations = pieces["duration"].astype(float)
     powers = durations[:, None, None] ** np.arange(POWERS)[:, None]
     coefficients = np.moveaxis(pieces["polynomials"][:, :3].astype(float), 2, 1)
-    return Trajectory(durations, coefficients * powers)
+    return Trajectory(durations, coefficients * powers, heading)
 
 
 def _loss(plan: Plan, path: Trajectory, yaw: YawFit) -> Loss:
@@ -70,6 +82,6 @@ def _loss(plan: Plan, path: Trajectory, yaw: YawFit) -> Loss:
     )
 
 
-def _csv(pieces: np.ndarray[tuple[int], np.dtype[np.void]]) -> bytes:
+def _csv(pieces: Pieces) -> bytes:
     rows = np.column_stack([pieces["duration"], pieces["polynomials"].reshape(len(pieces), -1)])
     return "\n".join([HEADER, *(",".join(map(repr, row)) for row in rows.tolist()), ""]).encode()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
@@ -21,12 +21,13 @@ LINE_STRIP, LINE_LIST, CYLINDER, TRIANGLE_LIST = 4, 5, 3, 11  # kinds of markers
 GLASS = 0.4  # opacity of what is solid
 DISC_HEIGHT = 0.01  # [m]
 BLACK = (0.1, 0.1, 0.1)
+RosMessage: TypeAlias = Any  # of the class that a distribution generates
 
 
 class Make(Protocol):
     """A maker of one distribution's messages."""
 
-    def __call__(self, kind: str, /, **given: Any) -> Any:
+    def __call__(self, kind: str, /, **given: Any) -> RosMessage:
         """A message of a kind, as in "geometry_msgs/msg/Pose"; what is not given is zero, empty or false."""
 
 
@@ -47,36 +48,36 @@ class Messages:
 
     make: Make
 
-    def header(self, stamp: int) -> Any:
+    def header(self, stamp: int) -> RosMessage:
         """The header of what is in the world."""
         return self.make("std_msgs/msg/Header", stamp=self.time("Time", stamp), frame_id=WORLD)
 
-    def time(self, kind: str, nanoseconds: int) -> Any:
+    def time(self, kind: str, nanoseconds: int) -> RosMessage:
         """An instant, kind `Time`, or a `Duration`."""
         sec, nanosec = divmod(nanoseconds, NANOSECONDS)
         return self.make(f"builtin_interfaces/msg/{kind}", sec=sec, nanosec=nanosec)
 
-    def vector(self, kind: str, components: Array) -> Any:
+    def vector(self, kind: str, components: Array) -> RosMessage:
         """A `Vector3` or a `Point`."""
         x, y, z = components.tolist()
         return self.make(f"geometry_msgs/msg/{kind}", x=x, y=y, z=z)
 
-    def quaternion(self, q: Array) -> Any:
+    def quaternion(self, q: Array) -> RosMessage:
         """A rotation, (w, x, y, z)."""
         w, x, y, z = q.tolist()
         return self.make("geometry_msgs/msg/Quaternion", w=w, x=x, y=y, z=z)
 
-    def pose(self, position: Array, q: Array) -> Any:
+    def pose(self, position: Array, q: Array) -> RosMessage:
         """A place [m] and an attitude."""
         place, turn = self.vector("Point", position), self.quaternion(q)
         return self.make("geometry_msgs/msg/Pose", position=place, orientation=turn)
 
-    def twist(self, linear: Array, angular: Array) -> Any:
+    def twist(self, linear: Array, angular: Array) -> RosMessage:
         """A velocity [m/s] and a rate [rad/s], or what they change by in a second."""
         vectors = self.vector("Vector3", linear), self.vector("Vector3", angular)
         return self.make("geometry_msgs/msg/Twist", linear=vectors[0], angular=vectors[1])
 
-    def odometry(self, stamp: int, state: BodyState) -> Any:
+    def odometry(self, stamp: int, state: BodyState) -> RosMessage:
         """The pose in the world, velocities in the body's axes, as the message has it."""
         velocity = so3.unrotate(state.q_world_body, state.velocity)
         pose, twist = self.pose(state.position, state.q_world_body), self.twist(velocity, state.omega_body)
@@ -88,7 +89,7 @@ class Messages:
             twist=self.make("geometry_msgs/msg/TwistWithCovariance", twist=twist),
         )
 
-    def trajectory_point(self, time_from_start: int, *joints: JointMotion) -> Any:
+    def trajectory_point(self, time_from_start: int, *joints: JointMotion) -> RosMessage:
         """The point of a trajectory at a time [ns] since it began."""
         transforms = [
             self.make(
@@ -108,7 +109,7 @@ class Messages:
 
     def line(
         self, stamp: int, name: str, points: Array, *, width: float, color: tuple[float, float, float]
-    ) -> Any:
+    ) -> RosMessage:
         """A marker of a line.
 
         Args:
@@ -131,7 +132,7 @@ class Messages:
 
     def cross(
         self, stamp: int, name: str, number: int, *, position: Array, q: Array, ends: Array, width: float
-    ) -> Any:
+    ) -> RosMessage:
         """A marker of arms from a middle.
 
         Args:
@@ -165,7 +166,7 @@ class Messages:
         q: Array,
         radius: float,
         color: tuple[float, float, float],
-    ) -> Any:
+    ) -> RosMessage:
         """A marker of a flat disc.
 
         Args:
@@ -189,7 +190,7 @@ class Messages:
 
     def solid(
         self, stamp: int, name: str, number: int, *, corners: Array, color: tuple[float, float, float]
-    ) -> Any:
+    ) -> RosMessage:
         """A marker of a surface, translucent.
 
         Args:
@@ -210,11 +211,11 @@ class Messages:
             points=[self.vector("Point", corner) for corner in corners],
         )
 
-    def _marker(self, stamp: int, name: str, number: int, **given: Any) -> Any:
+    def _marker(self, stamp: int, name: str, number: int, **given: Any) -> RosMessage:
         return self.make(
             "visualization_msgs/msg/Marker", header=self.header(stamp), ns=name, id=number, **given
         )
 
-    def _color(self, color: Sequence[float], opacity: float = 1.0) -> Any:
+    def _color(self, color: Sequence[float], opacity: float = 1.0) -> RosMessage:
         red, green, blue = color
         return self.make("std_msgs/msg/ColorRGBA", r=red, g=green, b=blue, a=opacity)

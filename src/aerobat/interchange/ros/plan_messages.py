@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import Reference, reference
-from aerobat.interchange.ros.messages import BODY, NANOSECONDS, JointMotion, Messages
+from aerobat.interchange.ros.messages import BODY, NANOSECONDS, JointMotion, Messages, RosMessage
 from aerobat.interchange.solids import solid_surfaces
 from aerobat.planning import Plan
 from aerobat.states import BodyState
@@ -29,7 +28,7 @@ class Stamped:
     topic: str
     kind: str
     stamp: int  # [ns]
-    message: Any
+    message: RosMessage
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ class PlanMessages:
         for time, discs in self.snapshots():
             yield self._array(self._stamp(time), discs)
 
-    def lines(self, found: Reference) -> Sequence[Any]:
+    def lines(self, found: Reference) -> Sequence[RosMessage]:
         """Markers of the path, sampled as `found`, of the gates and of obstacles."""
         stamp, path = self._stamp(0.0), found.setpoint.flat.position + self.origin
         lines = [self.messages.line(stamp, "path", path, width=PATH_WIDTH, color=GREY)]
@@ -83,7 +82,7 @@ class PlanMessages:
             lines.append(self.messages.solid(stamp, solid.name, number, corners=corners, color=GREY))
         return lines
 
-    def snapshots(self, every: float = np.inf) -> Iterator[tuple[float, Sequence[Any]]]:
+    def snapshots(self, every: float = np.inf) -> Iterator[tuple[float, Sequence[RosMessage]]]:
         """Markers of the vehicle at the start, at each stage and at the end, after their times [s].
 
         `every`: so often [s] on the way, too.
@@ -98,7 +97,7 @@ class PlanMessages:
             position, q = shown.flat.position[row] + self.origin, shown.q_world_body[row]
             yield time, self._vehicle(f"vehicle: {name}", row, position, q, self._stamp(time))
 
-    def _vehicle(self, name: str, row: int, position: Array, q: Array, stamp: int) -> Sequence[Any]:
+    def _vehicle(self, name: str, row: int, position: Array, q: Array, stamp: int) -> Sequence[RosMessage]:
         """The rotors and arms of the vehicle at one instant, numbered apart from those of others of its name.
 
         Args:
@@ -154,7 +153,7 @@ class PlanMessages:
         message = self.messages.make(kind, header=header, joint_names=[BODY], points=points)
         return Stamped("/aerobat/trajectory", kind, stamps[0], message)
 
-    def _array(self, stamp: int, markers: Sequence[Any]) -> Stamped:
+    def _array(self, stamp: int, markers: Sequence[RosMessage]) -> Stamped:
         message = self.messages.make(KIND_OF_MARKERS, markers=list(markers))
         return Stamped("/aerobat/markers", KIND_OF_MARKERS, stamp, message)
 

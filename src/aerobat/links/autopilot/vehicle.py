@@ -105,10 +105,10 @@ class SimulatedVehicle:
         return True
 
     def land(self) -> bool:
-        """Come to a hover, and from there down to the ground; an order that is repeated changes nothing."""
+        """Come to a hover, go down to the ground and disarm; an order that is repeated changes nothing."""
         if self.mode is not Mode.LAND:
             self.hold()
-            if not self.landed:
+            if not self.disarm():
                 self.mode = Mode.LAND
         return True
 

@@ -243,7 +243,12 @@ def _looks() -> Iterator[None]:
 
 @lru_cache(maxsize=32)
 def configured(lines: tuple[str, ...]) -> bytes:
-    """Return the settings that a firmware saves of lines of its command line."""
+    """Return the settings that a firmware saves of lines of its command line.
+
+    Another program may have taken the port that was free: a second firmware gets another one.
+    """
+    with suppress(FirmwareEnded), Firmware() as firmware:
+        return firmware.configure(lines)
     with Firmware() as firmware:
         return firmware.configure(lines)
 

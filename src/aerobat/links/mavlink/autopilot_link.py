@@ -7,10 +7,13 @@ from math import inf, isfinite, nan
 from random import randrange
 from typing import Any
 
+import numpy as np
+
+from aerobat import so3
 from aerobat.links.goals import AttitudeGoal, Mode, Observed, PositionGoal, observed
-from aerobat.links.mavlink.connection import Connection, dialect
+from aerobat.links.mavlink.connection import Connection, MavlinkMessage, dialect
+from aerobat.links.mavlink.dialects import ARMED, CUSTOM_MODE_ENABLED, PX4, Dialect, dialect_of
 from aerobat.links.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
-from aerobat.links.mavlink.modes import ARMED, CUSTOM_MODE_ENABLED, MAIN_AND_SUB, mode_of
 
 SYSTEM, COMPONENT = 245, 191  # ours: a companion computer
 _AUTOPILOT = 1  # the component of an autopilot
@@ -19,6 +22,8 @@ _ASK_AGAIN = 0.3  # [s] from an order to the same again, where it is not obeyed
 _SYNCHRONIZE = 0.1  # [s] between questions for the time
 _SYNCHRONIZATIONS = 50  # of which the quickest counts
 _MAX_AHEAD = 0.02  # [s] beside that by which states may be stamped ahead
+_MAX_APART = 0.1  # [s] between the attitude and the position of one state
+_WARNING = 4  # the severity from which on a text complains
 
 
 class AutopilotLink:
@@ -48,7 +53,10 @@ class AutopilotLink:
         self.armed = False
         self.landed: bool | None = None
         self.observed: Observed | None = None
+        self.dialect: Dialect = PX4  # once it is known, the autopilot's
         self.parameters: dict[str, float] = {}
+        self.complaints: dict[str, None] = {}  # what ails it, each once
+        self._attitude: MavlinkMessage = None  # the last message of it
         self.told: list[str] = []  # sentences for whoever listens, who empties it
         self._left_out: set[str] = set()  # why states were, each told once
 
@@ -75,8 +83,8 @@ class AutopilotLink:
             if not self._is_ours(message):
                 continue
             self.heard = now
-            if message.get_type() == "ODOMETRY":
-                seen += self._odometry(message)
+            if message.get_type() in ("ODOMETRY", "LOCAL_POSITION_NED"):
+                seen += self._state(message)
             take = getattr(self, f"_take_{message.get_type().lower()}", None)
             if take is not None:
                 take(message)
@@ -86,7 +94,9 @@ class AutopilotLink:
             if self._again("time", _SYNCHRONIZE):
                 self._ask_time()
             if self.observed is None or now - self.observed.time > 1.0:
-                self.command(511, self._mavlink.MAVLink_odometry_message.id, self._interval)
+                for name, every in self.dialect.states.items():
+                    kind = getattr(self._mavlink, f"MAVLink_{name.lower()}_message")
+                    self.command(511, kind.id, every * self._interval)
         return seen
 
     def ask_parameter(self, name: str) -> None:
@@ -97,12 +107,16 @@ class AutopilotLink:
     def set_mode(self, mode: Mode) -> None:
         """Order a mode, now and then until it is on."""
         if self.mode is not mode:
-            self.command(176, CUSTOM_MODE_ENABLED, *MAIN_AND_SUB[mode])
+            self.command(176, CUSTOM_MODE_ENABLED, *self.dialect.modes[mode])
 
     def arm(self) -> None:
         """Have the rotors turn, now and then until they do."""
         if not self.armed:
             self.command(400, 1.0)
+
+    def take_off(self, height: float) -> None:
+        """Have it climb by so much [m], now and then until it flies."""
+        self.command(22, *(0.0,) * 6, height)
 
     def command(self, number: int, *parameters: float) -> None:
         """Give an order, unless the same was given just now."""
@@ -133,7 +147,7 @@ class AutopilotLink:
             nan,
         )
 
-    def _is_ours(self, message: Any) -> bool:
+    def _is_ours(self, message: MavlinkMessage) -> bool:
         """True for messages of the autopilot: the one that is wanted, or the first that is heard."""
         if message.get_srcComponent() != _AUTOPILOT:
             return False
@@ -141,7 +155,7 @@ class AutopilotLink:
         if message.get_type() == "HEARTBEAT" and message.autopilot != _GROUND_STATION:
             self.systems.add(system)
             if not self.is_known and self._wanted in (None, system):
-                self._system = system
+                self._system, self.dialect = system, dialect_of(message.autopilot)
         return system == self._system
 
     def _again(self, order: object, every: float = _ASK_AGAIN) -> bool:
@@ -154,12 +168,12 @@ class AutopilotLink:
     def _send(self, name: str, *fields: Any) -> None:
         self._connection.send(getattr(self._mavlink, f"MAVLink_{name}_message")(*fields))
 
-    def _take_heartbeat(self, message: Any) -> None:
-        self.mode = mode_of(message.custom_mode)
+    def _take_heartbeat(self, message: MavlinkMessage) -> None:
+        self.mode = self.dialect.mode_of(message.custom_mode)
         self.armed = bool(message.base_mode & ARMED)
         self.beat = self._now
 
-    def _take_extended_sys_state(self, message: Any) -> None:
+    def _take_extended_sys_state(self, message: MavlinkMessage) -> None:
         self.landed = message.landed_state == 1
 
     def _ask_time(self) -> None:
@@ -168,35 +182,39 @@ class AutopilotLink:
         self._asked = dict([*self._asked.items(), (question, self._now)][-_SYNCHRONIZATIONS:])
         self._send("timesync", 0, question)
 
-    def _take_timesync(self, message: Any) -> None:
+    def _take_timesync(self, message: MavlinkMessage) -> None:
         """Take the answer to a question of ours; those to other clients come here too."""
         sent = self._asked.pop(message.ts1, None)
         if sent is not None and message.tc1 > 0:
             self._times.append((self._now - sent, 1e-9 * message.tc1 - 0.5 * (self._now + sent)))
 
-    def _take_param_value(self, message: Any) -> None:
+    def _take_param_value(self, message: MavlinkMessage) -> None:
         if isfinite(message.param_value):
             self.parameters[str(message.param_id)] = float(message.param_value)
 
-    def _take_statustext(self, message: Any) -> None:
+    def _take_statustext(self, message: MavlinkMessage) -> None:
         self.told.append(f"the vehicle: {message.text}")
+        if message.severity <= _WARNING:
+            self.complaints[str(message.text)] = None
 
-    def _odometry(self, message: Any) -> list[Observed]:
+    def _take_attitude_quaternion(self, message: MavlinkMessage) -> None:
+        self._attitude = message
+
+    def _state(self, message: MavlinkMessage) -> list[Observed]:
         """Return a state by our clock, if it is newer than the last and can be one.
 
         Nothing is returned before the vehicle's clock is known. Where a message takes longer one way than the
         other, states are stamped ahead by up to half a round trip.
         """
-        if not self.is_synchronized:
+        if not self.is_synchronized or message.get_type() not in self.dialect.states:
             return []
         _, offset = min(self._times)
-        seen = observed(
-            1e-6 * message.time_usec - offset,
-            swap_world((message.x, message.y, message.z)),
-            swap_attitude(tuple(message.q)),
-            swap_body((message.vx, message.vy, message.vz)),
-            swap_body((message.rollspeed, message.pitchspeed, message.yawspeed)),
-        )
+        if message.get_type() == "ODOMETRY":
+            seen = _of_odometry(message, offset)
+        elif self._attitude is None or abs(age := _apart(message, self._attitude)) > _MAX_APART:
+            return []
+        else:
+            seen = _of_position(message, self._attitude, age, offset)
         if seen is None:
             self._leave_out("not finite, or their attitude is no unit quaternion")
             return []
@@ -213,3 +231,33 @@ class AutopilotLink:
         if reason not in self._left_out:
             self._left_out.add(reason)
             self.told.append(f"states are left out that are {reason}")
+
+
+def _of_odometry(message: MavlinkMessage, offset: float) -> Observed | None:
+    """A state that one message tells, by a clock that is behind the vehicle's by so much [s]."""
+    return observed(
+        1e-6 * message.time_usec - offset,
+        swap_world((message.x, message.y, message.z)),
+        swap_attitude(tuple(message.q)),
+        swap_body((message.vx, message.vy, message.vz)),
+        swap_body((message.rollspeed, message.pitchspeed, message.yawspeed)),
+    )
+
+
+def _apart(position: MavlinkMessage, attitude: MavlinkMessage) -> float:
+    """The time from an attitude to a position [s]."""
+    return 1e-3 * float(position.time_boot_ms - attitude.time_boot_ms)
+
+
+def _of_position(
+    position: MavlinkMessage, attitude: MavlinkMessage, age: float, offset: float
+) -> Observed | None:
+    """A state that two messages tell: the attitude turns on by its rates to when the position was so."""
+    rates = swap_body((attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed))
+    told = np.array(swap_attitude((attitude.q1, attitude.q2, attitude.q3, attitude.q4)))
+    q = so3.multiply(told, so3.exp(age * np.array(rates)))
+    velocity = so3.unrotate(q, np.array(swap_world((position.vx, position.vy, position.vz))))
+    w, x, y, z = q.tolist()
+    forward, left, up = velocity.tolist()
+    place = swap_world((position.x, position.y, position.z))
+    return observed(1e-3 * position.time_boot_ms - offset, place, (w, x, y, z), (forward, left, up), rates)

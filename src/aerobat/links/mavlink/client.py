@@ -15,7 +15,6 @@ from aerobat.links.clock import Clock
 from aerobat.links.goals import Mode, Observed, PositionGoal, yaw_of
 from aerobat.links.mavlink.autopilot_link import AutopilotLink
 from aerobat.links.mavlink.connection import Connection
-from aerobat.links.mavlink.frames import HOVER_THRUST
 from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.path_follower import PathFollower
 from aerobat.links.rehearsal import rehearse
@@ -25,6 +24,8 @@ from aerobat.planning import Plan
 
 _HOVER_TOLERANCE = 0.1  # [-] by which a vehicle's hovering thrust may differ from that of the plan's vehicle
 _STREAMED = 1.2  # [s] of set-points before PX4 takes the mode offboard
+_LIFT = 1.0  # [m] that a vehicle takes off by, which set-points do not lead off the ground
+_LIFTED = 0.2  # [m] off there, within which it is led on
 _PATIENCE = 8.0  # [s] for a vehicle to do as it is told
 _HOVERING = 3.0  # [s] of hover after an abort, before it lands
 _STILL = 0.3  # [m/s] of a hover
@@ -39,6 +40,7 @@ class ClientStage(StrEnum):
     CONNECTING = "connecting"
     ASKING = "asking the vehicle"
     ARMING = "arming"
+    TAKING_OFF = "taking off"
     FLYING = "flying"
     RECOVERING = "hovering after the abort"
     LANDING = "landing"
@@ -178,12 +180,15 @@ class Client:
             raise SpecError(f"the systems {numbers} answer; name the vehicle's by --system")
 
     def _while_asking(self, now: float) -> None:
-        """Wait for its clock, its state and its hovering thrust, and see that it is the plan's vehicle."""
+        """Wait for its clock, its state and its parameters, and see that it is the plan's vehicle."""
         self._require_one_system()
-        hover = self.settings.hover_thrust or self.link.parameters.get(HOVER_THRUST)
-        if hover is None:
-            self.link.ask_parameter(HOVER_THRUST)
-        if hover is not None and self.link.observed is not None and self.link.landed is not None:
+        dialect, parameters = self.link.dialect, self.link.parameters
+        hover = self.settings.hover_thrust or parameters.get(dialect.hover_thrust)
+        unknown = [name for name in dialect.settings if name not in parameters]
+        unknown += [dialect.hover_thrust] if hover is None else []
+        for name in unknown:
+            self.link.ask_parameter(name)
+        if hover and not unknown and self.link.observed is not None and self.link.landed is not None:
             self._check(hover)
             self._max_thrust = self._weight / hover
             body = self._observed.body
@@ -193,17 +198,28 @@ class Client:
             self._say(f"connected; a message takes {1e3 * self.link.delay:.0f} ms")
             if self._announcement:
                 self._say(self._announcement)
+            self.link.complaints.clear()
             self._enter(ClientStage.ARMING, now)
         elif self._since(now) > self.settings.wait:
-            missing, remedy = "its state (ODOMETRY)", "have it send that message"
+            missing = f"its state ({', '.join(dialect.states)})"
+            remedy = "have it send that"
+            if unknown:
+                missing, remedy = f"its parameter {unknown[-1]}", "have it send its parameters"
             if hover is None:
-                missing, remedy = f"its parameter {HOVER_THRUST}", "give --hover-thrust"
+                remedy = "give --hover-thrust"
             waited = f"{self.settings.wait:g} s"
             raise SpecError(f"the vehicle does not tell {missing} within {waited}; {remedy}")
 
     def _check(self, hover: float) -> None:
         if not self.link.landed:
             raise SpecError("the vehicle is flying already; land it first")
+        for name, setting in self.link.dialect.settings.items():
+            value = round(self.link.parameters[name])
+            if value & setting.mask != setting.bits:
+                wanted = value & ~setting.mask | setting.bits
+                raise SpecError(
+                    f"the vehicle's parameter {name} is {value}: {setting.meaning}; set it to {wanted}"
+                )
         if not abs(hover / self._own_hover - 1.0) <= _HOVER_TOLERANCE:
             raise SpecError(
                 f"the vehicle hovers at {hover:.3f} of its thrust, {self._name} at {self._own_hover:.3f}: "
@@ -221,19 +237,38 @@ class Client:
             if self.link.mode is Mode.OFFBOARD:
                 self.link.arm()
         if self.link.armed and self.link.mode is Mode.OFFBOARD:
-            self.mission.begin(now, self._observed)
-            self._enter(ClientStage.FLYING, now)
             self._say("armed")
+            self._enter(ClientStage.TAKING_OFF, now)
+            self._while_taking_off(now)
         elif self._since(now) > _PATIENCE:
             self._give_up_arming(now)
 
+    def _while_taking_off(self, now: float) -> None:
+        """Have it take off where set-points do not lead it off the ground; then fly."""
+        assert self._ground is not None, "its state is known"
+        height = self._observed.body.position[2] - self._ground.position[2]
+        if self.link.dialect.leads_off or abs(height - _LIFT) < _LIFTED:
+            self.mission.begin(now, self._observed)
+            self._enter(ClientStage.FLYING, now)
+        elif self._since(now) > _PATIENCE:
+            self._refuse(now, "take off")
+        else:
+            self.link.take_off(_LIFT)
+
     def _give_up_arming(self, now: float) -> None:
         """Raise SpecError; a vehicle that was ordered to arm may have, and is told to land before."""
-        what = "arm" if self.link.mode is Mode.OFFBOARD else "take the mode offboard"
-        self._refusal = f"the vehicle does not {what}; its own ground station says why"
-        if self.link.mode is not Mode.OFFBOARD:
+        has_mode = self.link.mode is Mode.OFFBOARD
+        self._refuse(now, "arm" if has_mode else "take the mode offboard", lands=has_mode)
+
+    def _refuse(self, now: float, what: str, lands: bool = True) -> None:
+        """Raise SpecError, with what ails the vehicle as it says, once it is on the ground."""
+        reason = ": " + "; ".join(self.link.complaints)
+        self._refusal = f"the vehicle does not {what}" + (
+            reason if self.link.complaints else "; its own ground station says why"
+        )
+        if not lands:
             raise SpecError(self._refusal)
-        self._land(now, "the vehicle does not arm")
+        self._land(now, f"the vehicle does not {what}")
 
     def _while_flying(self, now: float) -> None:
         phase = self.mission.phase

@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import cache, partial
 from importlib.util import find_spec
 from itertools import count
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
@@ -22,14 +22,16 @@ _KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
 _PATIENCE = 1.0  # [s] of the wall, for opening a broken link, and until that is tried again
 _MANY = 1000  # messages at once, after which others have their turn
 
+MavlinkMessage: TypeAlias = Any  # of pymavlink's own class
+
 
 class Connection(Protocol):
     """A way for messages."""
 
-    def receive(self) -> list[Any]:
+    def receive(self) -> list[MavlinkMessage]:
         """The messages that have come since the last call; never waits."""
 
-    def send(self, message: Any) -> None:
+    def send(self, message: MavlinkMessage) -> None:
         """Send a message of the dialect `common`."""
 
     def close(self) -> None:
@@ -105,9 +107,9 @@ class _PymavlinkConnection:
         self._link: Any = None
         self._open()
 
-    def receive(self) -> list[Any]:
+    def receive(self) -> list[MavlinkMessage]:
         """See `Connection.receive`."""
-        messages: list[Any] = []
+        messages: list[MavlinkMessage] = []
         if not self._is_open():
             return messages
         try:
@@ -118,7 +120,7 @@ class _PymavlinkConnection:
             self.close()
         return [message for message in messages if message.get_type() != "BAD_DATA"]
 
-    def send(self, message: Any) -> None:
+    def send(self, message: MavlinkMessage) -> None:
         """See `Connection.send`."""
         if self._is_open():
             try:
@@ -184,10 +186,10 @@ class LossyConnection:
         self._loss, self._delay = loss, delay
         self._random = np.random.default_rng(seed)
         self._order = count()
-        self._coming: list[tuple[float, int, Any]] = []
-        self._going: list[tuple[float, int, Any]] = []
+        self._coming: list[tuple[float, int, MavlinkMessage]] = []
+        self._going: list[tuple[float, int, MavlinkMessage]] = []
 
-    def receive(self) -> list[Any]:
+    def receive(self) -> list[MavlinkMessage]:
         """See `Connection.receive`; also sends what has waited for long enough."""
         for message in self._connection.receive():
             self._keep(self._coming, message)
@@ -195,7 +197,7 @@ class LossyConnection:
             self._connection.send(message)
         return self._due(self._coming)
 
-    def send(self, message: Any) -> None:
+    def send(self, message: MavlinkMessage) -> None:
         """See `Connection.send`."""
         self._keep(self._going, message)
 
@@ -203,11 +205,11 @@ class LossyConnection:
         """See `Connection.close`."""
         self._connection.close()
 
-    def _keep(self, queue: list[tuple[float, int, Any]], message: Any) -> None:
+    def _keep(self, queue: list[tuple[float, int, MavlinkMessage]], message: MavlinkMessage) -> None:
         if self._random.random() >= self._loss:
             heapq.heappush(queue, (self._clock.now() + self._delay, next(self._order), message))
 
-    def _due(self, queue: list[tuple[float, int, Any]]) -> list[Any]:
+    def _due(self, queue: list[tuple[float, int, MavlinkMessage]]) -> list[MavlinkMessage]:
         due = []
         while queue and queue[0][0] <= self._clock.now():
             due.append(heapq.heappop(queue)[2])

@@ -6,7 +6,8 @@ q_ned_frd = q_M ⊗ q_enu_flu ⊗ q_X with half turns about (1, 1, 0)/√2 and a
 of attitudes but for the quaternion's sign. Yaw is counted from north clockwise there, from east here.
 
 Thrust is a fraction of what all rotors can give, taken to grow linearly with it: T / T_max. What T_max is an
-autopilot says by the fraction at which it hovers, PX4's parameter MPC_THR_HOVER: T_max = m g / MPC_THR_HOVER.
+autopilot says by the fraction at which it hovers, T_max = m g / fraction: PX4's parameter MPC_THR_HOVER,
+ArduPilot's MOT_THST_HOVER.
 """
 
 from __future__ import annotations
@@ -19,7 +20,6 @@ from aerobat.kernels.quaternions import multiply
 _S = sqrt(0.5)
 _WORLD: Quaternion = (0.0, _S, _S, 0.0)
 _BODY: Quaternion = (0.0, 1.0, 0.0, 0.0)
-HOVER_THRUST = "MPC_THR_HOVER"  # the parameter by whose value thrusts are scaled
 _EARTH = 6_371_000.0  # [m] mean radius
 HOME = (47.397742, 8.545594, 488.0)  # [°], [°], [m] where simulated vehicles stand, as PX4's own do
 

@@ -1,4 +1,4 @@
-"""The simulated vehicle as an autopilot that MAVLink clients know how to fly: the messages of a PX4."""
+"""The simulated vehicle as an autopilot that MAVLink clients know: with the messages of PX4, or ArduPilot."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 from aerobat import so3
 from aerobat.links.autopilot.vehicle import POINT_TIMEOUT, SimulatedVehicle
 from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
-from aerobat.links.mavlink.connection import Connection, dialect
+from aerobat.links.mavlink.connection import Connection, MavlinkMessage, dialect
+from aerobat.links.mavlink.dialects import ARMED, CUSTOM_MODE_ENABLED, PX4, Dialect
 from aerobat.links.mavlink.frames import (
-    HOVER_THRUST,
     from_global,
     swap_attitude,
     swap_body,
@@ -21,11 +21,9 @@ from aerobat.links.mavlink.frames import (
     swap_yaw,
     to_global,
 )
-from aerobat.links.mavlink.modes import ARMED, CUSTOM_MODE_ENABLED, MAIN_AND_SUB, custom_mode
 
 SYSTEM = 1  # the vehicle's number
 _TAKEOFF_HEIGHT = "MIS_TAKEOFF_ALT"  # the one parameter that clients may set
-_FIRMWARE = 0x010F00FF  # 1.15.0, a release: which autopilot clients take it for
 _IGNORED_POSITION, _IGNORED_VELOCITY, _IGNORED_ACCELERATION, _IGNORED_YAW = 7, 56, 448, 1024
 _IGNORED_RATES, _IGNORED_ATTITUDE = 7, 128
 
@@ -38,18 +36,21 @@ class FrontEnd:
         vehicle: SimulatedVehicle,
         connection: Connection,
         say: Callable[[str], None] = lambda sentence: None,
+        speaks: Dialect = PX4,
     ) -> None:
-        self.vehicle = vehicle
+        self.vehicle, self.dialect = vehicle, speaks
+        self._guided = False  # in ArduPilot's mode GUIDED, in which it holds where no set-points come
         self._say = say
         self._connection = connection
         self._mavlink = dialect()
         self._began = vehicle.time
         self.parameters = {
-            HOVER_THRUST: vehicle.hover_fraction,
+            self.dialect.hover_thrust: vehicle.hover_fraction,
             _TAKEOFF_HEIGHT: 2.5,  # [m] PX4's own, until a client says otherwise
-            "COM_OF_LOSS_T": POINT_TIMEOUT,
+            self.dialect.silence: POINT_TIMEOUT,
+            **{name: float(setting.bits) for name, setting in self.dialect.settings.items()},
         }
-        self._streams: dict[int, tuple[Callable[[], Any], float]] = {
+        self._streams: dict[int, tuple[Callable[[], MavlinkMessage], float]] = {
             message.id: (make, interval)
             for message, make, interval in (
                 (self._mavlink.MAVLink_heartbeat_message, self._heartbeat, 0.5),
@@ -99,42 +100,53 @@ class FrontEnd:
     def _microseconds(self) -> int:
         return round(1e6 * (self.vehicle.time - self._began))
 
-    def _heartbeat(self) -> Any:
+    def _heartbeat(self) -> MavlinkMessage:
         armed = ARMED if self.vehicle.armed else 0
         state = 4 if self.vehicle.armed else 3  # active, or on standby
         kinds = {4: 2, 6: 13, 8: 14}  # quadrotor, hexarotor, octorotor
         kind = kinds.get(len(self.vehicle.vehicle.rotors), 2)
         return self._mavlink.MAVLink_heartbeat_message(
-            kind, 12, CUSTOM_MODE_ENABLED | armed, custom_mode(self.vehicle.mode), state, 3
+            kind,
+            self.dialect.autopilot,
+            CUSTOM_MODE_ENABLED | armed,
+            self.dialect.custom_mode(self._mode),
+            state,
+            3,
         )
 
-    def _sys_status(self) -> Any:
+    @property
+    def _mode(self) -> Mode:
+        """The mode as heartbeats tell it."""
+        guided = self._guided and self.vehicle.mode in (Mode.HOLD, Mode.TAKEOFF)
+        return Mode.OFFBOARD if guided else self.vehicle.mode
+
+    def _sys_status(self) -> MavlinkMessage:
         sensors = 0x2F | 0x0C00 | 1 << 28  # gyro, accelerometer, magnetometer, GPS, control, may be armed
         return self._mavlink.MAVLink_sys_status_message(
             sensors, sensors, sensors, 100, 16000, -1, 100, 0, 0, 0, 0, 0, 0
         )
 
-    def _extended_state(self) -> Any:
+    def _extended_state(self) -> MavlinkMessage:
         landed = 1 if self.vehicle.landed else {Mode.TAKEOFF: 3, Mode.LAND: 4}.get(self.vehicle.mode, 2)
         return self._mavlink.MAVLink_extended_sys_state_message(0, landed)
 
-    def _home(self) -> Any:
+    def _home(self) -> MavlinkMessage:
         latitude, longitude, altitude = to_global((0.0, 0.0, 0.0))
         return self._mavlink.MAVLink_home_position_message(
             latitude, longitude, round(1e3 * altitude), 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
         )
 
-    def _gps(self) -> Any:
+    def _gps(self) -> MavlinkMessage:
         latitude, longitude, altitude = to_global(self._position)
         return self._mavlink.MAVLink_gps_raw_int_message(
             self._microseconds, 3, latitude, longitude, round(1e3 * altitude), 100, 100, 0, 0, 12
         )
 
-    def _local_position(self) -> Any:
+    def _local_position(self) -> MavlinkMessage:
         place, velocity = swap_world(self._position), swap_world(self._velocity)
         return self._mavlink.MAVLink_local_position_ned_message(self._milliseconds, *place, *velocity)
 
-    def _attitude(self) -> Any:
+    def _attitude(self) -> MavlinkMessage:
         state = self.vehicle.state
         q, rates = (
             swap_attitude(tuple(state.q_world_body.tolist())),
@@ -142,7 +154,7 @@ class FrontEnd:
         )
         return self._mavlink.MAVLink_attitude_quaternion_message(self._milliseconds, *q, *rates)
 
-    def _global_position(self) -> Any:
+    def _global_position(self) -> MavlinkMessage:
         latitude, longitude, altitude = to_global(self._position)
         velocity = (round(100 * v) for v in swap_world(self._velocity))
         heights = round(1e3 * altitude), round(1e3 * self._position[2])
@@ -150,7 +162,7 @@ class FrontEnd:
             self._milliseconds, latitude, longitude, *heights, *velocity, self._heading
         )
 
-    def _odometry(self) -> Any:
+    def _odometry(self) -> MavlinkMessage:
         state = self.vehicle.state
         velocity = so3.unrotate(state.q_world_body, state.velocity)
         unknown = (nan, *(0.0,) * 20)
@@ -183,18 +195,18 @@ class FrontEnd:
 
     # what is taken
 
-    def _take_timesync(self, message: Any) -> None:
+    def _take_timesync(self, message: MavlinkMessage) -> None:
         if message.tc1 == 0:
             self._send("timesync", round(1e9 * (self.vehicle.time - self._began)), message.ts1)
 
-    def _take_param_request_read(self, message: Any) -> None:
+    def _take_param_request_read(self, message: MavlinkMessage) -> None:
         self._give_parameter(str(message.param_id))
 
-    def _take_param_request_list(self, message: Any) -> None:
+    def _take_param_request_list(self, message: MavlinkMessage) -> None:
         for name in self.parameters:
             self._give_parameter(name)
 
-    def _take_param_set(self, message: Any) -> None:
+    def _take_param_set(self, message: MavlinkMessage) -> None:
         if message.param_id == _TAKEOFF_HEIGHT and 0.5 <= message.param_value <= 100.0:
             self.parameters[message.param_id] = float(message.param_value)
         self._give_parameter(str(message.param_id))
@@ -204,42 +216,60 @@ class FrontEnd:
             index = list(self.parameters).index(name)
             self._send("param_value", name.encode(), self.parameters[name], 9, len(self.parameters), index)
 
-    def _take_command_long(self, message: Any) -> None:
+    def _take_command_long(self, message: MavlinkMessage) -> None:
         self._obey(message, (1e7 * message.param5, 1e7 * message.param6, message.param7))
 
-    def _take_command_int(self, message: Any) -> None:
+    def _take_command_int(self, message: MavlinkMessage) -> None:
         self._obey(message, (message.x, message.y, message.z))
 
-    def _obey(self, message: Any, place: tuple[float, float, float]) -> None:
+    def _obey(self, message: MavlinkMessage, place: tuple[float, float, float]) -> None:
         """Do what a command says, and acknowledge it: accepted, denied, or not known.
 
         `place`: latitude and longitude [1e-7 °] and altitude [m].
         """
         known: dict[int, Callable[[], bool]] = {
-            400: lambda: self.vehicle.arm() if message.param1 > 0.5 else self.vehicle.disarm(),
+            400: lambda: self._arm() if message.param1 > 0.5 else self.vehicle.disarm(),
             176: lambda: self._change_mode(_whole(message.param2), _whole(message.param3)),
-            22: self._take_off,
+            22: lambda: self._take_off(place[2]),
             21: self.vehicle.land,
             192: lambda: self._reposition(place, message.param4),
             511: lambda: self._set_interval(_whole(message.param1), message.param2),
             512: lambda: self._give_message(_whole(message.param1)),
         }
         act = known.get(message.command)
-        result = 3 if act is None else 0 if act() else 2  # unsupported, accepted, denied
+        result = 3 if act is None else 0 if act() else self.dialect.refused  # unsupported, accepted
         source = message.get_srcSystem(), message.get_srcComponent()
         self._send("command_ack", message.command, result, 0, 0, *source)
+
+    def _arm(self) -> bool:
+        """Arm, or say why not."""
+        if not self.dialect.leads_off and not self._guided:
+            reason = f"{self._mode.name} mode not armable"
+        elif self.vehicle.arm():
+            return True
+        else:
+            reason = "it lies where it crashed"
+        self._send("statustext", 2, f"{self.dialect.refusal}: {reason}".encode()[:50])
+        return False
 
     def _change_mode(self, main: int, sub: int) -> bool:
         orders = {
             Mode.TAKEOFF: self._take_off,
             Mode.HOLD: self.vehicle.hold,
             Mode.LAND: self.vehicle.land,
-            Mode.OFFBOARD: self.vehicle.go_offboard,
+            Mode.OFFBOARD: self.vehicle.go_offboard if self.dialect.leads_off else self.vehicle.hold,
         }
-        return any(orders[mode]() for mode, numbers in MAIN_AND_SUB.items() if numbers == (main, sub))
+        wanted = next((mode for mode, numbers in self.dialect.modes.items() if numbers == (main, sub)), None)
+        if wanted is None or not ((wanted is Mode.OFFBOARD and self._guided) or orders[wanted]()):
+            return False
+        self._guided = wanted is Mode.OFFBOARD and not self.dialect.leads_off
+        return True
 
-    def _take_off(self) -> bool:
-        return self.vehicle.take_off(self.parameters[_TAKEOFF_HEIGHT])
+    def _take_off(self, height: float = 0.0) -> bool:
+        """Climb, PX4 by its own height, others by the order's [m], when they are guided."""
+        if self.dialect.leads_off:
+            height = self.parameters[_TAKEOFF_HEIGHT]
+        return height > 0.0 and (self.dialect.leads_off or self._guided) and self.vehicle.take_off(height)
 
     def _reposition(self, place: tuple[float, float, float], yaw: float) -> bool:
         latitude, longitude, altitude = place
@@ -260,7 +290,18 @@ class FrontEnd:
         if identity == self._mavlink.MAVLink_autopilot_version_message.id:
             capabilities = 64 | 128 | 8192 | 16384  # set-points in three ways, MAVLink 2
             self._send(
-                "autopilot_version", capabilities, _FIRMWARE, 0, 0, 0, (0,) * 8, (0,) * 8, (0,) * 8, 0, 0, 1
+                "autopilot_version",
+                capabilities,
+                self.dialect.firmware,
+                0,
+                0,
+                0,
+                (0,) * 8,
+                (0,) * 8,
+                (0,) * 8,
+                0,
+                0,
+                1,
             )
             return True
         if identity not in self._streams:
@@ -268,7 +309,7 @@ class FrontEnd:
         self._connection.send(self._streams[identity][0]())
         return True
 
-    def _take_set_position_target_local_ned(self, message: Any) -> None:
+    def _take_set_position_target_local_ned(self, message: MavlinkMessage) -> None:
         """A point with its velocity and acceleration; of velocity alone, from where the vehicle is."""
         mask = message.type_mask
         state = self.vehicle.state
@@ -284,8 +325,9 @@ class FrontEnd:
         numbers = np.concatenate([position, velocity, acceleration, [yaw]])
         if np.isfinite(numbers).all():
             self.vehicle.follow_point(PositionGoal(position, velocity, acceleration, yaw))
+            self._obey_set_points(not self.vehicle.landed)
 
-    def _take_set_attitude_target(self, message: Any) -> None:
+    def _take_set_attitude_target(self, message: MavlinkMessage) -> None:
         """An attitude with its rates and thrust; without the attitude it is not followed."""
         if message.type_mask & _IGNORED_ATTITUDE:
             return
@@ -296,6 +338,12 @@ class FrontEnd:
         thrust = message.thrust * float(self.vehicle.vehicle.max_thrusts.sum())
         if np.isfinite([*q, *rates, thrust]).all() and np.linalg.norm(q) > 0.5:
             self.vehicle.follow_attitude(AttitudeGoal(q, rates, thrust), 1e-3 * message.time_boot_ms)
+            self._obey_set_points(thrust > 0.0)
+
+    def _obey_set_points(self, flies: bool) -> None:
+        """Go where set-points lead in the mode GUIDED, which is on without any too."""
+        if flies and self._guided and self.vehicle.mode in (Mode.HOLD, Mode.TAKEOFF):
+            self.vehicle.go_offboard()
 
 
 def _whole(number: float) -> int:

@@ -6,16 +6,17 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
+from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
-from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages
+from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, RosMessage
 from aerobat.links.commander import Commander, Doing
 from aerobat.links.goals import Observed, PathGoal, PathPiece, yaw_of
-from aerobat.links.mission import Mission, MissionSettings
+from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.path_follower import PathForwarder
 from aerobat.links.rehearsal import rehearse
 from aerobat.links.report import LinkReport
@@ -40,9 +41,24 @@ class NodeSettings:
     takeoff_height: float = 3.0  # [m]
     in_world: bool = False  # whether gates and goals stay where their problems have them
     with_jerk: bool = True  # whether goals tell the jerk, as a second joint
+    in_pieces: bool = False  # whether plans are for a Crazyflie that flies them by itself
     goal: str = topics.GOAL
     odometry: str = topics.ODOMETRY
     mission: MissionSettings = field(default_factory=MissionSettings)
+
+
+class Tick(NamedTuple):
+    """What is due at one tick, for what flies the vehicle."""
+
+    piece: PathPiece | None  # of the path, that begins; None where there is no goal
+    seen: Observed | None  # the last state, None before the first
+    now: float  # [s]
+    stamp: int  # [ns] when the piece begins, by ROS time
+    doing: Doing
+    way: tuple[Array, float, float] | None  # see `Commander.way`
+    ground: float  # [m] where it took off
+    flown: Prepared | None  # the maneuver that is flown
+    is_flown: bool  # whether its plan is: neither the way to its start nor the hover at its end
 
 
 class ManeuverNode:
@@ -56,7 +72,7 @@ class ManeuverNode:
         executor: Executor,
         settings: NodeSettings = NodeSettings(),
         say: Callable[[str], None] = lambda sentence: None,
-        take: Callable[[PathPiece | None, Observed | None, float], None] | None = None,
+        take: Callable[[Tick], None] | None = None,
     ) -> None:
         """Offer the services.
 
@@ -67,8 +83,7 @@ class ManeuverNode:
             executor: what plans, beside this process.
             settings: of the node.
             say: what takes sentences about the course of things.
-            take: what flies the vehicle in place of the topic of goals, told of every tick: the piece of a
-                path that begins, if one does, the last state, and the time [s].
+            take: what flies the vehicle in place of the topic of goals, told of every tick.
         """
         self.origin = ros.time()  # [ns]
         self._ros = ros
@@ -105,15 +120,29 @@ class ManeuverNode:
         if goal is not None and self._last is not None:
             stamp, before = self._last
             piece = PathPiece(before, goal, stamp, now + self._period - stamp)
-        self._take(piece, self.commander.seen, now)
+        self._take(self._due(piece, now))
         self._last = None if goal is None else (now + self._period, goal)
         self._follow_up()
 
-    def _send(self, publish: Callable[[object], None], piece: PathPiece | None, *_: object) -> None:
+    def _due(self, piece: PathPiece | None, now: float) -> Tick:
+        commander, mission = self.commander, self.commander.mission
+        maneuvers = commander.doing is Doing.MANEUVERING
+        return Tick(
+            piece,
+            commander.seen,
+            now,
+            self.origin + round((now if piece is None else piece.stamp) * NANOSECONDS),
+            commander.doing,
+            commander.way(now),
+            commander.ground,
+            self._flown if maneuvers else None,
+            maneuvers and mission is not None and mission.phase is Phase.MANEUVER,
+        )
+
+    def _send(self, publish: Callable[[object], None], tick: Tick) -> None:
         """Publish a piece of a path, if there is one."""
-        if piece is not None:
-            at = self.origin + round(piece.stamp * NANOSECONDS)
-            publish(topics.goal_message(self._messages, piece, at, self.settings.with_jerk))
+        if tick.piece is not None:
+            publish(topics.goal_message(self._messages, tick.piece, tick.stamp, self.settings.with_jerk))
 
     def _follow_up(self) -> None:
         """Have a maneuver judged once it is over, and tell what came of it."""
@@ -130,7 +159,7 @@ class ManeuverNode:
             self._say(sentence)
             self._send_report(self._messages.make(topics.KIND_OF_REPORT, data=sentence))
 
-    def _take_odometry(self, message: Any) -> None:
+    def _take_odometry(self, message: RosMessage) -> None:
         """Take a state, unless it cannot be one."""
         seen = topics.read_odometry(message, self.origin)
         if seen is None:
@@ -179,6 +208,7 @@ class ManeuverNode:
             yaw_of(seen.body.q_world_body),
             self.commander.ground,
             self.settings.in_world,
+            self.settings.in_pieces,
         )
         self._planning = self._executor.submit(prepare, request), answer
 

@@ -25,10 +25,16 @@ _MAX_STEP = 0.01  # [s] between two looks at a clock that waits, its own process
 _MAX_WAIT, _MIN_WAIT = 0.005, 0.0002  # [s] between looks at a clock that may run at another pace than ours
 
 
-def message_class(kind: str) -> Any:
-    """The class of messages of a kind, package/msg/Name, of whichever ROS is at hand."""
-    package, _, name = kind.split("/")
-    return getattr(import_module(f"{package}.msg"), name)
+def interface_class(kind: str) -> Any:
+    """The class of messages or services of a kind, package/msg/Name or package/srv/Name, of the ROS at hand.
+
+    Raises SpecError where its package is not there.
+    """
+    package, folder, name = kind.split("/")
+    try:
+        return getattr(import_module(f"{package}.{folder}"), name)
+    except ImportError as error:
+        raise SpecError(f"{package} is not found ({error}); source the workspace that has built it") from None
 
 
 class PacedClock:

@@ -9,6 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import AerobatError, Infeasible, SpecError
+from aerobat.interchange.exports.crazyflie import Pieces, fitted_pieces
 from aerobat.links.goals import Observed
 from aerobat.links.mission import require_flyable
 from aerobat.links.report import LinkReport, link_report
@@ -39,6 +40,7 @@ class ManeuverRequest:
     yaw: float  # [rad] likewise
     ground: float  # [m] the height of the ground
     in_world: bool  # whether gates and goal stay where the problem has them; else they move with its start
+    in_pieces: bool = False  # whether a Crazyflie is to fly it by itself
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,7 @@ class Prepared:
     offset: Array  # [m] where its origin lies in the world, (3,)
     stream: SetpointStream
     announcement: str
+    pieces: Pieces | None = None  # for a Crazyflie that flies them by itself, from the plan's own origin
 
 
 def prepare(request: ManeuverRequest) -> Prepared | str:
@@ -73,7 +76,8 @@ def _prepared(request: ManeuverRequest) -> Prepared:
     told = f"'{problem.name}' in {found.duration:.2f} s{through}, {found.planner}; {way_back}"
     assert found.vehicle is not None, "it was planned for one"
     stream = SetpointStream(found.trajectory, found.vehicle, problem.environment, offset)
-    return Prepared(found, offset, stream, told)
+    pieces = fitted_pieces(found)[0] if request.in_pieces else None
+    return Prepared(found, offset, stream, told, pieces)
 
 
 def _from_here(request: ManeuverRequest) -> tuple[Problem, Array]:

@@ -8,18 +8,19 @@ from math import inf
 from threading import Thread
 from typing import Any
 
-from aerobat.errors import BackendMissing
+from aerobat.errors import BackendMissing, SpecError
 from aerobat.links.ros.middleware import (
     NEWEST,
     QUEUE,
     Answer,
     Calls,
     PacedClock,
-    message_class,
+    interface_class,
     require_time,
 )
 
 _THREADS = 4  # services wait for their answers, each in one
+_OFFERED = 10.0  # [s] of the wall, for which a service of another node is waited for
 
 
 class RclpyMiddleware:
@@ -55,7 +56,7 @@ class RclpyMiddleware:
     @staticmethod
     def make(kind: str, /, **given: Any) -> Any:
         """See `Make.__call__`."""
-        return message_class(kind)(**given)
+        return interface_class(kind)(**given)
 
     def time(self) -> int:
         """See `Middleware.time`."""
@@ -67,7 +68,7 @@ class RclpyMiddleware:
         durability = qos.DurabilityPolicy.TRANSIENT_LOCAL if latched else qos.DurabilityPolicy.VOLATILE
         profile = qos.QoSProfile(depth=1 if latched else QUEUE, durability=durability)
         publish: Callable[[Any], None] = self._node.create_publisher(
-            message_class(kind), topic, profile
+            interface_class(kind), topic, profile
         ).publish
         return publish
 
@@ -76,7 +77,7 @@ class RclpyMiddleware:
         qos = import_module("rclpy.qos")
         reliability = qos.ReliabilityPolicy.RELIABLE if every else qos.ReliabilityPolicy.BEST_EFFORT
         self._node.create_subscription(
-            message_class(kind),
+            interface_class(kind),
             topic,
             lambda message: self._calls.put(lambda: take(message)),
             qos.QoSProfile(depth=QUEUE if every else NEWEST, reliability=reliability),
@@ -91,6 +92,23 @@ class RclpyMiddleware:
             return response
 
         self._waiting.create_service(trigger, service, respond, callback_group=self._services)
+
+    def client(self, service: str, kind: str) -> Callable[..., None]:
+        """See `crazyswarm.Ros2.client`. Raises SpecError where nobody offers it."""
+        asked = interface_class(kind)
+        client = self._waiting.create_client(asked, service, callback_group=self._services)
+        if not client.wait_for_service(_OFFERED):
+            raise SpecError(f"nobody offers the service {service}; start crazyswarm2's server first")
+        return lambda **given: client.call_async(asked.Request(**given))
+
+    def serve(self, service: str, kind: str, take: Callable[[Any], None]) -> None:
+        """See `crazyswarm.Ros2.serve`."""
+
+        def respond(request: Any, response: Any) -> Any:
+            self._calls.put(lambda: take(request))
+            return response
+
+        self._waiting.create_service(interface_class(kind), service, respond, callback_group=self._services)
 
     def work_until(self, instant: int, patience: float = inf) -> None:
         """See `Middleware.work_until`."""

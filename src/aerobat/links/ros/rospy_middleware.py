@@ -14,7 +14,7 @@ from aerobat.links.ros.middleware import (
     Answer,
     Calls,
     PacedClock,
-    message_class,
+    interface_class,
     require_time,
 )
 
@@ -51,7 +51,7 @@ class RospyMiddleware:
         package, _, name = kind.split("/")
         if package == "builtin_interfaces":
             return getattr(import_module("genpy"), name)(given["sec"], given["nanosec"])
-        return message_class(kind)(**given)
+        return interface_class(kind)(**given)
 
     def time(self) -> int:
         """See `Middleware.time`."""
@@ -60,7 +60,7 @@ class RospyMiddleware:
     def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
         """See `Middleware.publisher`."""
         publish: Callable[[Any], None] = self._rospy.Publisher(
-            topic, message_class(kind), queue_size=QUEUE, latch=latched, tcp_nodelay=True
+            topic, interface_class(kind), queue_size=QUEUE, latch=latched, tcp_nodelay=True
         ).publish
         return publish
 
@@ -68,7 +68,7 @@ class RospyMiddleware:
         """See `Middleware.subscribe`."""
         self._rospy.Subscriber(
             topic,
-            message_class(kind),
+            interface_class(kind),
             lambda message: self._calls.put(lambda: take(message)),
             queue_size=None if every else NEWEST,
             tcp_nodelay=True,

@@ -8,13 +8,11 @@ velocity is therefore the acceleration, and whose acceleration is the jerk.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.interchange.ros import BODY, NANOSECONDS, JointMotion, Messages
+from aerobat.interchange.ros import BODY, NANOSECONDS, JointMotion, Messages, RosMessage
 from aerobat.links.goals import Observed, PathGoal, PathPiece, observed
 
 GOAL, ODOMETRY = "/aerobat/goal", "/aerobat/odometry"
@@ -30,7 +28,7 @@ _ALONE = 1.0  # [s] for which a goal of one point tells the way, more than it is
 _ZERO: Array = np.zeros(3)
 
 
-def goal_message(messages: Messages, piece: PathPiece, stamp: int, with_jerk: bool = True) -> Any:
+def goal_message(messages: Messages, piece: PathPiece, stamp: int, with_jerk: bool = True) -> RosMessage:
     """A piece of a path from a stamp [ns] on; without the jerk it has the vehicle's joint alone."""
     later = round(piece.duration * NANOSECONDS)
     points = [
@@ -42,7 +40,7 @@ def goal_message(messages: Messages, piece: PathPiece, stamp: int, with_jerk: bo
     return messages.make(KIND_OF_GOAL, header=header, joint_names=names, points=points)
 
 
-def read_goal(message: Any, origin: int) -> PathPiece | None:
+def read_goal(message: RosMessage, origin: int) -> PathPiece | None:
     """The piece of a path that a message tells, by a clock that began at an instant [ns]; None if malformed.
 
     Of a goal of others the jerk, a second point, velocities and accelerations may be missing.
@@ -61,7 +59,7 @@ def read_goal(message: Any, origin: int) -> PathPiece | None:
     return PathPiece(begin, end, (nanoseconds(message.header.stamp) - origin) / NANOSECONDS, duration)
 
 
-def read_odometry(message: Any, origin: int) -> Observed | None:
+def read_odometry(message: RosMessage, origin: int) -> Observed | None:
     """Return a state by a clock that began at an instant [ns]; see `observed` for what is none.
 
     The message has its velocities in the body's axes.
@@ -73,7 +71,7 @@ def read_odometry(message: Any, origin: int) -> Observed | None:
     return observed(time, place, (q.w, q.x, q.y, q.z), velocity, rates)
 
 
-def nanoseconds(time: Any) -> int:
+def nanoseconds(time: RosMessage) -> int:
     """An instant or a duration of either ROS [ns]."""
     if hasattr(time, "nanosec"):
         return int(time.sec) * NANOSECONDS + int(time.nanosec)
@@ -88,14 +86,14 @@ def _joints(goal: PathGoal) -> tuple[JointMotion, JointMotion]:
     )
 
 
-def _read_point(point: Any) -> PathGoal:
+def _read_point(point: RosMessage) -> PathGoal:
     twists = [
-        (_vector(found[0].linear), _vector(found[0].angular)) if found else (_ZERO, _ZERO)
+        (vector(found[0].linear), vector(found[0].angular)) if found else (_ZERO, _ZERO)
         for found in (point.velocities, point.accelerations)
     ]
     (velocity, omega), (acceleration, omega_dot) = twists
-    jerk = _vector(point.accelerations[1].linear) if len(point.accelerations) > 1 else _ZERO
-    place, q = _vector(point.transforms[0].translation), _quaternion(point.transforms[0].rotation)
+    jerk = vector(point.accelerations[1].linear) if len(point.accelerations) > 1 else _ZERO
+    place, q = vector(point.transforms[0].translation), quaternion(point.transforms[0].rotation)
     return PathGoal(place, velocity, acceleration, jerk, q, omega, omega_dot)
 
 
@@ -103,9 +101,11 @@ def _norm(goal: PathGoal) -> float:
     return float(np.linalg.norm(goal.q_world_body))
 
 
-def _vector(message: Any) -> Array:
+def vector(message: RosMessage) -> Array:
+    """A Vector3 or a Point of either ROS, (3,)."""
     return np.array([message.x, message.y, message.z])
 
 
-def _quaternion(message: Any) -> Array:
+def quaternion(message: RosMessage) -> Array:
+    """A Quaternion of either ROS, (w, x, y, z)."""
     return np.array([message.w, message.x, message.y, message.z])

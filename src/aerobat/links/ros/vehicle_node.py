@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
-from aerobat.interchange.ros import NANOSECONDS, Messages
+from aerobat.interchange.ros import NANOSECONDS, Messages, RosMessage
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.goals import Mode, PathGoal, PathPiece
 from aerobat.links.ros import topics
@@ -84,7 +83,7 @@ class VehicleNode:
     def _stamp(self, time: float) -> int:
         return self.origin + round(time * NANOSECONDS)
 
-    def _take_goal(self, message: Any) -> None:
+    def _take_goal(self, message: RosMessage) -> None:
         piece = topics.read_goal(message, self.origin)
         if piece is None:
             self._refuse("a goal is malformed, or its numbers are not finite")

@@ -98,6 +98,11 @@ class Inspection:
 
     @property
     def cause(self) -> str | None:
+        """The inner loop's fault, whatever it cost; else the largest error's main cause, if it has one."""
+        return self._main_cause if self.fault is None else self.fault.cause
+
+    @property
+    def _main_cause(self) -> str | None:
         """The largest error's main cause, None where the error is too small for one."""
         return None if self.largest < NEGLIGIBLE else self.shares[0].cause
 
@@ -143,7 +148,7 @@ class Inspection:
             "the log does not hold what an observer saw: hand-offs and other errors of sensors do not show"
         )
         asked = {
-            str(self.fault): self.fault is not None and self.fault.cause == self.cause,
+            str(self.fault): self.fault is not None and self.fault.cause == self._main_cause,
             f"{shift}; {moved}": not place.is_none,
             blind: not self.observed,
         }
@@ -152,13 +157,13 @@ class Inspection:
     @property
     def verdict(self) -> str:
         """The main cause and what would mend it, in one sentence; before it a fault of the inner loop."""
-        if self.fault is None or self.fault.cause == self.cause:
-            return self._main_cause
-        return f"{self.fault}; {CAUSES[self.fault.cause][1]}. Of the error: {self._main_cause}"
+        if self.fault is None or self.fault.cause == self._main_cause:
+            return self._explanation
+        return f"{self.fault}; {CAUSES[self.fault.cause][1]}. Of the error: {self._explanation}"
 
     @property
-    def _main_cause(self) -> str:
-        if self.cause is None:
+    def _explanation(self) -> str:
+        if self._main_cause is None:
             return f"nothing stands out: the error is {length(self.largest)} at most"
         first = self.shares[0]
         name, remedy = CAUSES[first.cause]

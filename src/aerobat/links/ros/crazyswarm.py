@@ -1,0 +1,131 @@
+"""A Crazyflie behind crazyswarm2's server of ROS 2: what its services and its topic of full states are told.
+
+Ways to a hover and to the ground are the firmware's own: it hovers by itself where nobody tells it anything.
+Maneuvers are streamed as full states, or, where the plan has the pieces, uploaded and flown by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.interchange.exports.crazyflie import AXES
+from aerobat.interchange.ros import NANOSECONDS, Messages, RosMessage
+from aerobat.links.commander import Doing
+from aerobat.links.goals import PathPiece
+from aerobat.links.ros.maneuver_node import Tick
+from aerobat.links.ros.middleware import Middleware
+from aerobat.links.ros.preparation import Prepared
+
+PREFIX = "crazyswarm2:"  # of a goal that is a Crazyflie's name
+FULL_STATE = "crazyflie_interfaces/msg/FullState"
+SERVICES = {
+    "takeoff": "crazyflie_interfaces/srv/Takeoff",
+    "land": "crazyflie_interfaces/srv/Land",
+    "go_to": "crazyflie_interfaces/srv/GoTo",
+    "upload_trajectory": "crazyflie_interfaces/srv/UploadTrajectory",
+    "start_trajectory": "crazyflie_interfaces/srv/StartTrajectory",
+    "notify_setpoints_stop": "crazyflie_interfaces/srv/NotifySetpointsStop",
+}
+_PIECE = "crazyflie_interfaces/msg/TrajectoryPolynomialPiece"
+_VALID = 100  # [ms] for which the last full state counts once no more come
+_SHORTEST = 0.5  # [s] of a way, however near its end is
+_TRAJECTORY = 1  # the number of the trajectory that is flown
+
+
+class Ros2(Middleware, Protocol):
+    """A node's access to ROS 2, with services of others."""
+
+    def client(self, service: str, kind: str) -> Callable[..., None]:
+        """What asks a service that is there, by its request's fields; its answer is not waited for."""
+
+    def serve(self, service: str, kind: str, take: Callable[[RosMessage], None]) -> None:
+        """Offer a service whose answer is empty."""
+
+
+class Crazyflie:
+    """What the server is told at each tick; see `take`."""
+
+    def __init__(self, ros: Ros2, name: str) -> None:
+        """Find the services of a Crazyflie by its name, as in /cf231."""
+        self._messages = Messages(ros.make)
+        self._publish = ros.publisher(f"{name}/cmd_full_state", FULL_STATE)
+        self._ask = {service: ros.client(f"{name}/{service}", kind) for service, kind in SERVICES.items()}
+        self._doing = Doing.NOTHING
+        self._streams = self._flies = False  # whether full states are sent, and a trajectory is flown
+
+    def take(self, tick: Tick) -> None:
+        """Tell what is due: an order where another way begins, else the full state of a maneuver's goal."""
+        enters, self._doing = tick.doing is not self._doing, tick.doing
+        own = tick.flown is not None and tick.flown.pieces is not None
+        if tick.way is None and tick.doing is Doing.NOTHING:
+            if enters and self._streams:  # in the air: the firmware stops the rotors where full states stop
+                self._order("go_to", relative=True, duration=self._duration(_SHORTEST))
+        elif tick.way is not None and tick.doing is not Doing.BRAKING:
+            if enters:
+                self._go(tick)
+        elif own and tick.flown is not None and tick.is_flown:
+            if not self._flies:
+                start = {"trajectory_id": _TRAJECTORY, "timescale": 1.0}
+                self._order("start_trajectory", **start, reversed=False, relative=False)
+            self._flies = True
+        elif tick.piece is not None:
+            if enters and own and tick.flown is not None:
+                self._upload(tick.flown)
+            self._flies, self._streams = False, True
+            self._publish(self._full_state(tick.piece, tick.stamp))
+
+    def _go(self, tick: Tick) -> None:
+        """Order the way that begins."""
+        assert tick.way is not None, "asked on a way only"
+        end, yaw, left = tick.way
+        duration = self._duration(max(left, _SHORTEST))
+        if tick.doing is Doing.CLIMBING:
+            self._order("takeoff", height=float(end[2]), duration=duration)
+        elif tick.doing is Doing.LANDING:
+            self._order("land", height=tick.ground, duration=duration)
+        else:
+            goal = self._messages.vector("Point", end)
+            self._order("go_to", relative=False, goal=goal, yaw=yaw, duration=duration)
+
+    def _order(self, service: str, **given: Any) -> None:
+        """Ask for a way of the firmware's own, in place of full states."""
+        if self._streams:
+            self._ask["notify_setpoints_stop"](group_mask=0, remain_valid_millisecs=_VALID)
+        self._streams = False
+        self._ask[service](group_mask=0, **given)
+
+    def _upload(self, flown: Prepared) -> None:
+        assert flown.pieces is not None, "asked of plans that have them"
+        moved = flown.pieces.copy()
+        moved["polynomials"][:, :3, 0] += flown.offset
+        pieces = [
+            self._messages.make(
+                _PIECE,
+                **{
+                    f"poly_{axis}": numbers
+                    for axis, numbers in zip(AXES, piece["polynomials"].tolist(), strict=True)
+                },
+                duration=self._duration(float(piece["duration"])),
+            )
+            for piece in moved
+        ]
+        self._ask["upload_trajectory"](trajectory_id=_TRAJECTORY, piece_offset=0, pieces=pieces)
+
+    def _full_state(self, piece: PathPiece, stamp: int) -> RosMessage:
+        """The goal that begins; body rates are in the body's axes there."""
+        goal = piece.begin
+        omega_body = so3.unrotate(goal.q_world_body, np.asarray(goal.omega))
+        return self._messages.make(
+            FULL_STATE,
+            header=self._messages.header(stamp),
+            pose=self._messages.pose(goal.position, goal.q_world_body),
+            twist=self._messages.twist(goal.velocity, omega_body),
+            acc=self._messages.vector("Vector3", goal.acceleration),
+        )
+
+    def _duration(self, seconds: float) -> RosMessage:
+        return self._messages.time("Duration", round(seconds * NANOSECONDS))

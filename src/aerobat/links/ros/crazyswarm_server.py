@@ -1,0 +1,125 @@
+"""The simulated vehicle as a Crazyflie behind crazyswarm2's server: orders in, odometry out.
+
+A stand-in: ways are flown at the simulated vehicle's own speeds, trajectories in the heading of their begin.
+Jerk and angular acceleration, which full states leave out, are taken from the last two.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.arrays import Array
+from aerobat.environment import Environment
+from aerobat.interchange.exports.crazyflie import AXES, PIECE, as_path
+from aerobat.interchange.ros import NANOSECONDS, RosMessage
+from aerobat.links.autopilot.vehicle import SimulatedVehicle
+from aerobat.links.goals import Mode, PathGoal, PathPiece
+from aerobat.links.path_follower import PathForwarder
+from aerobat.links.ros import topics
+from aerobat.links.ros.crazyswarm import FULL_STATE, SERVICES, Ros2
+from aerobat.links.ros.vehicle_node import VehicleNode
+from aerobat.links.stream import SetpointStream
+
+_KEPT = 0.5  # [s] for which a full state is carried on at most
+_STREAM = 0.05  # [s] between two full states of one stream, at most
+_AHEAD = 0.01  # [s] of a trajectory, given to the controller at once
+_ZERO: Array = np.zeros(3)
+
+
+class CrazyswarmServer(VehicleNode):
+    """The services of one Crazyflie; `tick` it often."""
+
+    def __init__(self, ros: Ros2, vehicle: SimulatedVehicle, name: str, **settings: Any) -> None:
+        """Offer the services of a name, as in /cf231; see `VehicleNode` for the settings."""
+        super().__init__(ros, vehicle, goal=f"{name}/goal", odometry=f"{name}/odom", **settings)
+        self._trajectories: dict[int, list[RosMessage]] = {}
+        self._flown: tuple[SetpointStream, float] | None = None  # and when it began [s]
+        nowhere = PathGoal(_ZERO, _ZERO, _ZERO, _ZERO, so3.IDENTITY, _ZERO, _ZERO)
+        self._last = nowhere, -np.inf  # the last full state, and its stamp [s]
+        ros.subscribe(f"{name}/cmd_full_state", FULL_STATE, self._take_full_state)
+        for service, kind in SERVICES.items():
+            ros.serve(f"{name}/{service}", kind, getattr(self, f"_{service}"))
+
+    def tick(self, now: float) -> None:
+        """Go on to this time [s] along the trajectory, and send what is due."""
+        if self._flown is not None:
+            stream, began = self._flown
+            since, forward = self.vehicle.time - began, PathForwarder(stream)
+            if since < stream.duration:
+                ends = forward.command(since), forward.command(since + _AHEAD)
+                self._follow(PathPiece(*ends, self.vehicle.time, _AHEAD))
+            else:
+                self._flown = None
+                self.vehicle.go_to(stream.flat(stream.duration).position)
+        super().tick(now)
+
+    def _follow(self, piece: PathPiece) -> None:
+        """Follow a piece of a path, in the air."""
+        if not self.vehicle.landed:
+            self.vehicle.follow_path(piece)
+            if self.vehicle.mode is not Mode.OFFBOARD:
+                self.vehicle.go_offboard()
+
+    def _take_full_state(self, message: RosMessage) -> None:
+        self._flown = None
+        pose, twist = message.pose, message.twist
+        q = topics.quaternion(pose.orientation)
+        position, velocity, omega, acceleration = map(
+            topics.vector, (pose.position, twist.linear, twist.angular, message.acc)
+        )
+        stamp = (topics.nanoseconds(message.header.stamp) - self.origin) / NANOSECONDS
+        goal = PathGoal(position, velocity, acceleration, _ZERO, q, so3.rotate(q, omega), _ZERO)
+        if np.isfinite(np.concatenate([*goal, [stamp]])).all():
+            goal = self._changing(goal, stamp)
+            self.vehicle.advance(stamp)
+            self._follow(PathPiece(goal, goal, stamp, _KEPT))
+
+    def _changing(self, goal: PathGoal, stamp: float) -> PathGoal:
+        """The same, changing as it did since the one before."""
+        (before, when), self._last = self._last, (goal, stamp)
+        elapsed = stamp - when
+        if not 0.0 < elapsed < _STREAM:
+            return goal
+        jerk, turning = goal.acceleration - before.acceleration, goal.omega - before.omega
+        return goal._replace(jerk=jerk / elapsed, omega_dot=turning / elapsed)
+
+    def _takeoff(self, request: RosMessage) -> None:
+        self.vehicle.arm()
+        self.vehicle.take_off(request.height - self.vehicle.state.position[2])
+
+    def _land(self, request: RosMessage) -> None:
+        self._flown = None
+        self.vehicle.land()
+
+    def _go_to(self, request: RosMessage) -> None:
+        self._flown = None
+        here = self.vehicle.state.position if request.relative else _ZERO
+        self.vehicle.go_to(here + topics.vector(request.goal), None if request.relative else request.yaw)
+
+    def _notify_setpoints_stop(self, request: RosMessage) -> None:
+        if self.vehicle.mode is Mode.OFFBOARD and self._flown is None:
+            self.vehicle.hold()
+
+    def _upload_trajectory(self, request: RosMessage) -> None:
+        known = self._trajectories.setdefault(request.trajectory_id, [])
+        known[request.piece_offset :] = request.pieces
+
+    def _start_trajectory(self, request: RosMessage) -> None:
+        uploaded = self._trajectories.get(request.trajectory_id, [])
+        if not uploaded or request.timescale != 1.0 or request.reversed:
+            self._say("trajectories are flown once uploaded, forwards, in their own time; none begins")
+            return
+        pieces = np.zeros(len(uploaded), dtype=PIECE)
+        for piece, told in zip(pieces, uploaded, strict=True):
+            piece["duration"] = topics.nanoseconds(told.duration) / NANOSECONDS
+            for numbers, axis in zip(piece["polynomials"], AXES, strict=True):
+                polynomial = getattr(told, f"poly_{axis}")
+                numbers[: len(polynomial)] = polynomial
+        path = as_path(pieces, heading=float(pieces["polynomials"][0, 3, 0]))
+        here = self.vehicle.state.position
+        offset = here - path.evaluate(0.0) if request.relative else _ZERO
+        stream = SetpointStream(path, self.vehicle.vehicle, Environment(), offset)
+        self._flown = stream, self.vehicle.time
