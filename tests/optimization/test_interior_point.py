@@ -29,9 +29,6 @@ class DenseRows:
     def transposed(self, weights: Array) -> Array:
         return np.asarray(self.matrix.T @ weights)
 
-    def normal(self, weights: Array) -> Array:
-        return np.asarray(self.matrix.T @ (weights[:, None] * self.matrix))
-
 
 @dataclass
 class Quadratics:
@@ -77,9 +74,10 @@ class QuadraticsPoint:
     def equality_rows(self) -> Array:
         return self.program.equal
 
-    def curvature(self, weights: Array, equality_weights: Array) -> Array:
+    def curvature(self, weights: Array, equality_weights: Array, squares: Array) -> Array:
         del equality_weights
-        return np.asarray(np.tensordot(weights, self.program.squares, 1))
+        rows = self.rows.matrix
+        return np.asarray(np.tensordot(weights, self.program.squares, 1) + rows.T @ (squares[:, None] * rows))
 
 
 def drawn(seed: int, convex: bool) -> Quadratics:

@@ -60,9 +60,6 @@ class ConstraintRows(Protocol):
     def transposed(self, weights: Array) -> Array:
         """Cᵀ w, (n,)."""
 
-    def normal(self, weights: Array) -> Array:
-        """Cᵀ diag(w) C, (n, n)."""
-
 
 class ConstrainedPoint(Protocol):
     """A program's constraints at a point."""
@@ -83,8 +80,8 @@ class ConstrainedPoint(Protocol):
     def equality_rows(self) -> Array:
         """The slopes of the equalities, (p, n)."""
 
-    def curvature(self, inequality_weights: Array, equality_weights: Array) -> Array:
-        """The second derivatives of their weighted sum, (n, n)."""
+    def curvature(self, inequality_weights: Array, equality_weights: Array, squares: Array) -> Array:
+        """The second derivatives of their weighted sum, and Cᵀ diag(squares) C, (n, n)."""
 
 
 class ConstrainedProgram(Protocol):
@@ -371,7 +368,7 @@ class _InteriorPoint:
     def _system(self, at: _Iterate) -> _System | None:
         """The equations of a step, damped until they have a positive definite matrix."""
         lower, upper = at.x - self._lower, self._upper - at.x
-        matrix = at.point.curvature(at.z, at.y) + at.point.rows.normal(at.z / at.slacks)
+        matrix = at.point.curvature(at.z, at.y, at.z / at.slacks)
         matrix[np.diag_indices_from(matrix)] += at.z_lower / lower + at.z_upper / upper
         equal = at.point.equality_rows
         weight = max(1.0, np.abs(np.diag(matrix)).max()) * _EQUALITY_WEIGHT if len(equal) else 0.0

@@ -60,16 +60,13 @@ class ClearanceValues:
         slopes[..., 1, :] = self.task.balance.drag * slopes[..., 2, :]
         return slopes
 
-    def curvature(self, derivatives: Array, planes: Planes, weights: Array) -> tuple[Array, Array]:
-        """The weighted values' slopes (m, 6, 3), and second derivatives by velocity and acceleration.
+    def curvature(self, derivatives: Array, planes: Planes, weights: Array) -> Array:
+        """Second derivatives of the weighted values by velocity and acceleration, (m, 6, 6).
 
         Args:
             derivatives: Of the path, (m, 6, 3).
             planes: At the places.
             weights: Of the values, (m, NEAREST).
-
-        Returns:
-            The slopes (m, 6, 3), and the second derivatives (m, 6, 6).
         """
         given = self._given(derivatives, planes)
         for k in range(3):
@@ -78,8 +75,7 @@ class ClearanceValues:
             found = np.stack(self._functions[1](given), axis=-1)
         bent = np.einsum("mk,imkj->mij", weights, found.imag) / COMPLEX_STEP
         by_motion = np.array([[self.task.balance.drag], [1.0]])
-        second = np.kron(by_motion @ by_motion.T, bent)
-        return np.einsum("mk,mkij->mij", weights, self.slopes(derivatives, planes)), second
+        return np.kron(by_motion @ by_motion.T, bent)
 
     def _thrust(self, derivatives: Array) -> Array:
         return self.task.balance.specific_thrust(derivatives[:, 1], derivatives[:, 2])
