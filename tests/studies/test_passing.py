@@ -130,7 +130,7 @@ def test_more_flights_than_can_be_flown_are_refused_at_once(flights):
 @pytest.mark.parametrize("name", ["half-flip", "flip-roll"])
 def test_more_thrust_in_a_gate_is_asked_of_the_stage_there_alone(name):
     problem = ab.load_problem(name)
-    firm = problem.maneuver.with_gate_thrust(problem.gates, 17.0)
+    firm = problem.maneuver.with_stage_thrust(problem.gates, 17.0)
     before, after = (each.stage_sequence(problem.gates, 40.0).stages for each in (problem.maneuver, firm))
     changed = [b.name for a, b in zip(before, after, strict=True) if a != b]
     assert changed == ["gate"]
