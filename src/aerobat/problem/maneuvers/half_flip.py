@@ -17,6 +17,7 @@ from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
 from aerobat.problem.stage import StageSequence
 from aerobat.so3 import UP
 
+SLOWER = 0.85  # of the thrust that keeps attitudes at the speed of figures
 _UPRIGHT = 1e-9  # [-] of a gate's upright across the vertical: rounding
 
 
@@ -24,8 +25,8 @@ _UPRIGHT = 1e-9  # [-] of a gate's upright across the vertical: rounding
 class HalfFlip(Maneuver):
     """Thrust along the tilted gate's upright while passing it, never upside down (paper, Section II-D)."""
 
-    # ε_y, least horizontal thrust across the passage; left out, 22.5 times the sine of the gate's tilt of
-    # vehicles that have so much beside their weight, and at least 20 % of what they have along its upright
+    # ε_y, least horizontal thrust across the passage; left out, 19 times the sine of the gate's tilt of
+    # vehicles that have 22.5 beside their weight, and at least 20 % of what they have along its upright
     min_lateral_thrust: Positive | None = None  # [m/s²]
     passage: GatePassage = GatePassage()  # how the gate is passed
     gate: str | None = None  # name of the gate; left out, the only one
@@ -69,7 +70,9 @@ class HalfFlip(Maneuver):
             raise SpecError("gate.tilt_deg must be from -90 to 90 for a half-flip; past that it is a flip")
         across = float(np.hypot(gate.up[0], gate.up[1]))
         if self.min_lateral_thrust is None:
-            return max(THRUST_FRACTION * max_specific_thrust, across * firm_thrust(max_specific_thrust))
+            return max(
+                THRUST_FRACTION * max_specific_thrust, across * SLOWER * firm_thrust(max_specific_thrust)
+            )
         if across < _UPRIGHT:
             raise SpecError(
                 "maneuver.min_lateral_thrust asks for thrust sideways, which an upright gate has not; tilt it"
