@@ -6,24 +6,21 @@ path nearby: exact where that is met, and exact to first order beside it, but fo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import chain, combinations_with_replacement
 from math import isfinite
 
 import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array, Mask
-from aerobat.engines.array_functions import gradient
-from aerobat.engines.duals import Dual, DualOps, value_and_tangent
-from aerobat.engines.llvm.functions import PlaceFunction, place_function
-from aerobat.engines.tracing import Trace, TraceOps
+from aerobat.engines.llvm.functions import NO_DIRECTION, SmoothFunctions, smooth_functions, triples
 from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag, reference_of
 from aerobat.flatness.parallel_transport import frames
 from aerobat.flatness.references import UNDETERMINED, specific_thrust
 from aerobat.kernels.measures import InertiaAndDrag, measures
-from aerobat.kernels.ops import Vector
+from aerobat.kernels.ops import Ops, Scalar
 from aerobat.kernels.quaternions import to_body
 from aerobat.kernels.unequal_drag import BodyMotion
 from aerobat.kernels.vectors import add_scaled
@@ -36,7 +33,6 @@ from aerobat.states import FlatState
 MOVING = slice(1, 6)  # velocity to crackle: what measures depend on
 MOTION = 15  # their components
 DIRECTIONS = np.eye(MOTION)
-NO_DIRECTION = np.zeros((1, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +95,7 @@ class LimitValues:
 
     def values(self, derivatives: Array, near: Frames) -> Array:
         """The constraints at derivatives (m, 6, 3), (m, c), infinite where thrust is against its frame."""
-        found = self._functions[0](self._shared, self._given(derivatives, near), NO_DIRECTION)
+        found = self._functions.values(self._shared, self._given(derivatives, near), NO_DIRECTION)
         with np.errstate(invalid="ignore"):
             values = found[0].T @ self.measured.T
         values[:, self.linear] = np.tensordot(derivatives, self.path[self.linear], ([1, 2], [1, 2]))
@@ -111,7 +107,7 @@ class LimitValues:
 
     def slopes(self, derivatives: Array, near: Frames) -> LimitSlopes:
         """The constraints' slopes by the derivatives (m, 6, 3)."""
-        found = self._functions[1](self._shared, self._given(derivatives, near), DIRECTIONS)
+        found = self._functions.slopes(self._shared, self._given(derivatives, near), DIRECTIONS)
         beside = None if near.planes is None else self.clearances.slopes(derivatives, near.planes)
         return LimitSlopes(self, found.transpose(2, 1, 0), beside)
 
@@ -130,7 +126,7 @@ class LimitValues:
         of_measures = weights[:, :held] @ self.measured, squares[:, :held] @ self._products
         given = self._given(derivatives, near, *of_measures)
         second = np.zeros((len(derivatives), 18, 18))
-        second[:, 3:, 3:] = self._functions[2](self._shared, given, DIRECTIONS).transpose(2, 1, 0)
+        second[:, 3:, 3:] = self._functions.curvature(self._shared, given, DIRECTIONS).transpose(2, 1, 0)
         rows = self.path[self.linear].reshape(-1, 18)
         second += np.tensordot(squares[:, :held][:, self.linear], rows[:, :, None] * rows[:, None], 1)
         if near.planes is not None:
@@ -159,17 +155,17 @@ class LimitValues:
         return so3.axes(path.q_world_body[path.samples])
 
     @cached_property
-    def _functions(self) -> tuple[PlaceFunction, ...]:
-        """Their values, slopes and second derivatives, of the airframe's kind."""
+    def _functions(self) -> SmoothFunctions:
+        """Of the airframe's kind."""
         return measure_functions(has_unequal_drag(self.task.vehicle))
 
     @cached_property
     def _shared(self) -> Array:
-        """Weight, wind, and the vehicle's mass, inertia and drag, as `measure_functions` take them."""
+        """Weight, wind, and the vehicle's inertia, drag and mass, as `measure_functions` take them."""
         vehicle, environment = self.task.vehicle, self.task.environment
-        drag = [lateral_drag(vehicle), axial_drag(vehicle), *vehicle.drag_body / vehicle.mass]
-        air = [*environment.weight, *environment.wind]
-        return np.array([*air, vehicle.mass, *vehicle.inertia.ravel(), *drag])
+        air, drag = [*environment.weight, *environment.wind], vehicle.drag_body / vehicle.mass
+        others = vehicle.mass, lateral_drag(vehicle), axial_drag(vehicle)
+        return np.array([*air, *vehicle.inertia.ravel(), *drag, *others])
 
     @cached_property
     def measured(self) -> Array:
@@ -230,46 +226,19 @@ class LimitSlopes:
 
 
 @lru_cache(maxsize=2)
-def measure_functions(has_unequal_drag: bool) -> tuple[PlaceFunction, ...]:
-    """Measures of a motion; their slopes along a direction; of a sum of them the second derivatives along it.
+def measure_functions(has_unequal_drag: bool) -> SmoothFunctions:
+    """Measures of a motion that moves: shared are weight, wind and airframe, a place's own its body axes."""
 
-    Shared are weight, wind and the airframe; a place has its own motion and body axes. The sum is that of
-    `LimitValues.curvature`, with weights on measures and on products of two.
-    """
-    trace = Trace()
-    weight, wind = trace.vector("weight"), trace.vector("wind")
-    mass, inertia = trace.input("mass"), [trace.vector(f"inertia {axis}") for axis in "xyz"]
-    lateral, axial, drag = trace.input("lateral drag"), trace.input("axial drag"), trace.vector("drag")
-    shared = [*weight, *wind, mass, *chain(*inertia), lateral, axial, *drag]
-    names = BodyMotion._fields[1:]
-    motion, directions = ([trace.vector(f"{kind}{name}") for name in names] for kind in ("", "changing "))
-    axes = [trace.vector(f"b{i}") for i in "123"]
-    weights = [trace.input(f"weight {i}") for i in range(MEASURES)]
-    products = [trace.input(f"product {i}") for i in range(MEASURES * (MEASURES + 1) // 2)]
+    def kernel(
+        ops: Ops, shared: Sequence[Scalar], moved: Sequence[Scalar], axes: Sequence[Scalar]
+    ) -> Sequence[Scalar]:
+        weight, wind, x, y, z, drag = triples(shared[:-3])
+        mass, lateral, axial = shared[-3:]
+        airspeed, *others = triples(moved)
+        b1, b2, b3 = triples(axes)
+        near = weight, add_scaled(airspeed, -1.0, wind), *others
+        moving = BodyMotion(*(to_body((b1, b2, b3), each) for each in near))
+        airframe = InertiaAndDrag(mass, (x, y, z), lateral, axial, drag if has_unequal_drag else None)
+        return measures(ops, airframe, moving, (b1[2], b2[2], b3[2]))
 
-    def dual(vector: Vector, along: Vector = (None, None, None)) -> Vector:
-        return Dual(vector[0], along[0]), Dual(vector[1], along[1]), Dual(vector[2], along[2])
-
-    b1, b2, b3 = map(dual, axes)
-    airspeed = add_scaled(dual(motion[0], directions[0]), -1.0, dual(wind))
-    others = map(dual, motion[1:], directions[1:])
-    moving = BodyMotion(*(to_body((b1, b2, b3), each) for each in (dual(weight), airspeed, *others)))
-    rows, unequal = [*map(dual, inertia)], dual(drag) if has_unequal_drag else None
-    airframe = InertiaAndDrag(Dual(mass), (rows[0], rows[1], rows[2]), Dual(lateral), Dual(axial), unequal)
-    found = measures(DualOps(TraceOps(trace)), airframe, moving, (b1[2], b2[2], b3[2]))
-    values, slopes = (
-        [trace.symbol(part) for part in parts] for parts in zip(*map(value_and_tangent, found), strict=True)
-    )
-    bent = trace.symbol(sum(w * slope for w, slope in zip(weights, slopes, strict=True)))
-    pairs = combinations_with_replacement(slopes, 2)
-    squared = sum(
-        w * (a * b if a is not b else 0.5 * a * b) for w, (a, b) in zip(products, pairs, strict=True)
-    )
-    flat, turns = [*chain(*motion)], [*chain(*directions)]
-    both = zip(gradient(bent, flat), gradient(trace.symbol(squared), turns), strict=True)
-    own = [*flat, *chain(*axes)]
-    return (
-        place_function(shared, own, (), values),
-        place_function(shared, own, turns, slopes),
-        place_function(shared, [*own, *weights, *products], turns, [a + b for a, b in both]),
-    )
+    return smooth_functions(kernel, 21, MOTION, 9, squares=True)
