@@ -25,7 +25,7 @@ from aerobat.kernels.ops import Ops, Scalar, Vector
 PlaceFunction = Callable[[Array, Array, Array], Array]
 Kernel = Callable[[Ops, Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]], Sequence[Scalar]]
 NO_DIRECTION = np.zeros((1, 0))
-_NONE = np.zeros(0)
+_UNUSED = (None,) * (len(ARRAYS) - 4)  # all but the first three arrays and the last
 
 
 class SmoothFunctions(NamedTuple):
@@ -105,8 +105,8 @@ def place_function(
         padded = np.concatenate([own, own[:1].repeat(blocks * width - len(own), 0)])
         packed = padded.reshape(blocks, width, -1).swapaxes(1, 2).copy()
         result = np.empty((len(directions), len(found), blocks * width))
-        given = dict(zip(ARRAYS, (shared, packed, directions), strict=False)) | {"outputs": result}
-        addresses = [given.get(name, _NONE).ctypes.data for name in ARRAYS]
+        given = (array.ctypes.data for array in (shared, packed, directions))
+        addresses = [*given, *_UNUSED, result.ctypes.data]
         scan(*addresses, blocks * width, len(directions), 0, 0, 1, 0, blocks * width)
         return result[..., : len(own)]
 
