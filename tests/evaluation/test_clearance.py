@@ -175,7 +175,7 @@ def test_a_path_that_bends_no_more_than_its_way_through_a_gate_clears_the_frame_
     gate, offset = replace(one.gate, width=size, height=size), 0.4 * one.offset
     way = BodyInGate(gate, 0, PASSAGE_DEPTH + max(wide, high), rng.uniform(0.1, 8.0))
     thrust = so3.rotate(one.attitude, np.array([0.0, 0.0, 1.0]))
-    extent = extent_of_thrust(FloatOps, body, tuple(thrust.tolist()))
+    extent = extent_of_thrust(FloatOps, body.revolved, tuple(thrust.tolist()))
     along = one.velocity / np.linalg.norm(one.velocity)
 
     def is_asked(speed: float) -> bool:
@@ -210,9 +210,9 @@ def test_a_body_turned_about_its_thrust_reaches_as_far_as_it_does_in_some_attitu
     surface /= np.linalg.norm(surface, axis=1, keepdims=True)
     points = so3.rotate(attitude, body.centre + body.semi_axes * surface)
     assert own == pytest.approx((points @ outward).max(), abs=2e-3)
-    assert own <= extent_of_thrust(FloatOps, body, tuple(2.0 * np.array(z)))(outward) + 1e-12
+    assert own <= extent_of_thrust(FloatOps, body.revolved, tuple(2.0 * np.array(z)))(outward) + 1e-12
     round_body = ab.Ellipsoid((0.2, 0.2, 0.05), (0.0, 0.0, 0.03))
-    assert extent_of_thrust(FloatOps, round_body, tuple(z))(outward) == pytest.approx(
+    assert extent_of_thrust(FloatOps, round_body.revolved, tuple(z))(outward) == pytest.approx(
         extent_of_attitude(FloatOps, round_body, (x, y, z))(outward)
     )
 

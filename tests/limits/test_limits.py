@@ -109,7 +109,7 @@ def test_slopes_of_every_limit_are_its_differences(flown: Trajectory, craft: Veh
     step = rng.normal(size=derivatives.shape) * np.abs(derivatives).max(axis=(0, 2))[:, None]
     ahead, behind = (rows.values(derivatives + h * step, frames) for h in (1e-6, -1e-6))
     expected = (ahead - behind) / 2e-6
-    found = np.sum(slopes * step[:, None], axis=(2, 3))
+    found = slopes.along(step)
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
 
 
@@ -121,14 +121,29 @@ def test_second_derivatives_of_every_limit_are_differences_of_its_slopes(
     rng = np.random.default_rng(0)
     weights = rng.normal(size=(len(times), len(rows.sides)))
     step = rng.normal(size=derivatives.shape) * np.abs(derivatives).max(axis=(0, 2))[:, None]
-    slopes, second = rows.curvature(derivatives, frames, weights)
-    expected = np.einsum("mc,mcka->mka", weights, rows.slopes(derivatives, frames))
-    np.testing.assert_allclose(slopes, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
-    ahead, behind = (rows.curvature(derivatives + h * step, frames, weights)[0] for h in (1e-6, -1e-6))
-    found = (second @ step[:, 1:].reshape(len(times), -1, 1)).reshape(len(times), 5, 3)
+    second = rows.curvature(derivatives, frames, weights, 0.0 * weights)
+    moved = (rows.slopes(derivatives + h * step, frames) for h in (1e-6, -1e-6))
+    ahead, behind = (slopes.weighted(weights) for slopes in moved)
+    found = (second @ step.reshape(len(times), -1, 1)).reshape(len(times), 6, 3)[:, 1:]
     change = (ahead - behind)[:, 1:] / 2e-6
     scale = np.abs(change).max(axis=(0, 2), keepdims=True)
     np.testing.assert_allclose(found / scale, change / scale, atol=1e-4)
+
+
+def test_weighted_slopes_and_squares_are_those_of_changes_along_a_step(
+    flown: Trajectory, craft: Vehicle
+) -> None:
+    times = flown.knots[2:6] + 0.4 * flown.durations[2:6]
+    rows, derivatives, frames = sampled(flown, craft, times)
+    slopes, rng = rows.slopes(derivatives, frames), np.random.default_rng(0)
+    weights, step = rng.uniform(size=(len(times), len(rows.sides))), rng.normal(size=derivatives.shape)
+    moved = slopes.along(step)
+    expected = np.sum(weights * moved, axis=1)
+    np.testing.assert_allclose(np.sum(slopes.weighted(weights) * step, axis=(1, 2)), expected, rtol=1e-9)
+    second = rows.curvature(derivatives, frames, 0.0 * weights, weights)
+    flat = step.reshape(len(times), -1)
+    found = np.einsum("mi,mij,mj->m", flat, second, flat)
+    np.testing.assert_allclose(found, np.sum(weights * moved**2, axis=1), rtol=1e-9)
 
 
 def test_collocation_looks_at_what_flatness_says_of_every_limit(flown: Trajectory, craft: Vehicle) -> None:

@@ -222,3 +222,16 @@ def test_a_closed_course_is_written_read_and_read_aloud() -> None:
         str(CLOSED) == "closed: a closed lap of by a waypoint, through the red gate, by a waypoint, 2 times"
     )
     assert ab.load_problem("lap-7").maneuver.elements == ab.load_problem("race-7").maneuver.elements
+
+
+@pytest.mark.parametrize(("clearance", "kept"), [(0.0, 0.0), (0.01, 0.01), (0.1, 0.03)])
+def test_a_path_keeps_inside_balls_what_it_keeps_from_obstacles_or_a_tenth_of_their_radius(
+    clearance: float, kept: float
+) -> None:
+    lap = ab.load_problem("lap-7")
+    task = Task.of(lap, QUAD, clearance=clearance)
+    asked = lap.stages(QUAD.max_specific_thrust).stages
+    for inside, stage in zip(task.stages.stages, asked, strict=True):
+        assert inside.ball is not None
+        assert stage.ball is not None
+        assert inside.ball.radius == pytest.approx(stage.ball.radius - kept)

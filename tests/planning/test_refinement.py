@@ -89,10 +89,11 @@ def test_slopes_and_second_derivatives_are_differences(problem: Problem, lag: fl
     weights, others = rng.uniform(size=len(moved)), rng.normal(size=len(equal))
     gradients = [at.rows.transposed(weights) + at.equality_rows.T @ others for at in (ahead, behind)]
     change_of_gradient = (gradients[0] - gradients[1]) / (2.0 * change)
-    expected = here.curvature(weights, others) @ step
+    expected = here.curvature(weights, others, 0.0 * weights) @ step
     np.testing.assert_allclose(change_of_gradient, expected, atol=1e-5 * np.abs(expected).max())
-    normal = here.rows.normal(weights) @ step
-    np.testing.assert_allclose(normal, here.rows.transposed(weights * here.rows.times(step)), rtol=1e-9)
+    squared = here.curvature(0.0 * weights, 0.0 * others, weights) @ step
+    expected = here.rows.transposed(weights * here.rows.times(step))
+    np.testing.assert_allclose(squared, expected, rtol=1e-8, atol=1e-10 * np.abs(expected).max())
 
 
 def test_variables_of_a_path_give_the_path_and_others_meet_its_ends() -> None:

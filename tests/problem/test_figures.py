@@ -14,6 +14,7 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.errors import SpecError
 from aerobat.problem import Figure, Quantity, Stage
+from aerobat.problem.condition import FIRM_THRUST
 
 PLACE = (1.0, 2.0, 3.0)
 FIGURES = (
@@ -184,3 +185,26 @@ def test_a_vehicle_too_weak_for_a_figure_is_told_what_it_lacks() -> None:
     lacks = r"that heavy can fly: at best, the (thrust|command) of rotor \d is beyond its limit by"
     with pytest.raises(ab.Infeasible, match=lacks):
         ab.plan("inverted-pass", ab.Miqp(rescue=False), heavy)
+
+
+@given(
+    thrust=st.floats(12.0, 80.0), name=st.sampled_from(["split-s", "immelmann", "barrel-roll", "corkscrew"])
+)
+def test_strong_vehicles_keep_attitudes_of_figures_firmly_and_weak_ones_as_they_can(
+    thrust: float, name: str
+) -> None:
+    figure = ab.load_problem(name).maneuver
+    asked = {
+        stage.attitude.min_thrust for stage in figure.stage_sequence((), thrust).stages if stage.attitude
+    }
+    assert asked == {FIRM_THRUST if thrust - 9.81 >= FIRM_THRUST else 0.2 * thrust}
+    firm = figure.with_stage_thrust((), 11.0)
+    assert {s.attitude.min_thrust for s in firm.stage_sequence((), thrust).stages if s.attitude} == {11.0}
+
+
+@pytest.mark.parametrize(("tilt_deg", "asked"), [(90.0, 19.125), (30.0, 9.5625), (0.0, 8.0)])
+def test_a_half_flip_asks_for_thrust_across_its_gate_by_the_gates_tilt(tilt_deg: float, asked: float) -> None:
+    problem = ab.load_problem("half-flip")
+    gates = problem.maneuver.with_gate_tilt(problem.gates, np.deg2rad(tilt_deg))
+    (stage,) = problem.maneuver.stage_sequence(gates, 40.0).stages
+    assert max(c.min_thrust for c in stage.explicit(gates[0]).conditions) == pytest.approx(asked)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat.studies.passing import Passing, Round
 from aerobat.studies.passing.passing import _Tightening
+from aerobat.studies.passing.spread import firmer
 
 WEAK = ab.Dispersion(name="weak", mass=0.05, rotor=0.04, start_position=0.02)
 HARSH = ab.Dispersion(name="harsh", start_velocity=30.0, mass=1e-4)
@@ -130,7 +132,18 @@ def test_more_flights_than_can_be_flown_are_refused_at_once(flights):
 @pytest.mark.parametrize("name", ["half-flip", "flip-roll"])
 def test_more_thrust_in_a_gate_is_asked_of_the_stage_there_alone(name):
     problem = ab.load_problem(name)
-    firm = problem.maneuver.with_gate_thrust(problem.gates, 17.0)
+    firm = problem.maneuver.with_stage_thrust(problem.gates, 17.0)
     before, after = (each.stage_sequence(problem.gates, 40.0).stages for each in (problem.maneuver, firm))
     changed = [b.name for a, b in zip(before, after, strict=True) if a != b]
     assert changed == ["gate"]
+
+
+@pytest.mark.slow
+def test_figures_whose_flights_stray_off_their_attitudes_are_asked_for_more_thrust_in_their_stages():
+    problem, vehicle = ab.load_problem("immelmann"), ab.load_vehicle("agile-quad")
+    loose = replace(problem, maneuver=problem.maneuver.with_stage_thrust((), 7.0))
+    plan = ab.plan(loose, ab.Miqp(reserve=0.15), vehicle)
+    strays = ab.score_flights(plan, vehicle, config=ab.FlightConfig(conditions="lab", flights=range(20)))
+    firm = firmer(loose, vehicle, plan, strays, 0.97)
+    assert firm.maneuver.min_thrust > 7.0
+    assert firm.maneuver.min_thrust <= 0.75 * vehicle.max_specific_thrust

@@ -152,9 +152,14 @@ def _together(pair: Tree) -> Tree:
 
 def _apart(tree: Tree) -> Tree:
     """Dual numbers as values and tangents."""
-    numbers = [dual(leaf) for leaf in tree_leaves(tree)]
-    values = tree_unflatten(tree, (number.value for number in numbers))
-    return values, tuple(_number(number.tangent) for number in numbers)
+    numbers = [value_and_tangent(leaf) for leaf in tree_leaves(tree)]
+    return tree_unflatten(tree, (value for value, _ in numbers)), tuple(tangent for _, tangent in numbers)
+
+
+def value_and_tangent(x: Any) -> tuple[Scalar, Scalar]:
+    """Both parts of a number, zero where it has no tangent."""
+    value, tangent = _parts(x)
+    return value, _number(tangent)
 
 
 def _parts(x: Any) -> tuple[Scalar, Scalar | None]:

@@ -29,16 +29,6 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "and": operator.and_,
     "select": lambda condition, x, y: x if condition else y,
 }
-# in Python, of floats and of arrays alike, where `sqrt` and `exp` are theirs
-FORMS = {
-    "add": "{} + {}",
-    "subtract": "{} - {}",
-    "multiply": "{} * {}",
-    "divide": "{} / {}",
-    "negate": "-{}",
-    "sqrt": "sqrt({})",
-    "exp": "exp({})",
-}
 _COMMUTATIVE = {"add", "multiply", "and"}
 _LOGICAL = {"less", "less_equal", "and"}
 
@@ -104,11 +94,6 @@ class Trace:
             numbers = tuple(sorted(numbers))
         logical = name in _LOGICAL or (name == "select" and known[1].logical)
         return Symbol(self, self._number(name, numbers, "", logical))
-
-    def written(self, number: int) -> str:
-        """The name of a value in Python, or a constant itself."""
-        operation = self.operations[number]
-        return f"({operation.content!r})" if operation.name == "constant" else f"v{number}"
 
     def needed(self, roots: Iterable[int], unless: int | None = None) -> set[int]:
         """The values that others are computed from, these included.

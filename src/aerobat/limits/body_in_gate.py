@@ -127,20 +127,20 @@ def extent_of_attitude(ops: Ops, body: Ellipsoid, axes: Axes) -> Extent:
     return extent
 
 
-def extent_of_thrust(ops: Ops, body: Ellipsoid, thrust: Vector) -> Extent:
+def extent_of_thrust(ops: Ops, revolved: Sequence[Scalar], thrust: Vector) -> Extent:
     """Return the extent of a body that is turned about its thrust axis in whichever way.
 
     Args:
         ops: The arithmetic of the thrust.
-        body: The ellipsoid about the vehicle.
+        revolved: The body that encloses the vehicle however that is turned, as `Revolved` has it.
         thrust: Along its thrust axis, of any length.
     """
-    wide, high, up, aside = body.revolved
+    wide, high, up, aside = revolved
     size = ops.sqrt(dot(thrust, thrust))
 
     def extent(outward: Vector) -> Scalar:
         along = dot(thrust, outward) / size
         squared = along * along
-        return up * along + aside + ops.sqrt(wide**2 * (1.0 - squared) + high**2 * squared)
+        return up * along + aside + ops.sqrt(wide * wide * (1.0 - squared) + high * high * squared)
 
     return extent

@@ -8,6 +8,7 @@ taken, the body is no nearer to the piece than that.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
@@ -99,17 +100,17 @@ class Clearance:
 
 
 def left_between(
-    ops: Ops, body: Ellipsoid, position: Vector, thrust: Vector, normal: Vector, offset: Scalar
+    ops: Ops, revolved: Sequence[Scalar], position: Vector, thrust: Vector, normal: Vector, offset: Scalar
 ) -> Scalar:
     """Return what is left between a body and a plane [m].
 
     Args:
         ops: The arithmetic.
-        body: The ellipsoid about the vehicle.
+        revolved: The body that encloses the vehicle however that is turned, as `Revolved` has it.
         position: Of its centre of mass [m].
         thrust: Along its thrust axis, of any length.
         normal: Of the plane, toward the body.
         offset: Of the plane along it [m].
     """
     against = (-1.0 * normal[0], -1.0 * normal[1], -1.0 * normal[2])
-    return dot(normal, position) - extent_of_thrust(ops, body, thrust)(against) - offset
+    return dot(normal, position) - extent_of_thrust(ops, revolved, thrust)(against) - offset

@@ -48,6 +48,8 @@ _SWITCH_POWERS = 2.3, 1.1  # of the promised fall and of the violation, as Wäch
 _CORRIDOR = 1e10  # the factor by which s z may differ from μ
 _EQUALITY_WEIGHT = 1e-2  # of the matrix's largest entry, by which equalities are added to it
 _ITERATIONS_FLAT = 3  # over which the cost has to stand still
+_ITERATIONS_STUCK = 15  # over which it changes by less than
+_STUCK = 1e-2  # of the gain that is standing still: where steps come to nothing at any barrier
 _LARGE_MULTIPLIER = 100.0  # on average: larger ones make the dual error count less
 
 
@@ -59,9 +61,6 @@ class ConstraintRows(Protocol):
 
     def transposed(self, weights: Array) -> Array:
         """Cᵀ w, (n,)."""
-
-    def normal(self, weights: Array) -> Array:
-        """Cᵀ diag(w) C, (n, n)."""
 
 
 class ConstrainedPoint(Protocol):
@@ -83,8 +82,8 @@ class ConstrainedPoint(Protocol):
     def equality_rows(self) -> Array:
         """The slopes of the equalities, (p, n)."""
 
-    def curvature(self, inequality_weights: Array, equality_weights: Array) -> Array:
-        """The second derivatives of their weighted sum, (n, n)."""
+    def curvature(self, inequality_weights: Array, equality_weights: Array, squares: Array) -> Array:
+        """The second derivatives of their weighted sum, and Cᵀ diag(squares) C, (n, n)."""
 
 
 class ConstrainedProgram(Protocol):
@@ -232,7 +231,7 @@ class _InteriorPoint:
             costs.append(float(self._cost @ iterate.x))
             if self._error(iterate, 0.0) < self._settings.tolerance or self._stands_still(iterate, costs):
                 return InteriorPointResult(iterate.x, True, iteration, iterate.z)
-            if out_of_time():
+            if out_of_time() or self._is_stuck(costs):
                 return InteriorPointResult(iterate.x, False, iteration, iterate.z)
             self._lower_barrier(iterate)
             if not self._advance(iterate):
@@ -283,6 +282,11 @@ class _InteriorPoint:
         at_end = self._barrier <= self._settings.least_barrier
         missed = max(float(at.point.inequalities.max(initial=0.0)), _largest(at.point.equalities))
         return still and at_end and missed < self._settings.violation
+
+    def _is_stuck(self, costs: list[float]) -> bool:
+        """True where no step has changed the cost for so long that none will, whichever the barrier."""
+        recent = costs[-_ITERATIONS_STUCK:]
+        return len(costs) > _ITERATIONS_STUCK and max(recent) - min(recent) < _STUCK * self._settings.gain
 
     def _lower_barrier(self, at: _Iterate) -> None:
         least = self._settings.least_barrier
@@ -371,7 +375,7 @@ class _InteriorPoint:
     def _system(self, at: _Iterate) -> _System | None:
         """The equations of a step, damped until they have a positive definite matrix."""
         lower, upper = at.x - self._lower, self._upper - at.x
-        matrix = at.point.curvature(at.z, at.y) + at.point.rows.normal(at.z / at.slacks)
+        matrix = at.point.curvature(at.z, at.y, at.z / at.slacks)
         matrix[np.diag_indices_from(matrix)] += at.z_lower / lower + at.z_upper / upper
         equal = at.point.equality_rows
         weight = max(1.0, np.abs(np.diag(matrix)).max()) * _EQUALITY_WEIGHT if len(equal) else 0.0

@@ -15,12 +15,15 @@ from aerobat.limits.limit import Limit
 from aerobat.planning.passages import PlacedStage, gaps_at_ends, planned_passages, planned_waypoints
 from aerobat.problem.condition import ForceBalance
 from aerobat.problem.problem import Problem
-from aerobat.problem.stage import StageSequence
+from aerobat.problem.stage import Stage, StageSequence
 from aerobat.vehicle import Vehicle
 
 # without a vehicle, stages that ask a fraction of its thrust assume what a hexarotor in the paper's class has
 ASSUMED_THRUST_TO_WEIGHT = 5.0
 SHARE = 0.5  # of the room that a narrow passage leaves to the body, which is kept clear
+BALL_SHARE = (
+    0.1  # of a ball's radius, which is kept inside it at most: flights under lab stray by half of that
+)
 LEAST_CLEARANCE = 0.001  # [m] that is kept clear in the narrowest: what lies between places is within it
 
 
@@ -36,7 +39,7 @@ class Task:
     vehicle_if_any: Vehicle | None
     stages: StageSequence
     reserve: float = 0.0  # of the vehicle's limits' ranges, kept from either end; proven of rotors
-    clearance: float = 0.0  # [m] kept from obstacles
+    clearance: float = 0.0  # [m] kept from obstacles, and inside balls
 
     @classmethod
     def of(
@@ -52,6 +55,7 @@ class Task:
         """
         body_radius = 0.0 if vehicle is None else vehicle.body_radius
         stages = problem.stages(max_specific_thrust(problem, vehicle), body_radius)
+        stages = replace(stages, stages=tuple(_well_inside(stage, clearance) for stage in stages.stages))
         asked = cls(problem, vehicle, stages, reserve, clearance)
         if vehicle is None or not clearance or not problem.surroundings.obstacles:
             return asked
@@ -105,6 +109,14 @@ class Task:
             goal=self.problem.ends.get("goal"),
             closed=self.stages.closed,
         )
+
+
+def _well_inside(stage: Stage, clearance: float) -> Stage:
+    """The stage with a smaller ball, if it has one."""
+    if stage.ball is None or not clearance:
+        return stage
+    kept = min(clearance, BALL_SHARE * stage.ball.radius)
+    return replace(stage, ball=replace(stage.ball, radius=stage.ball.radius - kept))
 
 
 def max_specific_thrust(problem: Problem, vehicle: Vehicle | None) -> float:

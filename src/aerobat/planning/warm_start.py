@@ -24,7 +24,7 @@ Reserve = Annotated[float, Field(ge=0, lt=0.5)]
 Clearance = Annotated[float, Field(ge=0)]  # [m] kept from obstacles for the controller
 CLEARANCE = (
     "The distance in metres that the body keeps from obstacles for the controller, less where a passage is "
-    "narrow."
+    "narrow, and that paths keep inside the radius of waypoints, a tenth of it at most."
 )
 MIN_INTERVALS = 4  # of a phase of a motion that is collocated
 

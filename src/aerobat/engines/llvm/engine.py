@@ -187,11 +187,11 @@ def target_machine() -> llvm.TargetMachine:
 
 def _width(kept: int) -> int:
     """The vehicles of a block, each of which keeps so many numbers from tick to tick."""
-    together = REGISTERS * _lanes()
-    return together if kept * together * np.float64().nbytes <= MAX_KEPT else _lanes()
+    together = REGISTERS * lanes()
+    return together if kept * together * np.float64().nbytes <= MAX_KEPT else lanes()
 
 
-def _lanes() -> int:
+def lanes() -> int:
     """The numbers of float64 that a register of this processor holds."""
     return 8 if llvm.get_host_cpu_features().get("avx512f") else 4
 

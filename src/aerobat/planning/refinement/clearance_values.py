@@ -1,22 +1,24 @@
-"""Clearances from obstacles as constraints with two derivatives, compiled once a vehicle.
+"""Clearances from obstacles as constraints with two derivatives, as machine code.
 
 They are columns behind those of the limits on measures: the nearest pieces of each place, whichever they are.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.engines.array_functions import COMPLEX_STEP, ArrayFunction, array_function, gradient
-from aerobat.engines.tracing import Trace, TraceOps
+from aerobat.engines.llvm.functions import NO_DIRECTION, SmoothFunctions, smooth_functions, triples
+from aerobat.kernels.ops import Ops, Scalar
 from aerobat.limits.clearance import NEAREST, SIZE, Clearance, Planes, left_between
 from aerobat.planning.task import Task
 
 MOVED = 6  # components of velocity and acceleration, in which clearances are not linear
+TINY = 1e-20  # [m/s²] beside any thrust
 FAR = 1e3  # [m] that is left to planes that do not count
 
 
@@ -42,61 +44,56 @@ class ClearanceValues:
         assert self.clearance is not None, "planes are asked for where there are obstacles"
         thrust = self._thrust(derivatives)
         size = np.linalg.norm(thrust, axis=1, keepdims=True)
-        return self.clearance.planes(derivatives[:, 0], thrust / np.maximum(size, COMPLEX_STEP), times)
+        return self.clearance.planes(derivatives[:, 0], thrust / np.maximum(size, TINY), times)
 
     def values(self, derivatives: Array, planes: Planes) -> Array:
         """The values at derivatives (m, 6, 3), (m, NEAREST)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            (found,) = self._functions[0](self._given(derivatives, planes))
+        left = _functions().values(*self._given(derivatives, planes), NO_DIRECTION)
+        found = (self.task.clearance - left.reshape(-1, NEAREST)) / SIZE
         return np.asarray(np.where(np.isnan(found), np.inf, found))
 
     def slopes(self, derivatives: Array, planes: Planes) -> Array:
         """The slopes by the derivatives, (m, NEAREST, 6, 3)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            by_thrust = self._functions[1](self._given(derivatives, planes))
+        by_thrust = _functions().slopes(*self._given(derivatives, planes), np.eye(3))[:, 0].T
         slopes = np.zeros((*planes.offsets.shape, 6, 3))
         slopes[..., 0, :] = -planes.normals / SIZE
-        slopes[..., 2, :] = np.stack(by_thrust, axis=-1)
+        slopes[..., 2, :] = by_thrust.reshape(planes.normals.shape) / -SIZE
         slopes[..., 1, :] = self.task.balance.drag * slopes[..., 2, :]
         return slopes
 
-    def curvature(self, derivatives: Array, planes: Planes, weights: Array) -> tuple[Array, Array]:
-        """The weighted values' slopes (m, 6, 3), and second derivatives by velocity and acceleration.
+    def curvature(self, derivatives: Array, planes: Planes, weights: Array) -> Array:
+        """Second derivatives of the weighted values by velocity and acceleration, (m, 6, 6).
 
         Args:
             derivatives: Of the path, (m, 6, 3).
             planes: At the places.
             weights: Of the values, (m, NEAREST).
-
-        Returns:
-            The slopes (m, 6, 3), and the second derivatives (m, 6, 6).
         """
-        given = self._given(derivatives, planes)
-        for k in range(3):
-            given[3 + k] = given[3 + k] + 1j * COMPLEX_STEP * np.eye(3)[k].reshape(3, 1, 1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found = np.stack(self._functions[1](given), axis=-1)
-        bent = np.einsum("mk,imkj->mij", weights, found.imag) / COMPLEX_STEP
+        given = self._given(derivatives, planes, weights.reshape(-1, 1) / -SIZE)
+        found = _functions().curvature(*given, np.eye(3))
+        bent = found.transpose(2, 1, 0).reshape(-1, NEAREST, 3, 3).sum(axis=1)
         by_motion = np.array([[self.task.balance.drag], [1.0]])
-        second = np.kron(by_motion @ by_motion.T, bent)
-        return np.einsum("mk,mkij->mij", weights, self.slopes(derivatives, planes)), second
+        return np.kron(by_motion @ by_motion.T, bent)
 
     def _thrust(self, derivatives: Array) -> Array:
         return self.task.balance.specific_thrust(derivatives[:, 1], derivatives[:, 2])
 
-    def _given(self, derivatives: Array, planes: Planes) -> list[Array]:
-        """What the functions take: position, thrust, normals and offsets, (m, 1) or so."""
-        state = np.concatenate([derivatives[:, 0], self._thrust(derivatives)], axis=1)
-        normals = np.moveaxis(planes.normals, -1, 0)
-        return [*state.T[..., None], *normals, np.maximum(planes.offsets, -FAR)]
+    def _given(self, derivatives: Array, planes: Planes, *more: Array) -> tuple[Array, Array]:
+        """The body, and of every place and plane thrust, position, normal and offset, then more."""
+        state = np.concatenate([self._thrust(derivatives), derivatives[:, 0]], axis=1)
+        plane = planes.normals.reshape(-1, 3), np.maximum(planes.offsets, -FAR).reshape(-1, 1)
+        own = np.concatenate([state.repeat(NEAREST, axis=0), *plane, *more], axis=1)
+        return np.array(self.task.vehicle.bounding_ellipsoid.revolved), own
 
-    @cached_property
-    def _functions(self) -> tuple[ArrayFunction, ArrayFunction]:
-        """What is missing, and its slopes by the thrust."""
-        trace = Trace()
-        position, thrust, normal = (trace.vector(name) for name in ("position", "thrust", "normal"))
-        offset, body = trace.input("offset"), self.task.vehicle.bounding_ellipsoid
-        left = left_between(TraceOps(trace), body, position, thrust, normal, offset)
-        missing = trace.symbol(1.0 / SIZE * (self.task.clearance - left))
-        given = [*position, *thrust, *normal, offset]
-        return array_function(given, [missing]), array_function(given, gradient(missing, thrust))
+
+@lru_cache(maxsize=1)
+def _functions() -> SmoothFunctions:
+    """What is left between a body and a plane [m], as the thrust moves."""
+
+    def kernel(
+        ops: Ops, revolved: Sequence[Scalar], thrust: Sequence[Scalar], others: Sequence[Scalar]
+    ) -> Sequence[Scalar]:
+        (along,), (position, normal) = triples(thrust), triples(others[:6])
+        return [left_between(ops, revolved, position, along, normal, others[6])]
+
+    return smooth_functions(kernel, 4, 3, 7)

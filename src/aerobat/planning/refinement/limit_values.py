@@ -1,4 +1,4 @@
-"""Limits along a path as constraints with their first and second derivatives, compiled once a vehicle.
+"""Limits along a path as constraints with their first and second derivatives, as machine code.
 
 Measures are taken in body axes that are carried with the thrust axis by the smallest rotation from those of a
 path nearby: exact where that is met, and exact to first order beside it, but for the angle about the axis.
@@ -6,30 +6,33 @@ path nearby: exact where that is met, and exact to first order beside it, but fo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import isfinite
 
 import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array, Mask
-from aerobat.engines.array_functions import COMPLEX_STEP, ArrayFunction, array_function, gradient
-from aerobat.engines.tracing import Trace, TraceOps
+from aerobat.engines.llvm.functions import NO_DIRECTION, SmoothFunctions, smooth_functions, triples
 from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag, reference_of
 from aerobat.flatness.parallel_transport import frames
 from aerobat.flatness.references import UNDETERMINED, specific_thrust
 from aerobat.kernels.measures import InertiaAndDrag, measures
+from aerobat.kernels.ops import Ops, Scalar
+from aerobat.kernels.quaternions import to_body
 from aerobat.kernels.unequal_drag import BodyMotion
+from aerobat.kernels.vectors import add_scaled
 from aerobat.limits import MEASURES, Limit, clearance
 from aerobat.limits.clearance import Planes
 from aerobat.planning.refinement.clearance_values import MOVED, ClearanceValues
 from aerobat.planning.task import Task
-from aerobat.so3 import UP
 from aerobat.states import FlatState
 
 MOVING = slice(1, 6)  # velocity to crackle: what measures depend on
 MOTION = 15  # their components
+DIRECTIONS = np.eye(MOTION)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +40,6 @@ class Frames:
     """Body axes of a path nearby, as columns, and what is known in them."""
 
     axes: Array  # (m, 3, 3)
-    weight: Array  # gravity's reaction over mass in them [m/s²], (m, 3)
-    up: Array  # (m, 3)
     planes: Planes | None  # between body and obstacles, where there are any
 
 
@@ -90,81 +91,55 @@ class LimitValues:
         """Body axes along a path's derivatives (m, 6, 3) at times (m,)."""
         axes = self._axes(times, derivatives)
         planes = self.clearances.planes(times, derivatives) if self.clearances.count else None
-        return Frames(axes, self.task.environment.weight @ axes, UP @ axes, planes)
+        return Frames(axes, planes)
 
     def values(self, derivatives: Array, near: Frames) -> Array:
         """The constraints at derivatives (m, 6, 3), (m, c), infinite where thrust is against its frame."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            moving = self._local(derivatives, near)
-            found = self._functions[0]([*moving, *near.weight.T, *near.up.T])
-            values = _columns(found, len(derivatives)) @ self._measured.T
-        values[:, self._linear] = np.tensordot(derivatives, self._path[self._linear], ([1, 2], [1, 2]))
+        found = self._functions.values(self._shared, self._given(derivatives, near), NO_DIRECTION)
+        with np.errstate(invalid="ignore"):
+            values = found[0].T @ self.measured.T
+        values[:, self.linear] = np.tensordot(derivatives, self.path[self.linear], ([1, 2], [1, 2]))
         values -= self._bounds
         values = np.where(np.isnan(values), np.inf, values)
         if near.planes is None:
             return values
         return np.concatenate([values, self.clearances.values(derivatives, near.planes)], axis=1)
 
-    def slopes(self, derivatives: Array, near: Frames) -> Array:
-        """The constraints' slopes by the derivatives, (m, c, 6, 3)."""
-        moving = self._stepped(self._local(derivatives, near))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found = self._functions[0]([*moving, *near.weight.T, *near.up.T])
-        count = len(derivatives)
-        by_local = np.array([np.broadcast_to(each, (MOTION, count)).imag for each in found]) / COMPLEX_STEP
-        weighted = np.tensordot(self._measured, by_local, 1).transpose(2, 0, 1)
-        slopes = np.zeros((count, len(self._held), 6, 3))
-        local = weighted.reshape(count, -1, 5, 3)
-        slopes[:, :, MOVING] = local @ np.swapaxes(near.axes, 1, 2)[:, None]
-        slopes[:, self._linear] = self._path[self._linear]
-        if near.planes is None:
-            return slopes
-        return np.concatenate([slopes, self.clearances.slopes(derivatives, near.planes)], axis=1)
+    def slopes(self, derivatives: Array, near: Frames) -> LimitSlopes:
+        """The constraints' slopes by the derivatives (m, 6, 3)."""
+        found = self._functions.slopes(self._shared, self._given(derivatives, near), DIRECTIONS)
+        beside = None if near.planes is None else self.clearances.slopes(derivatives, near.planes)
+        return LimitSlopes(self, found.transpose(2, 1, 0), beside)
 
-    def curvature(self, derivatives: Array, near: Frames, weights: Array) -> tuple[Array, Array]:
-        """The weighted constraints' slopes (m, 6, 3), and second derivatives by velocity to crackle.
+    def curvature(self, derivatives: Array, near: Frames, weights: Array, squares: Array) -> Array:
+        """Second derivatives by position to crackle of sums of constraints, (m, 18, 18).
+
+        The sum is Σ weights · c + Σ squares · (slope of c along what moves)² / 2.
 
         Args:
             derivatives: Of the path, (m, 6, 3).
             near: The frames.
             weights: Of the constraints, (m, c).
-
-        Returns:
-            The slopes (m, 6, 3), and the second derivatives (m, 15, 15).
+            squares: Likewise.
         """
-        count, weights, beside = len(derivatives), *np.split(weights, [len(self._held)], axis=1)
-        by_measure = weights @ self._measured
-        moving = self._stepped(self._local(derivatives, near))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found = self._functions[1]([*moving, *near.weight.T, *near.up.T, *by_measure.T])
-        gradients = np.array([np.broadcast_to(each, (MOTION, count)) for each in found])
-        slopes = np.tensordot(weights[:, self._linear], self._path[self._linear], 1)
-        turned = gradients[:, 0].real.T.reshape(count, 5, 3) @ np.swapaxes(near.axes, 1, 2)
-        slopes[:, MOVING] += turned
-        second = (gradients.imag / COMPLEX_STEP).transpose(2, 1, 0).reshape(count, 5, 3, 5, 3)
-        back = np.swapaxes(near.axes, 1, 2)[:, None]
-        second = second.reshape(count, -1, 3) @ back.reshape(count, 3, 3)
-        second = second.reshape(count, 5, 3, -1).swapaxes(2, 3)
-        second = (second.reshape(count, -1, 3) @ back.reshape(count, 3, 3)).reshape(count, 5, MOTION, 3)
-        second = second.swapaxes(2, 3).reshape(count, MOTION, MOTION)
+        held = len(self._held)
+        of_measures = weights[:, :held] @ self.measured, squares[:, :held] @ self._products
+        given = self._given(derivatives, near, *of_measures)
+        second = np.zeros((len(derivatives), 18, 18))
+        second[:, 3:, 3:] = self._functions.curvature(self._shared, given, DIRECTIONS).transpose(2, 1, 0)
+        rows = self.path[self.linear].reshape(-1, 18)
+        second += np.tensordot(squares[:, :held][:, self.linear], rows[:, :, None] * rows[:, None], 1)
         if near.planes is not None:
-            more_slopes, bent = self.clearances.curvature(derivatives, near.planes, beside)
-            slopes += more_slopes
-            second[:, :MOVED, :MOVED] += bent
-        return slopes, second
+            beside = self.clearances.slopes(derivatives, near.planes).reshape(len(derivatives), -1, 18)
+            second += np.swapaxes(beside, 1, 2) @ (squares[:, held:, None] * beside)
+            bent = self.clearances.curvature(derivatives, near.planes, weights[:, held:])
+            second[:, 3 : 3 + MOVED, 3 : 3 + MOVED] += bent
+        return second
 
-    def _local(self, derivatives: Array, near: Frames) -> Array:
-        """Airspeed, acceleration, jerk, snap and crackle in body axes, (15, m)."""
-        moving = derivatives[:, MOVING].copy()
-        moving[:, 0] -= self.task.environment.wind
-        return np.asarray((moving @ near.axes).reshape(len(derivatives), MOTION).T)
-
-    def _stepped(self, moving: Array) -> Array:
-        """The same, (15, m), with each component in turn moved by a complex step, (15, 15, m)."""
-        stepped = np.repeat(moving[:, None], MOTION, axis=1).astype(complex)
-        each = np.arange(MOTION)
-        stepped[each, each] += 1j * COMPLEX_STEP
-        return stepped
+    def _given(self, derivatives: Array, near: Frames, *more: Array) -> Array:
+        """Velocity to crackle, then body axes, then more, (m, 24 or more)."""
+        axes = np.swapaxes(near.axes, 1, 2).reshape(-1, 9)
+        return np.concatenate([derivatives[:, MOVING].reshape(-1, MOTION), axes, *more], axis=1)
 
     def _axes(self, times: Array, derivatives: Array) -> Array:
         """Body axes in the world, as columns, (m, 3, 3)."""
@@ -181,40 +156,37 @@ class LimitValues:
         return so3.axes(path.q_world_body[path.samples])
 
     @cached_property
-    def _functions(self) -> tuple[ArrayFunction, ArrayFunction]:
-        """Measures of a motion, weight and vertical; slopes by the motion of their weighted sum."""
-        trace = Trace()
-        moving = BodyMotion(*map(trace.vector, BodyMotion._fields))
-        up = trace.vector("up")
-        weights = [trace.input(f"weights {i}") for i in range(MEASURES)]
-        found = measures(TraceOps(trace), self._airframe, moving, up)
-        outputs = [trace.symbol(value) for value in found]
-        total = trace.symbol(sum(w * value for w, value in zip(weights, outputs, strict=True)))
-        motion = [component for vector in moving[1:] for component in vector]
-        given = [*motion, *moving.weight, *up]
-        return array_function(given, outputs), array_function([*given, *weights], gradient(total, motion))
-
-    @property
-    def _airframe(self) -> InertiaAndDrag:
-        vehicle = self.task.vehicle
-        unequal = tuple((vehicle.drag_body / vehicle.mass).tolist()) if has_unequal_drag(vehicle) else None
-        return InertiaAndDrag(
-            vehicle.mass, vehicle.inertia.tolist(), lateral_drag(vehicle), axial_drag(vehicle), unequal
-        )
+    def _functions(self) -> SmoothFunctions:
+        """Of the airframe's kind."""
+        return measure_functions(has_unequal_drag(self.task.vehicle))
 
     @cached_property
-    def _measured(self) -> Array:
+    def _shared(self) -> Array:
+        """Weight, wind, and the vehicle's inertia, drag and mass, as `measure_functions` take them."""
+        vehicle, environment = self.task.vehicle, self.task.environment
+        air, drag = [*environment.weight, *environment.wind], vehicle.drag_body / vehicle.mass
+        others = vehicle.mass, lateral_drag(vehicle), axial_drag(vehicle)
+        return np.array([*air, *vehicle.inertia.ravel(), *drag, *others])
+
+    @cached_property
+    def measured(self) -> Array:
         """Weights on the measures, (c, 11)."""
         rows = [sign / limit.size * limit.quantity.measured for limit, sign in self._held]
         return np.array(rows).reshape(-1, MEASURES)
 
     @cached_property
-    def _linear(self) -> Mask:
+    def _products(self) -> Array:
+        """Products of each constraint's weights, those above the diagonal once, (c, 66)."""
+        i, j = np.triu_indices(MEASURES)
+        return np.asarray(self.measured[:, i] * self.measured[:, j])
+
+    @cached_property
+    def linear(self) -> Mask:
         """The mask of the held limits that are linear in the path's derivatives."""
         return self.of_path[: len(self._held)]
 
     @cached_property
-    def _path(self) -> Array:
+    def path(self) -> Array:
         """Weights on the path's derivatives, (c, 6, 3)."""
         rows = [sign / limit.size * limit.quantity.path for limit, sign in self._held]
         return np.array(rows).reshape(-1, 6, 3)
@@ -225,6 +197,49 @@ class LimitValues:
         return np.array([sign * limit.ends[int(sign > 0.0)] for limit, sign in self._held])
 
 
-def _columns(found: tuple[Array, ...], count: int) -> Array:
-    """Arrays, or single numbers, as columns, (m, 11)."""
-    return np.stack([np.broadcast_to(each, (count,)) for each in found], axis=-1)
+@dataclass(frozen=True, eq=False)
+class LimitSlopes:
+    """Slopes of constraints by a path's derivatives (m, 6, 3)."""
+
+    limits: LimitValues
+    measures: Array  # by velocity to crackle, (m, 11, 15)
+    beside: Array | None  # of clearances, (m, NEAREST, 6, 3)
+
+    def along(self, change: Array) -> Array:
+        """The change of the constraints (m, c) with the derivatives, (m, 6, 3)."""
+        limits, count = self.limits, len(change)
+        moved = self.measures @ change[:, MOVING].reshape(count, MOTION, 1)
+        found = moved[..., 0] @ limits.measured.T
+        found[:, limits.linear] = np.tensordot(change, limits.path[limits.linear], ([1, 2], [1, 2]))
+        if self.beside is None:
+            return np.asarray(found)
+        return np.concatenate([found, np.einsum("mcka,mka->mc", self.beside, change)], axis=1)
+
+    def weighted(self, weights: Array) -> Array:
+        """The sum of the slopes (m, 6, 3), weighted (m, c)."""
+        limits, held = self.limits, len(self.limits.measured)
+        by_measure = weights[:, None, :held] @ limits.measured
+        total = np.tensordot(weights[:, :held][:, limits.linear], limits.path[limits.linear], 1)
+        total[:, MOVING] += (by_measure @ self.measures).reshape(-1, 5, 3)
+        if self.beside is not None:
+            total += np.einsum("mc,mcka->mka", weights[:, held:], self.beside)
+        return np.asarray(total)
+
+
+@lru_cache(maxsize=2)
+def measure_functions(has_unequal_drag: bool) -> SmoothFunctions:
+    """Measures of a motion that moves: shared are weight, wind and airframe, a place's own its body axes."""
+
+    def kernel(
+        ops: Ops, shared: Sequence[Scalar], moved: Sequence[Scalar], axes: Sequence[Scalar]
+    ) -> Sequence[Scalar]:
+        weight, wind, x, y, z, drag = triples(shared[:-3])
+        mass, lateral, axial = shared[-3:]
+        airspeed, *others = triples(moved)
+        b1, b2, b3 = triples(axes)
+        near = weight, add_scaled(airspeed, -1.0, wind), *others
+        moving = BodyMotion(*(to_body((b1, b2, b3), each) for each in near))
+        airframe = InertiaAndDrag(mass, (x, y, z), lateral, axial, drag if has_unequal_drag else None)
+        return measures(ops, airframe, moving, (b1[2], b2[2], b3[2]))
+
+    return smooth_functions(kernel, 21, MOTION, 9, squares=True)

@@ -15,7 +15,7 @@ import numpy as np
 from aerobat.arrays import Array, Indices, Mask
 from aerobat.planning.refinement.closure import Closure
 from aerobat.planning.refinement.excess import chebyshev
-from aerobat.planning.refinement.limit_values import Frames, LimitValues
+from aerobat.planning.refinement.limit_values import Frames, LimitSlopes, LimitValues
 from aerobat.planning.refinement.spline import Motion, Spline, basis
 from aerobat.planning.refinement.stage_values import KNOWN, STATE, StageValues
 
@@ -190,14 +190,10 @@ class RefinedPoint:
         """The slopes of the inequalities."""
         program = self.program
         limits = program.limits.slopes(self._motion.derivatives.reshape(-1, 6, 3), program.near)
-        segments, count, kinds = program.counts.shape
-        slopes = self._motion.slopes.reshape(segments, count, 18, -1)
-        local = limits.reshape(segments, count, kinds, 18) @ slopes
-        local *= program.weights[..., None]
         windows = np.zeros((len(program.windows[1]), len(self.x)))
         windows[:, program.spline.ratio_columns] = program.windows[0] * self._ratios
         others = np.concatenate([windows, self._stage_rows(*self._stage_slopes)])
-        return RefinedRows(program.spline, local.reshape(segments, count * kinds, -1), others)
+        return RefinedRows(program, self._motion.slopes, limits, others)
 
     @cached_property
     def equality_rows(self) -> Array:
@@ -212,23 +208,25 @@ class RefinedPoint:
             found.append(self.program.spline.scattered(by_local)[None])
         return np.concatenate(found)
 
-    def curvature(self, inequality_weights: Array, equality_weights: Array) -> Array:
-        """The second derivatives of their weighted sum, (n, n)."""
+    def curvature(self, inequality_weights: Array, equality_weights: Array, squares: Array) -> Array:
+        """The second derivatives of their weighted sum, and of squares of what moves inequalities, (n, n)."""
         program, spline = self.program, self.program.spline
         segments, count, kinds = program.counts.shape
-        at_places, at_windows, at_stages = np.split(
-            inequality_weights, np.cumsum([program.counts.size, len(program.windows[1])])
-        )
-        weights = (at_places.reshape(program.counts.shape) * program.weights).reshape(-1, kinds)
+        parts = np.cumsum([program.counts.size, len(program.windows[1])])
+        at_places, at_windows, at_stages = np.split(inequality_weights, parts)
+        faded = program.weights.reshape(-1, kinds)
+        weights = at_places.reshape(-1, kinds) * faded
+        squared = squares[: parts[0]].reshape(-1, kinds) * faded**2
         derivatives = self._motion.derivatives.reshape(-1, 6, 3)
-        by_motion, second = program.limits.curvature(derivatives, program.near, weights)
-        moving = self._motion.slopes[:, :, 1:].reshape(segments * count, STATE + 6, -1)
-        blocks = np.swapaxes(moving, 1, 2) @ (second @ moving)
-        blocks = blocks.reshape(segments, count, *blocks.shape[1:]).sum(axis=1)
-        blocks += self._motion.curvature(by_motion.reshape(segments, count, 6, 3))
+        second = program.limits.curvature(derivatives, program.near, weights, squared)
+        moving = self._motion.slopes.reshape(segments, count, 18, -1)
+        bent = (second.reshape(segments, count, 18, 18) @ moving).reshape(segments, count * 18, -1)
+        blocks = np.swapaxes(moving.reshape(bent.shape), 1, 2) @ bent
+        blocks += self._motion.curvature(self.rows.limits.weighted(weights).reshape(segments, count, 6, 3))
         timed, equal = np.split(equality_weights[: self._linear_equalities], [len(program.timed[1])])
         blocks += self._stage_blocks(at_stages, equal)
-        matrix = spline.assembled(blocks)
+        others = self.rows.others
+        matrix = spline.assembled(blocks) + others.T @ (squares[parts[0] :, None] * others)
         by_ratio = at_windows @ program.windows[0] + timed @ program.timed[0]
         columns = spline.ratio_columns
         matrix[columns, columns] += by_ratio * self._ratios
@@ -301,29 +299,29 @@ class RefinedPoint:
 
 @dataclass(frozen=True, eq=False)
 class RefinedRows:
-    """Slopes of inequalities: those of a segment by its own variables, others by all."""
+    """Slopes of inequalities: of limits at places by way of the motion there, of others by all variables."""
 
-    spline: Spline
-    local: Array  # (S, r, K + 2)
+    program: RefinementProgram
+    motion: Array  # by each segment's own variables, (S, p, 6, 3, K + 2)
+    limits: LimitSlopes
     others: Array  # (q, n)
 
     def times(self, step: Array) -> Array:
-        """The rows times a step, (S r + q,)."""
-        local = self.local @ self.spline.gathered(step)[..., None]
-        return np.concatenate([local.ravel(), self.others @ step])
+        """The rows times a step, (S p c + q,)."""
+        change = self._flat @ self.program.spline.gathered(step)[..., None]
+        at_places = self.limits.along(change.reshape(-1, 6, 3)).ravel() * self.program.weights.ravel()
+        return np.concatenate([at_places, self.others @ step])
 
     def transposed(self, weights: Array) -> Array:
         """The sum of weighted rows, (n,)."""
-        local, others = self._split(weights)
-        parts = np.swapaxes(self.local, 1, 2) @ local
-        return self.spline.scattered(parts[..., 0]) + self.others.T @ others
+        counts = self.program.counts
+        at_places, others = np.split(weights, [counts.size])
+        at_places = at_places * self.program.weights.ravel()
+        by_motion = self.limits.weighted(at_places.reshape(-1, counts.shape[-1]))
+        parts = np.swapaxes(self._flat, 1, 2) @ by_motion.reshape(len(counts), -1, 1)
+        return self.program.spline.scattered(parts[..., 0]) + self.others.T @ others
 
-    def normal(self, weights: Array) -> Array:
-        """The sum of weighted rows times themselves, (n, n)."""
-        local, others = self._split(weights)
-        blocks = np.swapaxes(self.local, 1, 2) @ (local * self.local)
-        return self.spline.assembled(blocks) + self.others.T @ (others[:, None] * self.others)
-
-    def _split(self, weights: Array) -> tuple[Array, Array]:
-        segments, rows, _ = self.local.shape
-        return weights[: segments * rows].reshape(segments, rows, 1), weights[segments * rows :]
+    @property
+    def _flat(self) -> Array:
+        """The motion's slopes, (S, 18 p, K + 2)."""
+        return self.motion.reshape(len(self.motion), -1, self.motion.shape[-1])

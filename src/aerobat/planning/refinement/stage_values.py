@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import isfinite
 
 import numpy as np
 
-from aerobat.arrays import Array, Indices, Mask, xyz
-from aerobat.engines.array_functions import COMPLEX_STEP, ArrayFunction, array_function, gradient
-from aerobat.engines.tracing import Symbol, Trace, TraceOps
+from aerobat.arrays import Array, Indices, Mask
+from aerobat.engines.llvm.functions import NO_DIRECTION, SmoothFunctions, smooth_functions, triples
+from aerobat.kernels.ops import Ops, Scalar
 from aerobat.kernels.vectors import add, add_scaled
 from aerobat.limits.body_in_gate import BodyInGate, OpeningAhead, extent_of_thrust
 from aerobat.limits.limit import Limit
 from aerobat.limits.path_condition import limit_of
 from aerobat.planning.task import Task
 from aerobat.problem.ball import Ball
-from aerobat.problem.problem import DERIVATIVES
 from aerobat.problem.stage import Stage
 
 KNOWN = 3  # derivatives that stages ask of: position, velocity, acceleration
 STATE = 3 * KNOWN  # their components
+DIRECTIONS = np.eye(STATE)
 BALL_SHARE = 1.0 - 1e-5  # of a ball's squared radius: rounding has the rest
 
 
@@ -43,15 +43,15 @@ class StageValues:
         linear = np.sum(weights[~equal] * derivatives[at[~equal]], axis=(1, 2)) - bounds[~equal]
         balls = [float(offset @ offset) - BALL_SHARE for _, offset, _ in self._in_balls(derivatives)]
         rooms = [
-            np.real(self._functions[k][0](self._given(k, derivatives[body.stage])))
-            for k, body in enumerate(self.in_gates)
+            _room_scale(body) * functions.values(*self._given(body, derivatives), NO_DIRECTION)[0, :, 0]
+            for body, functions in self._rooms
         ]
         return np.concatenate([linear, balls, *rooms])
 
     @property
     def inequality_count(self) -> int:
         """q."""
-        rooms = sum(_room_count(body) for body in self.in_gates)
+        rooms = sum(len(_room_scale(body)) for body in self.in_gates)
         return int((~self._linear[3]).sum()) + len(self._balls) + rooms
 
     def equalities(self, derivatives: Array) -> Array:
@@ -67,14 +67,12 @@ class StageValues:
             stages.append(stage)
             slopes.append(np.zeros((6, 3)))
             slopes[-1][0] = 2.0 * offset / radius
-        for k, body in enumerate(self.in_gates):
-            found = self._functions[k][0](self._stepped(k, derivatives[body.stage]))
-            for value in found:
+        for body, functions in self._rooms:
+            found = functions.slopes(*self._given(body, derivatives), DIRECTIONS)[..., 0].T
+            for value in _room_scale(body)[:, None] * found:
                 stages.append(body.stage)
                 slopes.append(np.zeros((6, 3)))
-                slopes[-1][:KNOWN] = (
-                    np.broadcast_to(np.imag(value), (STATE,)).reshape(KNOWN, 3) / COMPLEX_STEP
-                )
+                slopes[-1][:KNOWN] = value.reshape(KNOWN, 3)
         return np.array(stages, dtype=np.intp), np.array(slopes).reshape(-1, 6, 3)
 
     def equality_slopes(self) -> tuple[Indices, Array]:
@@ -92,14 +90,11 @@ class StageValues:
         for stage, _, radius in self._in_balls(derivatives):
             found[stage, :3, :3] += weights[first] * 2.0 / radius**2 * np.eye(3)
             first += 1
-        for k, body in enumerate(self.in_gates):
-            _, by_state = self._functions[k]
-            count = _room_count(body)
-            own = weights[first : first + count]
-            slopes = by_state([*self._stepped(k, derivatives[body.stage]), *own])
-            second = [np.broadcast_to(np.imag(each), (STATE,)) / COMPLEX_STEP for each in slopes]
-            found[body.stage] += np.array(second)
-            first += count
+        for body, functions in self._rooms:
+            scale = _room_scale(body)
+            own = scale * weights[first : first + len(scale)]
+            found[body.stage] += functions.curvature(*self._given(body, derivatives, own), DIRECTIONS)[..., 0]
+            first += len(scale)
         return found
 
     def _in_balls(self, derivatives: Array) -> Iterator[tuple[int, Array, float]]:
@@ -127,37 +122,32 @@ class StageValues:
             np.array([row[3] for row in rows], dtype=bool),
         )
 
-    def _given(self, k: int, state: Array) -> list[float]:
-        """What the functions of a gate take: the state there (6, 3), and the gate's opening."""
-        return [*state[:KNOWN].ravel().tolist(), *self.in_gates[k].parameters.tolist()]
-
-    def _stepped(self, k: int, state: Array) -> list[Array | float]:
-        """The same with each component of the state in turn moved by a complex step."""
-        moved = state[:KNOWN].ravel() + 1j * COMPLEX_STEP * np.eye(STATE)
-        return [*moved.T, *self.in_gates[k].parameters.tolist()]
-
     @cached_property
-    def _functions(self) -> tuple[tuple[ArrayFunction, ArrayFunction], ...]:
-        """Of each gate, what is missing of the room, and slopes by the state of its weighted sum."""
-        return tuple(self._room_functions(body) for body in self.in_gates)
+    def _rooms(self) -> tuple[tuple[BodyInGate, SmoothFunctions], ...]:
+        """Each body in a gate, with the functions of its room."""
+        return tuple((body, room_functions(len(body.gate.opening.sides[1]))) for body in self.in_gates)
 
-    def _room_functions(self, room: BodyInGate) -> tuple[ArrayFunction, ArrayFunction]:
-        trace = Trace()
-        ops = TraceOps(trace)
-        position, velocity, acceleration = (trace.vector(name) for name in DERIVATIVES[:KNOWN])
-        parameters = [trace.input(f"opening {i}") for i in range(len(room.parameters))]
-        balance, body = self.task.balance, self.task.vehicle.bounding_ellipsoid
-        thrust = add(add_scaled(acceleration, balance.drag, velocity), xyz(balance.constant))
-        extent = extent_of_thrust(ops, body, thrust)
-        *sides, speed = OpeningAhead.of_parameters(parameters).room(ops, position, velocity, extent)
-        size = room.gate.opening.inradius * room.min_speed
-        missing: list[Symbol] = [trace.symbol(-1.0 / size * side) for side in sides]
-        missing.append(trace.symbol(-1.0 / room.min_speed * speed))
-        weights = [trace.input(f"weights {i}") for i in range(len(missing))]
-        total = trace.symbol(sum(w * value for w, value in zip(weights, missing, strict=True)))
-        state = [*position, *velocity, *acceleration]
-        given = [*state, *parameters]
-        return array_function(given, missing), array_function([*given, *weights], gradient(total, state))
+    def _given(self, body: BodyInGate, derivatives: Array, *more: Array) -> tuple[Array, Array]:
+        """What the functions of a gate take: body, balance and opening, and the state there, then more."""
+        balance, revolved = self.task.balance, self.task.vehicle.bounding_ellipsoid.revolved
+        state = derivatives[body.stage, :KNOWN].ravel()
+        shared = [*revolved, balance.drag, *balance.constant, *body.parameters]
+        return np.array(shared), np.concatenate([state, *more])[None]
+
+
+@lru_cache(maxsize=8)
+def room_functions(sides: int) -> SmoothFunctions:
+    """The room in an opening of so many sides, as the state of its stage moves."""
+
+    def kernel(
+        ops: Ops, shared: Sequence[Scalar], state: Sequence[Scalar], _: Sequence[Scalar]
+    ) -> Sequence[Scalar]:
+        (position, velocity, acceleration), (constant,) = triples(state), triples(shared[5:8])
+        thrust = add(add_scaled(acceleration, shared[4], velocity), constant)
+        extent = extent_of_thrust(ops, shared[:4], thrust)
+        return [*OpeningAhead.of_parameters(shared[8:]).room(ops, position, velocity, extent)]
+
+    return smooth_functions(kernel, 16 + 4 * sides, STATE)
 
 
 def _sides(limit: Limit, is_equality: bool) -> Iterator[tuple[Array, float]]:
@@ -169,6 +159,7 @@ def _sides(limit: Limit, is_equality: bool) -> Iterator[tuple[Array, float]]:
                 return
 
 
-def _room_count(body: BodyInGate) -> int:
-    """The number of inequalities of a body's room in a gate."""
-    return 2 * len(body.gate.opening.sides[1]) + 1
+def _room_scale(body: BodyInGate) -> Array:
+    """Factors that make what is missing of values of a room, as fractions of a size, (2 K + 1,)."""
+    count = 2 * len(body.gate.opening.sides[1])
+    return -1.0 / np.array([body.gate.opening.inradius * body.min_speed] * count + [body.min_speed])

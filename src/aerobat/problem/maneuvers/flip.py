@@ -97,7 +97,7 @@ class Flip(Maneuver):
         )
 
     @validated
-    def with_gate_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Flip:
+    def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Flip:
         """Return it with a least specific thrust [m/s²] in its gate; itself where it has none."""
         if not gates and self.gate is None:
             return self

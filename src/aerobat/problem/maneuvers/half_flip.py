@@ -10,13 +10,14 @@ import numpy as np
 
 from aerobat.declaration import Angle, Positive, validated
 from aerobat.errors import SpecError
-from aerobat.problem.condition import THRUST_FRACTION, Condition, Quantity, thrust_in_plane
+from aerobat.problem.condition import THRUST_FRACTION, Condition, Quantity, firm_thrust, thrust_in_plane
 from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.gate_passage import PAPER_LATERAL, PAPER_PASSAGE, GatePassage
 from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
 from aerobat.problem.stage import StageSequence
 from aerobat.so3 import UP
 
+SLOWER = 0.85  # of the thrust that keeps attitudes at the speed of figures
 _UPRIGHT = 1e-9  # [-] of a gate's upright across the vertical: rounding
 
 
@@ -24,8 +25,8 @@ _UPRIGHT = 1e-9  # [-] of a gate's upright across the vertical: rounding
 class HalfFlip(Maneuver):
     """Thrust along the tilted gate's upright while passing it, never upside down (paper, Section II-D)."""
 
-    # ε_y, least horizontal thrust across the passage; left out, the thrust along the gate's upright is at
-    # least 20 % of what the vehicle has
+    # ε_y, least horizontal thrust across the passage; left out, 19 times the sine of the gate's tilt of
+    # vehicles that have 22.5 beside their weight, and at least 20 % of what they have along its upright
     min_lateral_thrust: Positive | None = None  # [m/s²]
     passage: GatePassage = GatePassage()  # how the gate is passed
     gate: str | None = None  # name of the gate; left out, the only one
@@ -57,7 +58,7 @@ class HalfFlip(Maneuver):
         return tuple(gate.tilted(tilt) for gate in gates)
 
     @validated
-    def with_gate_thrust(self, gates: Sequence[Gate], thrust: Positive) -> HalfFlip:
+    def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> HalfFlip:
         """Return it with a least specific thrust [m/s²] in its gate; itself where that is upright."""
         up = passed_gate(gates, self.gate, self.kind).up
         across = float(np.hypot(up[0], up[1]))
@@ -67,9 +68,11 @@ class HalfFlip(Maneuver):
         """The least thrust along the gate's upright [m/s²]."""
         if gate.up[2] < -1e-9:
             raise SpecError("gate.tilt_deg must be from -90 to 90 for a half-flip; past that it is a flip")
-        if self.min_lateral_thrust is None:
-            return THRUST_FRACTION * max_specific_thrust
         across = float(np.hypot(gate.up[0], gate.up[1]))
+        if self.min_lateral_thrust is None:
+            return max(
+                THRUST_FRACTION * max_specific_thrust, across * SLOWER * firm_thrust(max_specific_thrust)
+            )
         if across < _UPRIGHT:
             raise SpecError(
                 "maneuver.min_lateral_thrust asks for thrust sideways, which an upright gate has not; tilt it"

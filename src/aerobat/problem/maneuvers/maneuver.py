@@ -45,8 +45,8 @@ class Maneuver(ABC):
         raise SpecError(f"only the gate of a half-flip can be tilted, this maneuver is a {self.kind}")
 
     @validated
-    def with_gate_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Maneuver:
-        """Return it with a least specific thrust [m/s²] in its gate; itself where it asks for none there."""
+    def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Maneuver:
+        """Return it with a least specific thrust [m/s²] in its gate or stages; itself if it asks none."""
         return self
 
     @property

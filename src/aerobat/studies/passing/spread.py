@@ -15,7 +15,6 @@ from aerobat.planning import Plan
 from aerobat.planning.passages import require_openings
 from aerobat.problem import Gate, Problem
 from aerobat.simulation import fly
-from aerobat.simulation.passages import Passage
 from aerobat.vehicle import Vehicle
 
 LEVEL = 0.95  # of the flights, that keep within a tube
@@ -23,8 +22,8 @@ ROWS_RATE = 100.0  # [1/s] of a tube's rows, at most
 SAMPLED = 200  # flights whose every row is looked at: 50 MB
 MIN_TOLERANCE = 0.1  # of a gate's tolerance, that is left to the plan however far flights stray
 MIN_OPENING = 0.8  # likewise of a gate's opening
-AIM = 0.8  # of a gate's tolerance of attitude, that flights shall keep to after their thrust there is raised
-MAX_GATE_THRUST = 0.6  # of the greatest specific thrust, to which it may be: turning takes the rest
+AIM = 0.8  # of a tolerance of attitude, that flights shall keep to after their thrust there is raised
+MAX_THRUST = 0.75  # of the greatest specific thrust, to which it may be: turning takes the rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,10 +98,10 @@ def narrowed(problem: Problem, vehicle: Vehicle, scores: Score) -> Problem:
 
 
 def firmer(problem: Problem, vehicle: Vehicle, plan: Plan, scores: Score, fraction: float) -> Problem:
-    """The problem with more thrust in the gates than its plan has, where flights stray off their attitude.
+    """The problem with more thrust in its stages than its plan has, where flights stray off their attitude.
 
     Against a push across the thrust the vehicle leans by their ratio: the more thrust, the less. The problem
-    itself where its maneuver asks for no thrust in its gate, or this is as much as is useful.
+    itself where its maneuver asks for no thrust in them, or this is as much as is useful.
 
     Args:
         problem: What is planned.
@@ -111,29 +110,29 @@ def firmer(problem: Problem, vehicle: Vehicle, plan: Plan, scores: Score, fracti
         scores: Of that plan's flights.
         fraction: Of the flights, that shall keep to the attitude.
     """
-    needed = [_thrust_needed(plan, passage, fraction) for passage in scores.passages]
-    most = MAX_GATE_THRUST * vehicle.max_specific_thrust
-    thrust = min(max(needed, default=0.0), most)
-    if thrust <= min((_planned_thrust(plan, passage) for passage in scores.passages), default=0.0):
+    strays = [(p.attitude_error_deg / p.attitude_tolerance_deg, p.planned) for p in scores.passages]
+    strays += [(stage.angle_deg / stage.tolerance_deg, stage.planned) for stage in scores.attitudes]
+    planned = [_planned_thrust(plan, np.asarray(times)) for _, times in strays]
+    needed = [
+        _excess(np.asarray(each), fraction) * f / AIM for (each, _), f in zip(strays, planned, strict=True)
+    ]
+    thrust = min(max(needed, default=0.0), MAX_THRUST * vehicle.max_specific_thrust)
+    if thrust <= min(planned, default=0.0):
         return problem
-    return replace(problem, maneuver=problem.maneuver.with_gate_thrust(problem.gates, thrust))
+    return replace(problem, maneuver=problem.maneuver.with_stage_thrust(problem.gates, thrust))
 
 
-def _thrust_needed(plan: Plan, passage: Passage, fraction: float) -> float:
-    """The specific thrust [m/s²] with which flights would keep well to a gate's attitude."""
-    strays, tolerance = np.asarray(passage.attitude_error_deg), np.asarray(passage.attitude_tolerance_deg)
-    crossed = np.isfinite(strays) & np.isfinite(tolerance)
-    if not crossed.any():
+def _excess(strays: Array, fraction: float) -> float:
+    """The part of its tolerance within which a fraction of the flights keeps to an attitude; 0 for none."""
+    known = strays[np.isfinite(strays)]
+    return float(np.quantile(known, fraction)) if len(known) else 0.0
+
+
+def _planned_thrust(plan: Plan, times: Array) -> float:
+    """The specific thrust [m/s²] of a plan as it is to pass a stage, at times [s] of flights."""
+    if np.isnan(times).all():  # no flight came near
         return 0.0
-    excess = float(np.quantile(strays[crossed] / tolerance[crossed], fraction))
-    return _planned_thrust(plan, passage) * excess / AIM
-
-
-def _planned_thrust(plan: Plan, passage: Passage) -> float:
-    """The specific thrust [m/s²] of a plan as it is to pass a gate."""
-    if np.isnan(passage.planned).all():  # no flight came near
-        return 0.0
-    time = min(float(np.nanmedian(passage.planned)), plan.duration)
+    time = min(float(np.nanmedian(times)), plan.duration)
     acceleration = plan.trajectory.evaluate(np.array([time]), 2)[0]
     return float(np.linalg.norm(acceleration + plan.problem.environment.weight))
 

@@ -1,0 +1,113 @@
+"""Traces as machine code of many places at once, along several directions from each.
+
+It is `scan` of a loop without a carry: places are its vehicles, directions its ticks, and what directions do
+not change is computed once a place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import combinations_with_replacement
+from operator import mul
+from typing import NamedTuple
+
+import numpy as np
+
+from aerobat.arrays import Array
+from aerobat.engines.duals import Dual, DualOps, value_and_tangent
+from aerobat.engines.gradient import gradient
+from aerobat.engines.llvm.engine import lanes, machine_code
+from aerobat.engines.llvm.packing import ARRAYS, InputKind, Layout
+from aerobat.engines.traced_loop import TracedLoop
+from aerobat.engines.tracing import Symbol, Trace, TraceOps
+from aerobat.kernels.ops import Ops, Scalar, Vector
+
+PlaceFunction = Callable[[Array, Array, Array], Array]
+Kernel = Callable[[Ops, Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]], Sequence[Scalar]]
+NO_DIRECTION = np.zeros((1, 0))
+_UNUSED = (None,) * (len(ARRAYS) - 4)  # all but the first three arrays and the last
+
+
+class SmoothFunctions(NamedTuple):
+    """A kernel at places: of shared values (s,), own ones (m, w) and directions (t, d), (t, o, m) each.
+
+    Own are values that move, then others, and of the curvature weights on what the kernel returns.
+    """
+
+    values: PlaceFunction  # along NO_DIRECTION
+    slopes: PlaceFunction  # along directions of what moves
+    curvature: PlaceFunction  # the change of the weighted sum's slopes by what moves
+
+
+def smooth_functions(
+    kernel: Kernel, shared: int, moved: int, fixed: int = 0, squares: bool = False
+) -> SmoothFunctions:
+    """Return a kernel with two derivatives as machine code.
+
+    Args:
+        kernel: From its arithmetic, shared values, values that move and others of a place to what it returns.
+        shared: The number of values that are one for all places.
+        moved: Of those of a place by which slopes are taken.
+        fixed: Of the others of a place.
+        squares: Whether the curvature has that of Σ w_ij slope_i slope_j / 2 beside, with weights on pairs in
+            the order of `combinations_with_replacement` behind the others, those of unlike ones counted once.
+    """
+    trace = Trace()
+
+    def inputs(name: str, count: int) -> list[Symbol]:
+        return [trace.input(f"{name} {i}") for i in range(count)]
+
+    common, moving, still = inputs("shared", shared), inputs("moved", moved), inputs("fixed", fixed)
+    directions, own = inputs("direction", moved), [*moving, *still]
+    along = [*map(Dual, moving, directions)]
+    found = kernel(DualOps(TraceOps(trace)), [*map(Dual, common)], along, [*map(Dual, still)])
+    parts = zip(*map(value_and_tangent, found), strict=True)
+    values, slopes = ([trace.symbol(part) for part in each] for each in parts)
+    weights = inputs("weight", len(values))
+    bent = gradient(trace.symbol(sum(map(mul, weights, slopes))), moving)
+    if squares:
+        pairs = [a * b if a is not b else 0.5 * a * b for a, b in combinations_with_replacement(slopes, 2)]
+        weights += inputs("pair", len(pairs))
+        squared = trace.symbol(sum(map(mul, weights[len(values) :], pairs)))
+        bent = [*map(Symbol.__add__, bent, gradient(squared, directions))]
+    return SmoothFunctions(
+        place_function(common, own, (), values),
+        place_function(common, own, directions, slopes),
+        place_function(common, [*own, *weights], directions, bent),
+    )
+
+
+def triples(values: Sequence[Scalar]) -> list[Vector]:
+    """Return values as vectors of three each."""
+    return [(values[k], values[k + 1], values[k + 2]) for k in range(0, len(values), 3)]
+
+
+def place_function(
+    shared: Sequence[Symbol], own: Sequence[Symbol], directions: Sequence[Symbol], outputs: Sequence[Symbol]
+) -> PlaceFunction:
+    """Return the function of a trace from shared values (s,), own (m, w) and directions (t, d) to (t, o, m).
+
+    Args:
+        shared: Inputs that are one number for all places.
+        own: Inputs of which every place has its own.
+        directions: Inputs that all places take in turn, one row after another.
+        outputs: What comes out.
+    """
+    given, turns, found = (tuple(s.number for s in each) for each in ((*shared, *own), directions, outputs))
+    loop = TracedLoop(outputs[0].trace, given, turns, (), (), (), found, (), ())
+    width, constant = lanes(), (False,) * len(turns)
+    places = (True,) * len(shared) + (False,) * len(own)
+    layout = Layout(width, places, (InputKind(shared=True),) * len(turns), (), constant)
+    _, scan = machine_code(loop, layout)
+
+    def function(shared: Array, own: Array, directions: Array) -> Array:
+        blocks = -(-len(own) // width)
+        padded = np.concatenate([own, own[:1].repeat(blocks * width - len(own), 0)])
+        packed = padded.reshape(blocks, width, -1).swapaxes(1, 2).copy()
+        result = np.empty((len(directions), len(found), blocks * width))
+        given = (array.ctypes.data for array in (shared, packed, directions))
+        addresses = [*given, *_UNUSED, result.ctypes.data]
+        scan(*addresses, blocks * width, len(directions), 0, 0, 1, 0, blocks * width)
+        return result[..., : len(own)]
+
+    return function
