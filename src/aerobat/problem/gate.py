@@ -158,6 +158,10 @@ class Gate:
         """The outer corners in the world [m] of a frame so thick, one beside each of `outline`, (K, 3)."""
         return self.position + self.opening.frame(thickness) @ self.plane_axes
 
+    def plane_around(self, border: float) -> tuple[ConvexPiece, ...]:
+        """The gate's plane around the opening as far as a border [m], where a body touches the frame."""
+        return _around(self, Wall(border), f"the frame of {self.name}", np.zeros(1))
+
     @cached_property
     def solid(self) -> Obstacle | None:
         """The wall around the opening, as an obstacle; None where there is none."""
@@ -207,15 +211,9 @@ class GateWall(Obstacle):
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
         """The parts of the wall that lie beyond each side."""
-        gate, wall = self.gate, self.gate.wall or Wall()
-        thick = wall.thickness / 2.0 * np.outer([-1.0, 1.0], gate.normal)
-        return tuple(
-            ConvexPiece(
-                (gate.position + part @ gate.plane_axes + thick[:, None]).reshape(-1, 3),
-                name=f"the wall of {gate.name}",
-            )
-            for part in wall.parts(gate.opening)
-        )
+        wall = self.gate.wall or Wall()
+        sides = wall.thickness / 2.0 * np.array([-1.0, 1.0])
+        return _around(self.gate, wall, f"the wall of {self.gate.name}", sides)
 
 
 @validated
@@ -300,6 +298,13 @@ def named_gate(gates: Sequence[Gate], name: str) -> Gate:
         if gate.name == name:
             return gate
     raise unknown_name("gate", name, [gate.name for gate in gates])
+
+
+def _around(gate: Gate, wall: Wall, name: str, heights: Array) -> tuple[ConvexPiece, ...]:
+    """The parts of a wall that lie beyond each side of a gate's opening, at heights [m] above its plane."""
+    levels = gate.position + np.multiply.outer(heights, gate.normal)[:, None]
+    parts = wall.parts(gate.opening)
+    return tuple(ConvexPiece((levels + part @ gate.plane_axes).reshape(-1, 3), name=name) for part in parts)
 
 
 def _half(diameter: Any) -> float:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification.envelope import PlannedPassage
+from aerobat.certification.envelope import PASSAGE_DEPTH, PlannedPassage
 from aerobat.declaration import by_value
 from aerobat.engines.pytree import components, tree_map
 from aerobat.kernels.gates.progress import GatePlane, GateProgress
@@ -36,7 +36,6 @@ from aerobat.vehicle import Ellipsoid
 T = TypeVar("T")
 
 PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is looked for
-PASSAGE_DEPTH = 0.05  # [m] beyond the plane, where who crosses it has not merely stopped in it
 
 
 def one_of_many(found: T, k: int, shared: int) -> T:
