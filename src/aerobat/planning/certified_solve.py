@@ -70,7 +70,7 @@ class Judged(Generic[Detail]):
 
     @property
     def frames(self) -> tuple[Finding, ...]:
-        """What is proven about the body and the frames of the gates that are passed at placed stages."""
+        """The findings about the body and the frames of gates that are passed at placed stages."""
         return () if self.certificate is None else self.certificate.frames
 
     def at(self, stages: Sequence[PlacedStage]) -> Judged[Detail]:

@@ -22,7 +22,7 @@ class Framed(Protocol):
 
     @property
     def frames(self) -> tuple[Finding, ...]:
-        """What is proven about its body and each gate's frame."""
+        """The findings about its body and each gate's frame."""
 
 
 Found = TypeVar("Found", bound=Framed)

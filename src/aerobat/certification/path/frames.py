@@ -50,7 +50,7 @@ def _clear(attitude: BodyPath | None, ball: BodyPath, passage: PlannedPassage) -
 def _away(path: BodyPath, gate: Gate, around: float) -> Array:
     """Instants [s] at which the body on a path is not about a gate's opening, within `around` [m] of it."""
     times, centres, axes = path.sampled
-    offset = centres - gate.position
+    offset = centres - gate.places(times)
     height, along = offset @ gate.normal, axes @ gate.normal
     body = path.body
     touched = np.sqrt(body.wide**2 + (body.high**2 - body.wide**2) * along**2) + body.aside

@@ -29,6 +29,11 @@ class ObstacleMotion:
     velocity: Array  # [m/s] (3,)
     rows: Array  # time [s] and place [m], (k, 4); it rests before the first and after the last
 
+    @classmethod
+    def of(cls, velocity: Array, rows: Array) -> ObstacleMotion | None:
+        """Return the motion; None of what stands still."""
+        return cls(velocity, rows) if velocity.any() or len(rows) else None
+
     @property
     def times(self) -> Array:
         """The instants [s] at which its velocity may jump, (k,)."""
@@ -41,6 +46,16 @@ class ObstacleMotion:
             along = [np.interp(times, self.times, each) - each[0] for each in self.rows.T[1:]]
             moved += np.stack(along, axis=-1)
         return np.asarray(moved)
+
+    @property
+    def turns(self) -> Array:
+        """By how much the velocity jumps at each of `times` [m/s], (k, 3)."""
+        slopes = np.diff(self.rows[:, 1:], axis=0) / np.diff(self.times)[:, None]
+        return np.diff(slopes, axis=0, prepend=0.0, append=0.0) if len(self.rows) else self.rows[:, 1:]
+
+    def velocity_at(self, time: float) -> Array:
+        """Return its velocity [m/s] at a time [s], (3,)."""
+        return np.asarray(self.velocity + self.turns[self.times <= time].sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ class FlownPath:
 
     @property
     def frames(self) -> tuple[Finding, ...]:
-        """What is proven about its body and each gate's frame."""
+        """The findings about its body and each gate's frame."""
         return self.judged.frames
 
     @property
