@@ -42,7 +42,9 @@ def flip() -> Plan:
 
 
 def passage_of(certificate: Certificate) -> dict[str, Finding]:
-    return {finding.quantity: finding for finding in certificate.findings if finding.gate is not None}
+    """What is said of the instant of the passage; of the body on the way through, `frames` says it."""
+    found = set(certificate.findings) - set(certificate.frames)
+    return {f.quantity: f for f in certificate.findings if f.gate is not None and f in found}
 
 
 def level(speed: float) -> Trajectory:

@@ -14,13 +14,14 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification import PlannedPassage
+from aerobat.certification.envelope import PASSAGE_DEPTH
 from aerobat.engines.floats import FloatOps
 from aerobat.limits.body_in_gate import BodyInGate, extent_of_attitude, extent_of_thrust
 from aerobat.planning import PlacedStage
 from aerobat.reporting.plain_data import plain
 from aerobat.reporting.report import Report
 from aerobat.simulation import Outcome
-from aerobat.simulation.passages import PASSAGE_DEPTH, log_rows, passages_in_log
+from aerobat.simulation.passages import log_rows, passages_in_log
 from gate_motions import CROSSING, RATE, Motion, cruise, motion
 from random_problems import random_case
 from score_cases import QUAD

@@ -11,9 +11,9 @@ import pytest
 import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.certification.envelope import PASSAGE_DEPTH
 from aerobat.problem.condition import Attitude
 from aerobat.simulation import Outcome
-from aerobat.simulation.passages import PASSAGE_DEPTH
 from gate_motions import CRUISE, SPEED
 from score_cases import QUAD, assert_same
 from score_cases import near as starts_near

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aerobat.certification import Finding, Side, Verdict
 from aerobat.planning import FreeKnots, MinSnap, Plan
-from aerobat.planning.flyability import FlownPassage, OwnFlight, own_flight
+from aerobat.planning.flyability import own_flight
 from aerobat.planning.gate_clearance import more_direct
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.task import Task
@@ -92,10 +93,9 @@ def test_a_path_is_made_more_direct_by_less_where_the_body_only_touches_the_fram
     stages = task.stages.stages
 
     def raised_by(clearance: float) -> float:
-        missed = FlownPassage(task.problem.gates[0].name, 0.0, None, "hit the frame", clearance)
-        flight = OwnFlight(error=0.0, passages=(missed,))
-        (body,) = more_direct((), stages, task, flight)
-        (again,) = more_direct((body,), stages, task, flight)
+        hit = Finding("clearance", "m", Side.MIN, clearance, clearance, 0.0, 0.0, Verdict.VIOLATED)
+        (body,) = more_direct((), stages, task, [hit])
+        (again,) = more_direct((body,), stages, task, [hit])
         return again.bending / body.bending
 
     assert 1.0 < raised_by(-0.001) < raised_by(-0.1)

@@ -282,7 +282,7 @@ def test_a_gate_that_a_stage_names_is_crossed_in_its_direction(name: str) -> Non
     """Also where the way on leads back, and standing still in it would be shortest."""
     if name in ("free-knots", "time-optimal"):
         pytest.importorskip("casadi")
-    gate = ab.tilted_gate((2.0, 0.0, 1.0), name="far")
+    gate = ab.tilted_gate((2.0, 0.0, 1.0), width=3.0, height=3.0, name="far")
     maneuver = ab.CustomManeuver((ab.Stage("turn", gate="far"),))
     problem = Problem("there and back", at_rest((0, 0, 1)), at_rest((0, 0, 1.5)), maneuver, (gate,))
     # from the MIQP's plan, kept in its plane, time-optimal does not converge; out of it it does

@@ -259,7 +259,7 @@ def through(*openings: str) -> ab.Problem:
 @pytest.mark.parametrize(
     ("planner", "openings"),
     [
-        (ab.TimeOptimal(8, starts=1), ("round",)),
+        pytest.param(ab.TimeOptimal(8, starts=1), ("round",), marks=pytest.mark.slow),
         pytest.param(ab.FreeKnots(segments=2), ("triangle",), marks=pytest.mark.slow),
         (ab.Miqp(order=4), ("round", "triangle")),
         pytest.param(ab.TimeOptimal(8, starts=1), ("round", "triangle"), marks=pytest.mark.slow),

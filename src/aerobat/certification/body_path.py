@@ -6,7 +6,8 @@ axis. Where no attitude is determined it is the ball that encloses it in every a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from aerobat.so3 import UP
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle.ellipsoid import Revolved
+
+INSTANT = 1e-3  # [s] from one sample to the next, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,25 @@ class BodyPath:
         """Balls that hold the body all along each piece: their centres [m], (P, 3), and radii [m], (P,)."""
         moved = np.linalg.norm(self.series[:, 1:, :3], axis=-1).sum(axis=1)
         return self.series[:, 0, :3], moved + self.error[:, 0] + self.body.reach
+
+    def during(self, begin: float, end: float) -> BodyPath:
+        """Return the part of it between two times [s]."""
+        first, last = (self.pieces.times(self.trajectory, np.array(side)) for side in (-1.0, 1.0))
+        rows = np.flatnonzero((first < end) & (begin < last))
+        pieces, duration = self.pieces[rows], (last - first)[rows]
+        low, high = (np.clip((time - first[rows]) / duration, 0.0, 1.0) for time in (begin, end))
+        series = chebyshev.basis(self.series.shape[1] - 1).parts(low, high) @ self.series[rows]
+        cut = Subintervals(pieces.interval, pieces.start + low * pieces.length, (high - low) * pieces.length)
+        return replace(self, pieces=cut, series=series, error=self.error[rows])
+
+    @cached_property
+    def sampled(self) -> tuple[Array, Array, Array]:
+        """Instants [s], (n,), one each INSTANT or more, with centres [m] and thrust axes, (n, 3) each."""
+        count = np.ceil(self.pieces.seconds(self.trajectory) / INSTANT).astype(np.intp)
+        rows = np.repeat(np.arange(len(count)), count)
+        along = (2 * (np.arange(len(rows)) - (np.cumsum(count) - count)[rows]) + 1) / count[rows] - 1
+        values = [chebyshev.evaluate(series[rows], along) for series in np.moveaxis(self.series, -1, 0)]
+        return self.pieces[rows].times(self.trajectory, along), np.array(values[:3]).T, np.array(values[3:]).T
 
     @classmethod
     def in_attitude(cls, found: ChebyshevSeries, body: Revolved) -> BodyPath:

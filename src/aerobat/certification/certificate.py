@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from math import degrees, inf
 from typing import Literal
@@ -158,6 +157,11 @@ class Certificate:
         return holds and not self.undetermined and not self.discontinuities
 
     @property
+    def frames(self) -> tuple[Finding, ...]:
+        """The findings about the body's clearance from the frame of each gate, in the order of passages."""
+        return tuple(f for f in self.findings if f.gate is not None and f.quantity == "clearance")
+
+    @property
     def worst(self) -> Finding | None:
         """The rotor's thrust or command with the smallest margin; None if no attitude is ever determined.
 
@@ -196,11 +200,6 @@ class Certificate:
             if finding.verdict is Verdict.UNDECIDED:
                 return Reason(f"cannot decide: {finding}", finding.reason.limits)
         return f"certified: {self.worst}"
-
-    def with_passages(self, passages: Sequence[Finding]) -> Certificate:
-        """The same with the findings about passages through gates and about waypoints."""
-        others = tuple(f for f in self.findings if f.gate is None and f.waypoint is None)
-        return replace(self, findings=(*others, *passages))
 
     def __str__(self) -> str:
         """The outcome in one sentence."""

@@ -33,6 +33,7 @@ from aerobat.certification.enclosure.queries import (
 )
 from aerobat.certification.envelope import Envelope
 from aerobat.certification.path.ends import end_findings
+from aerobat.certification.path.frames import frame_findings
 from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
 from aerobat.certification.subdivision import Subdivision, subdivide
@@ -101,17 +102,20 @@ def certify(
     on_thrust = [limit for limit in on_path if unequal and _is_of_thrust(limit, envelope.conditions)]
     derived = [limit for limit in on_measures if not _is_stated(limit)]
     has_obstacles = len(environment.pieces) > 0
-    series, lost = _series(curve, found, derived, on_thrust, has_obstacles)
+    is_near = has_obstacles or len(envelope.passages) > 0
+    series, lost = _series(curve, found, derived, on_thrust, is_near)
     if series is not None:
         queries = _queries(vehicle, envelope, on_measures)
         first = len(quantities.scales(vehicle)) + len(derived)
         queries += [query for i, limit in enumerate(on_thrust, first) for query in within(limit, i)]
         findings += series.answers(queries)
     findings += kinematic_findings(trajectory, envelope.speed, [x for x in on_path if x not in on_thrust])
-    if has_obstacles:
-        findings += [_clearance(curve, series, whole.bounding_ellipsoid.revolved)]
+    bodies = _bodies(curve, series, whole.bounding_ellipsoid.revolved) if is_near else None
+    if bodies and has_obstacles:
+        findings += [clearance_finding(*bodies, environment.pieces)]
     findings += end_findings(trajectory, envelope.start, envelope.goal)
     findings += passage_findings(trajectory, envelope.passages, vehicle, environment)
+    findings += frame_findings(*bodies, envelope.passages) if bodies else []
     findings += waypoint_findings(trajectory, envelope.waypoints)
     jumps = discontinuities(curve, floor, series)
     if envelope.closed:
@@ -142,19 +146,20 @@ def _series(
     return (_with_axis(curve, series) if with_axis else series), ()
 
 
-def _clearance(curve: ThrustCurve, series: ChebyshevSeries | None, body: Revolved) -> Finding:
-    """The finding about the body's least gap from obstacles: as a ball, where no attitude is known.
+def _bodies(
+    curve: ThrustCurve, series: ChebyshevSeries | None, body: Revolved
+) -> tuple[BodyPath | None, BodyPath]:
+    """The body in its attitude, where one is ever known, and as a ball on the rest of the path.
 
     Args:
-        curve: What is flown, among obstacles.
+        curve: What is flown.
         series: With the components of the thrust axis as its last columns, if an attitude is ever known.
         body: The vehicle's.
     """
-    trajectory = curve.trajectory
     known = Subintervals.whole(0) if series is None else series.pieces
     attitude = None if series is None else BodyPath.in_attitude(series, body)
-    ball = BodyPath.in_every_attitude(trajectory, known.rest(trajectory.segments), body)
-    return clearance_finding(attitude, ball, curve.environment.pieces)
+    rest = known.rest(curve.trajectory.segments)
+    return attitude, BodyPath.in_every_attitude(curve.trajectory, rest, body)
 
 
 def _is_of_thrust(limit: Limit, conditions: Sequence[Condition]) -> bool:

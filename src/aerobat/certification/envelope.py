@@ -9,6 +9,7 @@ from aerobat.problem import Ball, Condition, EndState, Gate, Limits, Quantity, S
 from aerobat.problem.stage import PARALLEL
 
 CROSSING_SPEED = 1e-3  # [m/s] a path that is slower in the gate's plane does not cross it
+PASSAGE_DEPTH = 0.05  # [m] beyond the plane, where who crosses it has not merely stopped in it
 NO_LIMITS = Limits()
 
 

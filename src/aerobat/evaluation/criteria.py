@@ -126,16 +126,24 @@ def _nearest_stages(problem: Problem, path: SampledPath) -> list[tuple[Stage, fl
     sequence = problem.stages(1.0)
     stages = [stage for stage in sequence.stages if stage.gate is not None or stage.ball is not None]
     stages = stages or [Stage(gate.name, gate=gate.name) for gate in problem.gates]
-    centres = np.reshape([stage.centre(problem.gates) for stage in stages], (-1, 3))
+    centres = [_centre(stage, problem, path.times) for stage in stages]
     in_order = sequence.ordered and bool(sequence.stages)
     return list(zip(stages, _nearest_instants(centres, path.times, path.position, in_order), strict=True))
 
 
-def _nearest_instants(centres: Array, times: Array, position: Array, in_order: bool) -> list[float]:
+def _centre(stage: Stage, problem: Problem, times: Array) -> Array:
+    """Where a gate or a ball is [m], (3,), or at times (T,), (T, 3)."""
+    if stage.gate is not None:
+        return problem.gate(stage.gate).places(times)
+    assert stage.ball is not None, "what is passed is a gate or a ball"
+    return stage.ball.centre
+
+
+def _nearest_instants(centres: Sequence[Array], times: Array, position: Array, in_order: bool) -> list[float]:
     """The instants of the nearest approaches; in order those of the least sum of squared distances.
 
     Args:
-        centres: of what is passed [m], (n, 3).
+        centres: of what is passed [m], (3,), or at the times, (T, 3).
         times: of the set-points [s], (T,).
         position: of the set-points [m], (T, 3).
         in_order: true where one follows the other, and what is passed again is later by PASSAGE_WINDOW.

@@ -6,11 +6,13 @@ its certificate over continuous time, which therefore is always that of the traj
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
-from aerobat.certification import Certificate
+from aerobat.certification import Certificate, Finding
 from aerobat.planning.evidence import Evidence
+from aerobat.planning.passages import PlacedStage
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import Plan
 from aerobat.planning.rotor_margin import reserve_shortfalls, sampled_margin
@@ -34,6 +36,7 @@ class Solution(Generic[Detail]):
     dt: float | None = None  # [s]
     failure: str | None = None  # why it cannot be a plan, found without a certificate
     margin: float | None = None  # [N] of the rotors, where samples have shown it to be negative
+    placed: tuple[PlacedStage, ...] = ()  # those that are proven at once
 
 
 class Program(Protocol[Detail]):
@@ -64,6 +67,15 @@ class Judged(Generic[Detail]):
     def certificate(self) -> Certificate | None:
         """The certificate of the solution's path; None without a vehicle."""
         return None if self.evidence is None else self.evidence.certificate
+
+    @property
+    def frames(self) -> tuple[Finding, ...]:
+        """The findings about the body and the frames of gates that are passed at placed stages."""
+        return () if self.certificate is None else self.certificate.frames
+
+    def at(self, stages: Sequence[PlacedStage]) -> Judged[Detail]:
+        """Return the same with its stages placed."""
+        return replace(self, evidence=None if self.evidence is None else self.evidence.at(stages))
 
     def plan(self, recorder: Recorder, **facts: Any) -> Plan:
         """The plan of it; `facts` are the fields of Plan that the planner alone knows."""
@@ -121,7 +133,7 @@ def judge(solution: Solution[Detail], task: Task, recorder: Recorder, jumps: boo
     """
     evidence = certificate = None
     if solution.trajectory is not None and solution.failure is None and task.vehicle_if_any is not None:
-        evidence = Evidence(task.without_reserve, solution.trajectory)
+        evidence = Evidence(task.without_reserve, solution.trajectory, solution.placed)
         certificate = evidence.certificate
     outcome = solution.failure
     if certificate is not None:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from aerobat.certification import Certificate, certify
-from aerobat.certification.path.passages import passage_findings, waypoint_findings
 from aerobat.planning.assessment.assess import assessment
 from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.flyability import Flyability, own_flights
@@ -46,10 +45,10 @@ class Evidence:
         return assessment(self.task, self.trajectory, self.certificate)
 
     def at(self, stages: Sequence[PlacedStage]) -> Evidence:
-        """Return the evidence for the same path with its stages placed; what is proven along it is kept."""
-        placed = replace(self, stages=tuple(stages))
-        envelope, task = self.task.envelope(stages), self.task
-        findings = passage_findings(self.trajectory, envelope.passages, task.vehicle, task.environment)
-        findings += waypoint_findings(self.trajectory, envelope.waypoints)
-        vars(placed)["certificate"] = self.certificate.with_passages(findings)
+        """Return the evidence for the same path with its stages placed; what is proven of them is kept."""
+        if tuple(stages) == self.stages:
+            return self
+        placed, envelope = replace(self, stages=tuple(stages)), self.task.envelope(stages)
+        if not (envelope.passages or envelope.waypoints):
+            vars(placed)["certificate"] = self.certificate
         return placed

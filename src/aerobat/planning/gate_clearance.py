@@ -1,4 +1,4 @@
-"""The room that a path leaves its body in gates: from the start, and more once a flight hits them.
+"""The room that a path leaves its body in gates: from the start, and more where its frames are not clear.
 
 What room in a gate is, `limits.body_in_gate` says.
 """
@@ -7,22 +7,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
-from aerobat.certification import PlannedPassage
+from aerobat.certification import Finding, PlannedPassage, Verdict
+from aerobat.certification.envelope import PASSAGE_DEPTH
 from aerobat.limits.body_in_gate import FRAME_CLEARANCE, BodyInGate
 from aerobat.optimization.deadline import out_of_time
-from aerobat.planning.flyability import FLYABLE_ERROR, OwnFlight
 from aerobat.planning.task import Task
 from aerobat.problem.stage import Stage
-from aerobat.simulation.passages import PASSAGE_DEPTH
 
-Found = TypeVar("Found")
+
+class Framed(Protocol):
+    """A path through gates."""
+
+    @property
+    def frames(self) -> tuple[Finding, ...]:
+        """The findings about its body and each gate's frame."""
+
+
+Found = TypeVar("Found", bound=Framed)
 
 MAX_ATTEMPTS = 4  # at a more direct path, of one plan
 BENDING = 0.4  # of the largest specific thrust: the acceleration by which a path may bend there, at first
 BENDING_IN_MANEUVER = 0.25  # likewise beside a stage that does not say where it is, as a flip's
-MORE_BENDING = 1.6  # times that, where the plan's own flight does not pass
+MORE_BENDING = 1.6  # times that, where the body is not clear of the frame
 A_LITTLE_MORE = 1.2  # the same, where it touches the frame by no more than FRAME_CLEARANCE
 
 
@@ -37,53 +45,49 @@ def bodies_in_gates(task: Task) -> tuple[BodyInGate, ...]:
 
 
 def more_direct(
-    in_gates: Sequence[BodyInGate], stages: Sequence[Stage], task: Task, flight: OwnFlight
+    in_gates: Sequence[BodyInGate], stages: Sequence[Stage], task: Task, frames: Sequence[Finding]
 ) -> tuple[BodyInGate, ...]:
-    """Return more room in the gates that a flight did not pass, and room in those that had none.
+    """Return more room in the gates whose frames are not clear, and room in those that had none.
 
     Args:
-        in_gates: The room that the flown path has in gates that the stages cross.
+        in_gates: The room that the path has in gates that the stages cross.
         stages: In the order of the path.
         task: Its gates are crossed.
-        flight: With a passage for each stage that names a gate.
+        frames: A finding for each stage that names a gate.
     """
     crossing = [k for k, stage in enumerate(stages) if stage.gate is not None]
-    missed = {k: flown for k, flown in zip(crossing, flight.passages, strict=True) if flown.is_missed}
     found: dict[int, BodyInGate | None] = {body.stage: body for body in in_gates}
-    for k, flown in missed.items():
+    for k, frame in zip(crossing, frames, strict=True):
         last = found.get(k)
+        if frame.verdict is Verdict.HOLDS:
+            continue
         if last is None:
             found[k] = _body_in_gate(k, stages, task, BENDING_IN_MANEUVER)
         else:
-            touches = flown.clearance is not None and flown.clearance >= -FRAME_CLEARANCE
+            touches = frame.value >= -FRAME_CLEARANCE
             found[k] = replace(last, bending=(A_LITTLE_MORE if touches else MORE_BENDING) * last.bending)
     return tuple(body for body in found.values() if body is not None)
 
 
-def cleared(
-    found: Found,
-    flown: Callable[[Found], OwnFlight],
-    again: Callable[[Found, OwnFlight], Found | None],
-) -> tuple[OwnFlight, Found]:
-    """Return the best of what was found and of more direct paths through gates that its flight does not pass.
-
-    With its flight. Only where that keeps to its path: else it is not the path that misses them.
+def cleared(found: Found, again: Callable[[Found], Found | None]) -> Found:
+    """Return what was found, or the best of more direct paths where its body is not clear of gates' frames.
 
     Args:
-        found: What flies.
-        flown: Its own flight.
-        again: What is found with more room in gates than in a flight; None where there is nothing.
+        found: A certified path, its stages placed.
+        again: What is found with more room in gates; None where there is nothing.
     """
-    best = flight, _ = flown(found), found
-    for _ in range(MAX_ATTEMPTS):
-        if not (flight.lingers and flight.error <= FLYABLE_ERROR) or out_of_time():
-            break
-        following = again(found, flight)
+    best, following = found, None if is_clear(found.frames) else again(found)
+    for _ in range(MAX_ATTEMPTS - 1):
         if following is None:
             break
-        flight, found = flown(following), following
-        best = min(best, (flight, found), key=lambda pair: pair[0].rank)
+        best = max(best, following, key=lambda each: min(frame.bound for frame in each.frames))
+        following = None if is_clear(following.frames) or out_of_time() else again(following)
     return best
+
+
+def is_clear(frames: Sequence[Finding]) -> bool:
+    """True where a body is proven clear of frames."""
+    return all(frame.verdict is Verdict.HOLDS for frame in frames)
 
 
 def _body_in_gate(k: int, stages: Sequence[Stage], task: Task, bending: float) -> BodyInGate | None:

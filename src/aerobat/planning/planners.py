@@ -22,6 +22,7 @@ from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.courses import is_course, on_open_courses
 from aerobat.planning.heading.follow import with_heading
 from aerobat.planning.holds import between_holds
+from aerobat.planning.moving_gates import through_moving_gates
 from aerobat.planning.passages import require_clear_ends, require_openings
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import FLYING_RESERVE, Plan
@@ -199,7 +200,7 @@ def planner(name: Label) -> Callable[[type[P]], type[P]]:
     def register(cls: type[P]) -> type[P]:
         if "plan" in vars(cls):
             planning: Any = cls
-            method = _on_one_thread(between_holds(cls.plan))
+            method = _on_one_thread(through_moving_gates(between_holds(cls.plan)))
             closes = getattr(cls, "PLANS_CLOSED_COURSES", False)
             planning.plan = validated(method if closes else on_open_courses(name, method))
         return cast(type[P], PLANNERS.add(name, cls))

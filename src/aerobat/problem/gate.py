@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import degrees, radians
 from typing import Any, ClassVar, cast
@@ -30,14 +30,16 @@ from aerobat.declaration import (
     validated,
 )
 from aerobat.environment.obstacles.attitude import axes_of
-from aerobat.environment.obstacles.convex_piece import ConvexPiece
+from aerobat.environment.obstacles.convex_piece import ConvexPiece, ObstacleMotion
 from aerobat.environment.obstacles.obstacle import Obstacle
+from aerobat.environment.obstacles.path_rows import PathRows
 from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, ConeAngle, Quantity, fixed
 from aerobat.problem.opening import Circle, Corners, OpeningShape, Polygon, Rectangle
 from aerobat.problem.wall import Wall
 
 DEFAULT_SIZE = (1.0, 0.6)  # [m] width and height of a rectangular opening
+MAX_ROWS = 64  # of a path: each is looked at in every tick of a flight
 TOUCHING = 1e-6  # [m] within which frames touch, and neither stands in the other's opening
 
 
@@ -64,6 +66,9 @@ class Gate:
     radius: Positive | None = None  # [m] of a round opening, instead of width and height
     polygon: Corners | None = None  # [m] of any other convex opening, from `position`, instead of those
     wall: Wall | None = None  # around the opening, an obstacle; `true` in a file for one of the usual size
+    velocity: Vector3 = field(default_factory=lambda: np.zeros(3))  # [m/s] with which it moves
+    # t [s], x, y, z [m] of a point of it: straight from row to row, in its place at the first
+    path: PathRows = field(default_factory=lambda: np.zeros((0, 4)))
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {
         "heading_deg": "[deg] direction of passage, from x toward y (0)",
@@ -78,6 +83,8 @@ class Gate:
         """Check."""
         if abs(self.normal @ self.up) > 1e-6:
             raise FieldError("up", "must be normal to normal, the direction of passage")
+        if len(self.path) > MAX_ROWS:
+            raise FieldError("path", f"of a gate must have {MAX_ROWS} rows at most, got {len(self.path)}")
         kinds = (
             ("polygon", self.polygon),
             ("radius", self.radius),
@@ -131,6 +138,23 @@ class Gate:
         return table
 
     @cached_property
+    def motion(self) -> ObstacleMotion | None:
+        """The motion from where it is at first; None for what stands still."""
+        return ObstacleMotion.of(self.velocity, self.path)
+
+    def places(self, times: Array) -> Array:
+        """Return where the opening's centre is [m] at times (...), (..., 3)."""
+        moved = 0.0 if self.motion is None else self.motion.moved(times)
+        return np.asarray(np.broadcast_to(self.position + moved, (*times.shape, 3)))
+
+    def at(self, time: float) -> Gate:
+        """Return it where it is at a time [s], standing still."""
+        if self.motion is None:
+            return self
+        place = self.places(np.array(time))
+        return replace(self, position=place, velocity=np.zeros(3), path=np.zeros((0, 4)))
+
+    @cached_property
     def lateral(self) -> Array:
         """The unit vector across the opening, to the left of who passes upright, (3,)."""
         return unit(np.cross(self.up, self.normal))
@@ -158,10 +182,14 @@ class Gate:
         """The outer corners in the world [m] of a frame so thick, one beside each of `outline`, (K, 3)."""
         return self.position + self.opening.frame(thickness) @ self.plane_axes
 
+    def plane_around(self, border: float) -> tuple[ConvexPiece, ...]:
+        """The gate's plane around the opening as far as a border [m], where a body touches the frame."""
+        return _around(self, Wall(border), f"the frame of {self.name}", np.zeros(1))
+
     @cached_property
     def solid(self) -> Obstacle | None:
         """The wall around the opening, as an obstacle; None where there is none."""
-        return None if self.wall is None else GateWall(self)
+        return None if self.wall is None else GateWall(self, velocity=self.velocity, path=self.path)
 
     def resized(self, across: float, up: float) -> Gate:
         """The same gate with another size, by parts of what it is, by the lesser where it has but one."""
@@ -207,15 +235,9 @@ class GateWall(Obstacle):
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
         """The parts of the wall that lie beyond each side."""
-        gate, wall = self.gate, self.gate.wall or Wall()
-        thick = wall.thickness / 2.0 * np.outer([-1.0, 1.0], gate.normal)
-        return tuple(
-            ConvexPiece(
-                (gate.position + part @ gate.plane_axes + thick[:, None]).reshape(-1, 3),
-                name=f"the wall of {gate.name}",
-            )
-            for part in wall.parts(gate.opening)
-        )
+        wall = self.gate.wall or Wall()
+        sides = wall.thickness / 2.0 * np.array([-1.0, 1.0])
+        return _around(self.gate, wall, f"the wall of {self.gate.name}", sides)
 
 
 @validated
@@ -300,6 +322,16 @@ def named_gate(gates: Sequence[Gate], name: str) -> Gate:
         if gate.name == name:
             return gate
     raise unknown_name("gate", name, [gate.name for gate in gates])
+
+
+def _around(gate: Gate, wall: Wall, name: str, heights: Array) -> tuple[ConvexPiece, ...]:
+    """The parts of a wall that lie beyond each side of a gate's opening, at heights [m] above its plane."""
+    levels = gate.position + np.multiply.outer(heights, gate.normal)[:, None]
+    parts = wall.parts(gate.opening)
+    return tuple(
+        ConvexPiece((levels + part @ gate.plane_axes).reshape(-1, 3), name=name, motion=gate.motion)
+        for part in parts
+    )
 
 
 def _half(diameter: Any) -> float:

@@ -112,7 +112,7 @@ def _header(scene: Scene, blob: Blob) -> dict[str, Any]:
             }
             for rotor in vehicle.rotors
         ],
-        "gates": [_gate(gate) for gate in scene.gates],
+        "gates": [_gate(gate, blob, scene.times) for gate in scene.gates],
         "obstacles": _obstacles([each for each in scene.surfaces if each.motion is None], blob),
         "moving": [
             _obstacles([each], blob) | {"places": blob.add(each.motion.moved(scene.times), "f4")}
@@ -134,9 +134,10 @@ def _header(scene: Scene, blob: Blob) -> dict[str, Any]:
     }
 
 
-def _gate(gate: Gate) -> dict[str, Any]:
+def _gate(gate: Gate, blob: Blob, times: Array) -> dict[str, Any]:
     width, height = gate.opening.size.tolist()
-    return {
+    moved = {} if gate.motion is None else {"places": blob.add(gate.motion.moved(times), "f4")}
+    return moved | {
         "name": gate.name,
         "position": gate.position.tolist(),
         "normal": gate.normal.tolist(),

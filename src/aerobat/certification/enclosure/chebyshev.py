@@ -38,17 +38,27 @@ class Basis:
         """By how much its derivative magnifies errors of values, at most (Duffin and Schaeffer, 1941)."""
         return float(self.degree**2)
 
+    def parts(self, low: Array, high: Array) -> Array:
+        """Return the matrices as `halves`, of parts from low to high in [0, 1] (n,), (n, K + 1, K + 1)."""
+        at = 2 * low[:, None] - 1 + (high - low)[:, None] * (1 + self.nodes)
+        return _parts(self.analysis, at)
+
 
 @lru_cache(maxsize=16)
 def basis(degree: int) -> Basis:
     """The basis of a degree >= 1."""
     nodes = np.asarray(-np.cos(np.pi * np.arange(degree + 1) / degree))
     analysis = np.linalg.inv(chebyshev.chebvander(nodes, degree))
-    # a half's term is made of terms of no lower degree: rounding of large ones would be left in all others
-    halves = [np.triu(analysis @ chebyshev.chebvander((nodes + side) / 2, degree)) for side in (-1, 1)]
+    halves = _parts(analysis, np.array([(nodes + side) / 2 for side in (-1, 1)]))
     derivative = np.zeros((degree + 1, degree + 1))
     derivative[:-1] = chebyshev.chebder(np.eye(degree + 1))
-    return Basis(nodes, np.asarray(analysis), np.array(halves), derivative)
+    return Basis(nodes, np.asarray(analysis), halves, derivative)
+
+
+def _parts(analysis: Array, at: Array) -> Array:
+    """The matrices of coefficients -> those of parts whose nodes are at such points (n, K + 1)."""
+    # a part's term is made of terms of no lower degree: rounding of large ones would be left in all others
+    return np.triu(analysis @ chebyshev.chebvander(at, at.shape[1] - 1))
 
 
 def growth(degree: int, rho: Array) -> Array:

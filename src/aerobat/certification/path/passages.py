@@ -68,7 +68,7 @@ class _Instant:
 
     passage: PlannedPassage
     offset: Array  # [m], (3,)
-    velocity: Array  # [m/s], (3,)
+    velocity: Array  # relative to the gate's [m/s], (3,)
     thrust: Array  # specific, drag counted [m/s²], (3,)
     floor: float  # [m/s²] of |thrust|, below which no attitude is determined
 
@@ -85,7 +85,10 @@ class _Instant:
             axis = so3.thrust_axis(found.setpoint.q_world_body[0])
             thrust = (axis @ thrust) * axis
         floor = UNDETERMINED * environment.gravity
-        return cls(passage, position - passage.gate.position, velocity, thrust, floor)
+        gate = passage.gate
+        if gate.motion is not None:
+            velocity = velocity - gate.motion.velocity_at(float(time[0]))
+        return cls(passage, position - gate.places(time)[0], velocity, thrust, floor)
 
     def findings(self) -> list[Finding]:
         """Return the findings on the passage: what it does, against what is asked of it."""

@@ -29,6 +29,11 @@ class ObstacleMotion:
     velocity: Array  # [m/s] (3,)
     rows: Array  # time [s] and place [m], (k, 4); it rests before the first and after the last
 
+    @classmethod
+    def of(cls, velocity: Array, rows: Array) -> ObstacleMotion | None:
+        """Return the motion; None of what stands still."""
+        return cls(velocity, rows) if velocity.any() or len(rows) else None
+
     @property
     def times(self) -> Array:
         """The instants [s] at which its velocity may jump, (k,)."""
@@ -50,9 +55,8 @@ class ObstacleMotion:
         count = np.searchsorted(self.times, end, side="right") - first
         passed = count > 0
         if passed.any():
-            level = (
-                np.frexp(count[passed])[1] - 1
-            )  # of the longest stretch of 2^level rows among those passed
+            # of the longest stretch of 2^level rows among those passed
+            level = np.frexp(count[passed])[1] - 1
             last = first[passed] + count[passed] - (1 << level)
             for low, high in (self._extremes[:, level, first[passed]], self._extremes[:, level, last]):
                 lower[passed] = np.minimum(lower[passed], low)
@@ -69,6 +73,16 @@ class ObstacleMotion:
             lower, upper = np.minimum(lower, lower[ahead]), np.maximum(upper, upper[ahead])
             levels.append((lower, upper))
         return np.stack(levels, axis=1)
+
+    @property
+    def turns(self) -> Array:
+        """By how much the velocity jumps at each of `times` [m/s], (k, 3)."""
+        slopes = np.diff(self.rows[:, 1:], axis=0) / np.diff(self.times)[:, None]
+        return np.diff(slopes, axis=0, prepend=0.0, append=0.0) if len(self.rows) else self.rows[:, 1:]
+
+    def velocity_at(self, time: float) -> Array:
+        """Return its velocity [m/s] at a time [s], (3,)."""
+        return np.asarray(self.velocity + self.turns[self.times <= time].sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False)

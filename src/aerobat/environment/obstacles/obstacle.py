@@ -37,8 +37,7 @@ class Obstacle(ABC):
     @property
     def motion(self) -> ObstacleMotion | None:
         """The motion; None for what stands still."""
-        moves = self.velocity.any() or len(self.path)
-        return ObstacleMotion(self.velocity, self.path) if moves else None
+        return ObstacleMotion.of(self.velocity, self.path)
 
 
 O = TypeVar("O", bound=Obstacle)  # noqa: E741 - an obstacle

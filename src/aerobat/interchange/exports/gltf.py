@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.environment.obstacles.convex_piece import ObstacleMotion
 from aerobat.flatness import reference
 from aerobat.interchange.exports.loss import Content, ExportRows
 from aerobat.interchange.solids import flattened, solid_surfaces
@@ -53,17 +54,21 @@ def blender_scene(plan: Plan, rate: float) -> Content:
     scene = _Scene()
     vehicle = scene.node(plan.vehicle.name, scene.mesh("vehicle", _vehicle(scene, plan.vehicle)))
     scene.node("path", scene.mesh("path", [scene.primitive(position, LINE_STRIP, "path")]))
+
+    def moved(node: int, motion: ObstacleMotion | None) -> None:
+        if motion is not None:
+            away = motion.moved(found.times).astype(np.float32)
+            scene.animate(node, times, {"translation": _y_up(away)})
+
     for gate in plan.problem.gates:
-        scene.node(gate.name, scene.mesh(gate.name, [scene.primitive(_frame(gate), TRIANGLES, "gate")]))
+        frame = scene.primitive(_frame(gate), TRIANGLES, "gate")
+        moved(scene.node(gate.name, scene.mesh(gate.name, [frame])), gate.motion)
     for solid in solid_surfaces(plan):
         corners = solid.triangles.reshape(-1, 3)
         node = scene.node(
             solid.name, scene.mesh(solid.name, [scene.primitive(corners, TRIANGLES, "obstacle")])
         )
-        if solid.motion is not None:
-            scene.animate(
-                node, times, {"translation": _y_up(solid.motion.moved(found.times).astype(np.float32))}
-            )
+        moved(node, solid.motion)
     rotation = np.concatenate([_y_up(q[:, 1:]), q[:, :1]], axis=1)
     scene.animate(vehicle, times, {"translation": _y_up(position), "rotation": rotation})
     rows = ExportRows(found.times, position.astype(float), None, so3.normalize(q))

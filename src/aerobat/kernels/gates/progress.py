@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from aerobat.kernels.gates import swath
 from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
-from aerobat.kernels.gates.snapshot import Snapshot, between, relative
+from aerobat.kernels.gates.snapshot import PlaceMotion, Snapshot, beside, between
 from aerobat.kernels.gates.swath import SwathProgress
 from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
 from aerobat.kernels.vectors import ZERO, dot
@@ -23,6 +23,7 @@ class GatePlane(NamedTuple):
     planned: Scalar  # [s] when it is to be crossed
     window: Scalar  # [s] by which the crossing may be earlier or later
     depth: Scalar  # [m] beyond the plane that makes a crossing a passage
+    motion: PlaceMotion | tuple[()] = ()  # of one that moves
 
 
 class GateProgress(NamedTuple):
@@ -59,7 +60,7 @@ def step(
         counted: true where there was a last tick, and where this one counts.
     """
     plane, ellipsoid = gate
-    last, now = (relative(each, plane.centre) for each in snapshots)
+    last, now = (beside(ops, each, plane.centre, plane.motion) for each in snapshots)
     before, behind = dot(last.position, plane.normal), dot(now.position, plane.normal)
     both = counted[0] & counted[1]
     forward = both & (before <= 0.0) & (behind > 0.0)

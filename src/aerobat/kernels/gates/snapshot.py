@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from aerobat.kernels.ops import Quaternion, Scalar, Vector
+from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector
 from aerobat.kernels.vectors import add_scaled, subtract
 
 
@@ -15,6 +15,34 @@ class Snapshot(NamedTuple):
     position: Vector  # [m]
     velocity: Vector  # [m/s]
     q_world_body: Quaternion  # between two ticks not quite of unit length
+
+
+class Bend(NamedTuple):
+    """An instant at which the velocity of something jumps."""
+
+    time: Scalar  # [s]
+    change: Vector  # [m/s]
+
+
+class PlaceMotion(NamedTuple):
+    """The motion of a place from where it is at first."""
+
+    velocity: Vector  # [m/s] before all bends
+    bends: tuple[Bend, ...]
+
+
+def beside(ops: Ops, snapshot: Snapshot, centre: Vector, motion: PlaceMotion | tuple[()]) -> Snapshot:
+    """The snapshot as it is seen from a centre that may move; () for one that does not."""
+    seen = relative(snapshot, centre)
+    if not motion:
+        return seen
+    position = add_scaled(seen.position, -snapshot.time, motion.velocity)
+    velocity = subtract(seen.velocity, motion.velocity)
+    for bend in motion.bends:
+        since = ops.maximum(snapshot.time - bend.time, 0.0)
+        position = add_scaled(position, -since, bend.change)
+        velocity = add_scaled(velocity, ops.select(since > 0.0, -1.0, 0.0), bend.change)
+    return seen._replace(position=position, velocity=velocity)
 
 
 def relative(snapshot: Snapshot, centre: Vector) -> Snapshot:

@@ -146,8 +146,7 @@ class Miqp(Planner):
         if isinstance(found.solution.source, Placement):
             return plan_of(attempts, found, self.backend)
         if self.flies:
-            flight, flown = FlownPath(refinement, found).through_gates()
-            found = flown.with_reserves(flight).judged
+            found = FlownPath.of(refinement, found).through_gates().with_reserves().judged
         return found.plan(
             recorder,
             planner="miqp",

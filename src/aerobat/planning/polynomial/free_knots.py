@@ -21,6 +21,7 @@ from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.courses import is_course
+from aerobat.planning.gate_clearance import is_clear
 from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.flying_lap import flying_lap
@@ -101,7 +102,7 @@ class FreeKnots(Planner):
     def _fastest(self, refinement: Refinement) -> Plan | None:
         """The fastest plan from the first start that leads to one; from further ones if it is poor.
 
-        A plan is poor whose own flight does not pass a gate, or that is slow beside what is possible.
+        A plan is poor whose body touches a gate's frame, or that is slow beside what is possible.
         """
         slow = SUSPICIOUS * least_duration(refinement.task.problem, refinement.task.vehicle)
         best: _Found | None = self._around(refinement)
@@ -113,7 +114,7 @@ class FreeKnots(Planner):
             best = min(filter(None, (best, own, refined)), key=lambda found: found[:2], default=None)
             if out_of_time() or (refined is not None and plan is not None and plan is self.start):
                 break
-            if best is not None and not best.lingers and best.duration <= slow:
+            if best is not None and not best.touches and best.duration <= slow:
                 break
         return None if best is None else best.plan
 
@@ -133,8 +134,7 @@ class FreeKnots(Planner):
             return None
         said = f"free-knots found none faster than the path that it began from, {plan.planner}'s"
         kept = replace(plan, planner="free-knots", attempts=tuple(refinement.recorder.attempts), rescue=said)
-        assert plan.flyability is not None
-        return _Found(plan.flyability.lingers, plan.duration, kept)
+        return _Found(not plan.certified, plan.duration, kept)
 
     def _refined(self, refinement: Refinement, start: WarmStart) -> _Found | None:
         """The certified plan near a start; None where there is none."""
@@ -169,16 +169,16 @@ class FreeKnots(Planner):
 class _Found(NamedTuple):
     """A plan, and what it is worth: the least is the best."""
 
-    lingers: bool  # whether its own flight does not pass a gate
+    touches: bool  # whether its body is not clear of a gate's frame
     duration: float  # [s]
     plan: Plan
 
 
 def _found(refinement: Refinement, judged: Judged[RefinedPath]) -> _Found:
-    """What is certified, with more room in gates where its own flight wants it."""
-    flight, flown = FlownPath(refinement, judged).through_gates()
-    plan = _plan(flown.judged, refinement.recorder)
-    return _Found(flight.lingers, plan.duration, plan)
+    """What is certified, with more room in gates where its body wants it."""
+    cleared = FlownPath.of(refinement, judged).through_gates().judged
+    plan = _plan(cleared, refinement.recorder)
+    return _Found(not is_clear(cleared.frames), plan.duration, plan)
 
 
 def _plan(judged: Judged[RefinedPath], recorder: Recorder) -> Plan:

@@ -15,7 +15,7 @@ from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, Reason, SpecError, limits_of
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.certified_solve import Judged, Solution, judge, refuted_by_samples
-from aerobat.planning.passages import place_stages
+from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, unhurried, violated_stage
 from aerobat.planning.recorder import Progress, Recorder
@@ -153,14 +153,13 @@ class _Planning:
 
     def result(self, found: Judged[None]) -> Plan:
         """The plan of what the search settled on."""
-        times = np.cumsum(self.scaled(found.solution.duration))[:-1].tolist()
         return found.plan(
             self.recorder,
             planner="min-snap",
             order=self.config.order,
             status="feasible" if found.feasible else "stopped",
             backend="closed form",
-            stages=place_stages(self.task.stages.stages, range(len(times)), times),
+            stages=found.solution.placed,
         )
 
 
@@ -192,8 +191,15 @@ class _ClosedForm:
             solve_time=perf_counter() - started,
             cost=trajectory.effort(order),
             failure=failure,
+            placed=self.placed,
         )
         return refuted_by_samples(solution, task)
+
+    @property
+    def placed(self) -> tuple[PlacedStage, ...]:
+        """The stages, each at the end of its segment."""
+        times = np.cumsum(self.planning.scaled(self.duration))[:-1].tolist()
+        return place_stages(self.planning.task.stages.stages, range(len(times)), times)
 
     def _trajectory(self, task: Task) -> Trajectory:
         """The closed form through stages whose drag at the stages is that of its own velocities there.

@@ -1,10 +1,11 @@
-"""A refined path whose own flight has a defect, refined again: more room in gates, or a reserve."""
+"""A refined path with a defect, refined again: more room in gates, or a reserve that its flight lacks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from aerobat.certification import Finding
 from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged
@@ -23,22 +24,30 @@ class FlownPath:
     refinement: Refinement
     judged: Judged[RefinedPath]
 
+    @classmethod
+    def of(cls, refinement: Refinement, judged: Judged[RefinedPath]) -> FlownPath:
+        """The path, its stages placed."""
+        return cls(refinement, judged.at(judged.solution.source.placed))
+
+    @property
+    def frames(self) -> tuple[Finding, ...]:
+        """The findings about its body and each gate's frame."""
+        return self.judged.frames
+
     @property
     def flight(self) -> OwnFlight:
         """The findings about the path's own flight, the nominal one."""
         source = self.judged.solution.source
         return own_flight(self.refinement.task, source.path.trajectory, source.placed)
 
-    def through_gates(self) -> tuple[OwnFlight, FlownPath]:
-        """Return the flight and the path, or those of a path with more room in gates.
+    def through_gates(self) -> FlownPath:
+        """Return the path, or one with more room in the gates whose frames its body does not clear."""
+        return cleared(self, FlownPath._more_direct)
 
-        More room is given in the gates whose frames the flight does not clear.
-        """
-        return cleared(self, lambda found: found.flight, FlownPath._more_direct)
-
-    def with_reserves(self, flight: OwnFlight) -> FlownPath:
+    def with_reserves(self) -> FlownPath:
         """Return the path itself, or one with a reserve that leaves the controller what its flight lacked."""
-        best, found = (flight, self), self
+        flight, found = self.flight, self
+        best = flight, found
         for reserve in RESERVES:
             if not flight.wants_reserve or out_of_time():
                 break
@@ -49,11 +58,11 @@ class FlownPath:
                 best = min(best, (flight, found), key=lambda pair: pair[0].rank)
         return best[1]
 
-    def _more_direct(self, flight: OwnFlight) -> FlownPath | None:
-        """The path with more room in the gates that a flight did not pass; None where none is found."""
+    def _more_direct(self) -> FlownPath | None:
+        """The path with more room in the gates whose frames are not clear; None where none is found."""
         refinement, stages = self.refinement, self.judged.solution.source.path.stages
         before = refinement.rooms(stages)
-        in_gates = more_direct(before, stages, refinement.task, flight)
+        in_gates = more_direct(before, stages, refinement.task, self.frames)
         for _ in range(MAX_HALVINGS if in_gates != before else 0):
             again = replace(self, refinement=replace(refinement, in_gates=in_gates))._refined()
             if again is not None or out_of_time():
@@ -67,7 +76,7 @@ class FlownPath:
         judged = self.refinement.finished(self.refinement.path(source.path))
         if not (judged.feasible or out_of_time()):
             judged = self.refinement.refined(source.path, source.path.trajectory.segments)
-        return replace(self, judged=judged) if judged.feasible else None
+        return FlownPath.of(self.refinement, judged) if judged.feasible else None
 
 
 def _halfway(before: Sequence[BodyInGate], in_gates: Sequence[BodyInGate]) -> tuple[BodyInGate, ...]:

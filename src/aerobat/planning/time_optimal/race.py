@@ -82,8 +82,8 @@ class Race:
         The motion is made more direct through gates, then given more reserve. Where no reserve is wanted the
         reserve stays as it is, and where none is enough the best motion is returned.
         """
-        best, reserve = cleared(found, self._own_flight, self._more_direct), self.task.reserve
-        found = best[1]
+        found, reserve = cleared(found, self._more_direct), self.task.reserve
+        best = self._own_flight(found), found
         for _ in range(RESERVE_RAISES if reserve > 0.0 else 0):
             if not best[0].wants_reserve or out_of_time():
                 break
@@ -95,11 +95,11 @@ class Race:
                 best = min(best, (self._own_flight(found), found), key=lambda pair: pair[0].rank)
         return best[1]
 
-    def _more_direct(self, found: Judged[SolvedMotion], flight: OwnFlight) -> Judged[SolvedMotion] | None:
-        """What is found with more room in the gates that a flight did not pass, if anything is."""
+    def _more_direct(self, found: Judged[SolvedMotion]) -> Judged[SolvedMotion] | None:
+        """What is found with more room in the gates whose frames are not clear, if anything is."""
         solved = found.solution.source
         before, control = solved.program.start.in_gates, solved.program.control
-        in_gates = more_direct(before, control.stages, self.task, flight)
+        in_gates = more_direct(before, control.stages, self.task, found.frames)
         if in_gates == before:
             return None
         return self._certified(self._fine(control.elements, solved, self.task.reserve, in_gates))
@@ -164,7 +164,7 @@ class Race:
 
     def _certified(self, program: CollocatedProgram) -> Judged[SolvedMotion] | None:
         found = certified_solve(program, self.task, self.recorder, ROUNDS)
-        return found if found.feasible else None
+        return found.at(found.solution.source.placed) if found.feasible else None
 
     def _record(self, solved: SolvedMotion, usable: bool) -> None:
         duration, answer = float(solved.motion.phases.sum()), solved.answer

@@ -202,12 +202,15 @@ class MovingPicture:
         shapes = [Shape(shadow(path, self._floor), edge=HAIR, width=2.5, depth_bias=-1e3)]
         shapes += polyline(path, BAND, 3.2, depth_bias=-BELOW * self.subject.reference.extent)
         shapes += obstacle_shapes([each for each in self._surfaces if each.motion is None], self._camera)
-        return shapes + [shape for gate in self.subject.gates for shape in gate_shapes(gate)]
+        still = [gate for gate in self.subject.gates if gate.motion is None]
+        return shapes + [shape for gate in still for shape in gate_shapes(gate)]
 
     def _moving(self, time: float) -> list[Shape]:
         """Vehicles at an instant, the paths that they have flown by then, and the stages that are behind."""
         moved = [each.at(time) for each in self._surfaces if each.motion is not None]
         shapes = [*obstacle_shapes(moved, self._camera), *self._passed(time)]
+        gates = [gate.at(time) for gate in self.subject.gates if gate.motion is not None]
+        shapes += [shape for gate in gates for shape in gate_shapes(gate)]
         many = len(self.subject.shown) > 1
         line: Any = (BLUE, 0.3) if many else BLUE
         for poses in self.subject.shown:

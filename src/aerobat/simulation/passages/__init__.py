@@ -8,7 +8,6 @@ from aerobat.simulation.passages.obstacles import (
     nearest_obstacles,
 )
 from aerobat.simulation.passages.passage import (
-    PASSAGE_DEPTH,
     PASSAGE_WINDOW,
     Passage,
     bounding_ellipsoid,
@@ -24,7 +23,6 @@ from aerobat.simulation.passages.stage_attitude import (
 from aerobat.simulation.passages.waypoint import WaypointPassage, waypoint_passages, waypoint_target
 
 __all__ = [
-    "PASSAGE_DEPTH",
     "PASSAGE_WINDOW",
     "FlownBodies",
     "NearestObstacle",

@@ -22,11 +22,12 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification.envelope import PlannedPassage
+from aerobat.certification.envelope import PASSAGE_DEPTH, PlannedPassage
 from aerobat.declaration import by_value
 from aerobat.engines.pytree import components, tree_map
 from aerobat.kernels.gates.progress import GatePlane, GateProgress
 from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
+from aerobat.kernels.gates.snapshot import Bend, PlaceMotion
 from aerobat.kernels.gates.swath import NOWHERE, Extreme, Swath
 from aerobat.problem.gate import Gate
 from aerobat.problem.opening import EdgeProbe, edge_name
@@ -36,7 +37,6 @@ from aerobat.vehicle import Ellipsoid
 T = TypeVar("T")
 
 PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is looked for
-PASSAGE_DEPTH = 0.05  # [m] beyond the plane, where who crosses it has not merely stopped in it
 
 
 def one_of_many(found: T, k: int, shared: int) -> T:
@@ -214,6 +214,7 @@ def gate_places(
                 planned=each.time,
                 window=PASSAGE_WINDOW,
                 depth=PASSAGE_DEPTH,
+                motion=_motion(each.gate),
             ),
             ellipsoid,
         )
@@ -226,6 +227,14 @@ def bounding_ellipsoid(body: Ellipsoid | None) -> BoundingEllipsoid | tuple[()]:
     if body is None:
         return ()
     return BoundingEllipsoid(components(body.centre), components(body.semi_axes))
+
+
+def _motion(gate: Gate) -> PlaceMotion | tuple[()]:
+    """The motion of a gate that moves."""
+    if gate.motion is None:
+        return ()
+    bends = zip(gate.motion.times.tolist(), gate.motion.turns, strict=True)
+    return PlaceMotion(components(gate.velocity), tuple(Bend(time, components(by)) for time, by in bends))
 
 
 def _directions(gate: Gate) -> tuple[PlaneDirection, ...]:

@@ -72,7 +72,9 @@ class MujocoRun:
         names = [self._model.geom(k).name for k in range(self._model.ngeom)]
         self._kinds = [_KINDS[name.partition(" ")[0]] for name in names]
         self._contact = Contact.NOTHING
-        self._motions = [each.motion for each in scene.obstacles for _ in _shapes(each) if each.motion]
+        moving = [each.motion for each in scene.obstacles for _ in _shapes(each)]
+        moving += [gate.motion for gate in scene.gates if gate.wall is None]
+        self._motions = [motion for motion in moving if motion is not None]
         self._begin(motion)
 
     def _begin(self, motion: VehicleState) -> None:
@@ -115,7 +117,7 @@ class MujocoRun:
             self._feel()
 
     def _move_obstacles(self) -> None:
-        """Move those that move to where they are now."""
+        """Move those that move, gates too, to where they are now."""
         for place, motion in zip(self._data.mocap_pos, self._motions, strict=True):
             place[:] = motion.moved(np.array(self._data.time))
 
@@ -152,11 +154,13 @@ def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
         holder = world if motion is None else SubElement(world, "body", name=name, mocap="true")
         SubElement(holder, "geom", shape, name=name, rgba="0.5 0.5 0.5 1", contype="0", conaffinity=meets)
     for number, gate in enumerate(scene.gates):
+        if gate.wall is not None:
+            continue
+        name = f"{_GATE} {number}"
+        holder = world if gate.motion is None else SubElement(world, "body", name=name, mocap="true")
         for side, (centre, outward, half_size) in enumerate(_frame_bars(gate)):
-            if gate.wall is not None:
-                continue
             SubElement(
-                world, "geom", name=f"{_GATE} {number} {side}", type="box", pos=_text(centre),
+                holder, "geom", name=f"{name} {side}", type="box", pos=_text(centre),
                 size=_text(half_size), xyaxes=_text((*gate.normal, *outward)), rgba="0.85 0.4 0.1 1",
                 contype="0", conaffinity=meets,
             )  # fmt: skip

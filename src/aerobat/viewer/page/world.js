@@ -58,10 +58,13 @@ class World {
   placeGates(gates) {
     if (this.gates) this.remove(this.gates);
     this.gates = new THREE.Group();
+    this.movingGates = [];
     for (const gate of gates) {
       const foot = vector(gate.position);
       foot.z = Math.min(...outlineOf(gate).map((point) => point.z));
-      this.gates.add(gateModel(gate), dropLine(foot, this.bounds.floor));
+      const model = new THREE.Group().add(gateModel(gate), dropLine(foot, this.bounds.floor));
+      this.gates.add(model);
+      if (gate.places) this.movingGates.push({ model, places: values(gate.places) });
     }
     this.scene.add(this.gates);
   }
@@ -167,7 +170,7 @@ class World {
   show(time) {
     const until = Math.min(time, this.track.end);
     const [before, part] = place(until);
-    for (const { model, places } of this.moving) {
+    for (const { model, places } of [...this.moving, ...this.movingGates]) {
       const [a, b] = [before, Math.min(before + 1, places.length / 3 - 1)].map((k) => vector(places.subarray(3 * k, 3 * k + 3)));
       model.position.copy(a.lerp(b, part));
     }
