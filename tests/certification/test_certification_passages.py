@@ -110,7 +110,9 @@ def test_a_plan_whose_gate_is_elsewhere_then_is_not_certified(flip):
 
 def test_a_plan_that_passes_the_gate_tilted_is_not_certified():
     # flown slower the path is the same, and the thrust another
-    fast = plan(load_problem("half-flip"), Miqp(order=5), VEHICLE)
+    problem = load_problem("half-flip")
+    little = problem.maneuver.with_stage_thrust(problem.gates, 7.0)
+    fast = plan(replace(problem, maneuver=little), Miqp(order=5), VEHICLE)
     slow = Trajectory(1.3 * fast.trajectory.durations, fast.trajectory.coefficients)
     stages = tuple(replace(s, time=1.3 * s.time) for s in fast.stages)
     certificate = replace(fast, trajectory=slow, stages=stages).for_vehicle(VEHICLE).certificate

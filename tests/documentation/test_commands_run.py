@@ -35,8 +35,6 @@ LEFT_OUT = {
 ENDS = {  # of commands that do not end with 0, as the pages say
     "--to crazyflie": 0,
     "crazyflie": 1,
-    "race-7": 1,
-    "fly split-s": 1,
     "--paper": 1,
     "min-snap": 1,
     "two-flips": 1,

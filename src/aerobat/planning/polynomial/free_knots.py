@@ -116,7 +116,7 @@ class FreeKnots(Planner):
                 break
             if best is not None and not best.touches and best.duration <= slow:
                 break
-        return None if best is None else best.plan
+        return None if best is None else replace(best.plan, attempts=tuple(refinement.recorder.attempts))
 
     def _around(self, refinement: Refinement) -> _Found | None:
         """The plan around obstacles; None where there are none, or no route leads to one."""
