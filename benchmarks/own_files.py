@@ -95,7 +95,18 @@ def random_files(seed: int, case: int) -> Case:
     for gate in (*found.problem.get("gates", ()), found.problem.get("gate")):
         if gate and pen.chance(0.1):
             gate["wall"] = wall(pen)
+    if pen.chance(0.15):
+        start = found.problem.pop("heading", None)
+        found.problem["heading"] = _heading(pen) | ({} if start is None else {"start": start})
     return found
+
+
+def _heading(pen: Pen) -> Table:
+    """What the body's x axis follows along the way."""
+    point = {"mode": "towards", "point": [pen.number(-9.0, 9.0) for _ in range(3)]}
+    spline = {"mode": "spline", "knots_deg": [[0.5, pen.number(-180, 180)], [1.0, pen.number(-180, 180)]]}
+    mode = pen.one_of({"mode": "fixed"}, {"mode": "along-velocity"}, point, spline)
+    return mode | pen.some({"tolerance_deg": lambda p: p.number(5.0, 170.0)}, 0.3)
 
 
 def _vehicle(pen: Pen) -> Table:

@@ -167,8 +167,8 @@ def read_flight_package(path: str | os.PathLike[str]) -> FlightPackage:
     try:
         document = json.loads(content["document"].tobytes())
         heading = float(content["heading"])
-        path = content["durations"], content["coefficients"], heading
-        package = FlightPackage(*path, document, content.get("yaw"))
+        arrays = content["durations"], content["coefficients"], heading
+        package = FlightPackage(*arrays, document, content.get("yaw"))
         _require_whole(package)
     except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError):
         raise ValueError(f"{path} is damaged") from None

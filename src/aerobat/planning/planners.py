@@ -27,6 +27,7 @@ from aerobat.planning.passages import require_clear_ends, require_openings
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.problem import Problem, as_problem
+from aerobat.problem.heading import HeadingMode
 from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
 
 
@@ -91,6 +92,8 @@ def plan(
         vehicle.require_hover(problem.environment.gravity)
         require_openings(problem, vehicle)
         _require_consistency(problem, vehicle)
+    elif problem.heading.mode is not HeadingMode.FREE:
+        raise SpecError('heading: how fast it may turn, a vehicle says; give one, or mode = "free"')
     require_clear_ends(problem, vehicle)
     method = planner_for(problem, vehicle) if planner is None else as_planner(planner)
     found: Any = method.plan(problem, vehicle, progress)

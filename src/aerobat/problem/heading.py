@@ -91,6 +91,10 @@ class Heading:
             begin = f"begins with {knots[0, 1]:g}°, heading_deg is {degrees(self.start):g}"
             raise FieldError("knots_deg", f"{begin}; give both alike, or leave that row out")
 
+    def __float__(self) -> float:
+        """The start [rad]."""
+        return self.start
+
     def asked(self, fractions: Array, flat: FlatState, b3: Array) -> Array:
         """Directions that the body's x axis shall have, world, (T, 3), the shorter the less they matter.
 
@@ -125,7 +129,12 @@ def as_heading(value: object) -> Heading:
     """A heading, of itself, of a table, or of the angle [rad] that it begins with."""
     if isinstance(value, Heading):
         return value
-    return from_table(Heading, value if isinstance(value, Mapping) else {"start": number(value, "")})
+    if isinstance(value, Mapping):
+        return from_table(Heading, value)
+    try:
+        return from_table(Heading, {"start": number(value, "")})
+    except FieldError as error:
+        raise FieldError("", error.complaint) from None
 
 
 def _softened(vectors: Array, small: float) -> Array:

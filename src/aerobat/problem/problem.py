@@ -137,8 +137,8 @@ class Problem:
     maneuver: Annotated[Maneuver, PlainValidator(MANEUVERS.read)] = Line()  # what happens on the way
     gates: tuple[Gate, ...] = ()  # openings to pass
     limits: Limits = field(default_factory=Limits)  # bounds on the path
-    # where the body's x axis points along the way; an angle: at the start, then carried along without spin
-    heading: Annotated[Heading, PlainValidator(as_heading)] = Heading()
+    # about the thrust axis at the start, carried along without spin; or a table of what it follows
+    heading: Annotated[Heading, PlainValidator(as_heading)] = Heading()  # [rad]
     environment: Environment = field(default_factory=Environment)  # where it is flown
     tolerance: Tolerance = Tolerance()  # how exactly flights keep to it beside gates and radii
     description: str = ""  # what it is, for people
@@ -182,12 +182,13 @@ class Problem:
             with within_field("gate"):
                 table["gates"] = (from_table(Gate, table.pop("gate")),)
         if "heading_deg" in table:
-            angle = {"start": in_radians({"heading_deg": table.pop("heading_deg")}, "heading")["heading"]}
-            if "heading" in table and not isinstance(table["heading"], Mapping):
-                raise SpecError("heading and heading_deg are both given; give one of them")
-            if "start" in table.get("heading", {}):
+            asked = table.get("heading")
+            if not isinstance(asked, Mapping):
+                return in_radians(table, "heading")
+            if "start" in asked:
                 raise FieldError("heading_deg", "stands beside heading.start; drop either")
-            table["heading"] = angle | table.get("heading", {})
+            del table["heading"]
+            table["heading"] = {**asked} | {"start": in_radians(table, "heading")["heading"]}
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:

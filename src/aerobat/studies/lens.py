@@ -21,7 +21,8 @@ from aerobat.declaration.sentences import closest
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
 from aerobat.planning import Planner
-from aerobat.problem import Gate, Problem
+from aerobat.problem import Gate, Heading, Problem
+from aerobat.problem.heading import HeadingMode
 from aerobat.studies.units import DEGREES, unit_of
 from aerobat.vehicle import Vehicle
 
@@ -279,6 +280,8 @@ def _with(value: Any, name: str, inner: Any) -> Any:
         return from_table(Gate, table | angles | {name: inner})
     if name not in table:
         name, inner = name.removesuffix(DEGREES), radians(inner)
+        if isinstance(table[name], Heading) and table[name].mode is not HeadingMode.FREE:
+            inner = _with(table[name], "start", inner)
     return from_table(type(value), table | {name: inner})
 
 

@@ -54,4 +54,4 @@ def load_trajectory(path: PathName) -> Trajectory:
 def trajectory_in(arrays: Mapping[str, Array]) -> Trajectory:
     """The trajectory that a file's arrays hold. Raises KeyError for one that is missing."""
     durations, coefficients, heading = (arrays[name] for name in ("durations", "coefficients", "heading"))
-    return Trajectory(durations, coefficients, float(heading), arrays.get("yaw"))
+    return Trajectory(durations, coefficients, heading, arrays.get("yaw"))  # type: ignore[arg-type]

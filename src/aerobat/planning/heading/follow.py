@@ -15,7 +15,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.errors import Infeasible, Reason, SpecError
+from aerobat.errors import Infeasible, Reason
 from aerobat.optimization.quadratic import quadratic_minimum
 from aerobat.planning.heading.yaw_limits import ORDERS, YawLimits
 from aerobat.planning.heading.yaw_spline import PER_KNOT, YawSpline
@@ -42,17 +42,15 @@ TRIES = ((0.0, 1.0), (0.02, 1.0), (0.02, 0.6), (0.02, 0.3), (0.02, 0.0))
 def with_heading(plan: Plan, reserve: float) -> Plan:
     """Return a plan whose body follows its problem's heading; itself where that is free.
 
-    Raises Infeasible where the heading's tolerance is not kept, SpecError without a vehicle.
+    Raises Infeasible where the heading's tolerance is not kept.
 
     Args:
         plan: Of a path alone.
         reserve: That the path keeps of its limits.
     """
     heading = plan.problem.heading
-    if heading.mode is HeadingMode.FREE:
+    if heading.mode is HeadingMode.FREE or plan.vehicle is None:
         return plan
-    if plan.vehicle is None:
-        raise SpecError('heading: how fast it may turn, a vehicle says; give one, or mode = "free"')
     spline = YawSpline.along(plan.trajectory)
     for more, left in TRIES:
         task = Task.of(plan.problem, plan.vehicle, SHARE * reserve + more)
