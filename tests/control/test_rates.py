@@ -8,6 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
+from aerobat.control import Seen
+from aerobat.control.laws.rates import Rates
 from aerobat.control.parameters import airframe_parameters, controller_parameters
 from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.environment import Environment
@@ -16,6 +18,7 @@ from aerobat.kernels.control import Commands
 from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.rate_loop import RateLoopModel, RateLoopState, RateSetpoint, rate_gains
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
+from aerobat.simulation.autopilot.braking import point_reference
 from aerobat.vehicle.fleet import Fleet
 from refusals import complaint
 from shared_plans import shared_plan
@@ -78,6 +81,23 @@ def test_commands_stay_within_limits_and_give_the_thrust_where_moments_leave_roo
     assert all(-1e-9 <= each <= high + 1e-9 for each in commands.thrusts)
     if not commands.saturated:
         assert sum(commands.thrusts) == pytest.approx(thrust, abs=1e-9)
+
+
+def test_rates_are_corrected_by_the_square_of_the_thrust_below_a_hovers() -> None:
+    """Of a tilted vehicle: hardly any thrust has a direction that small errors swing about."""
+    law, model = Rates(), first_numbers(controller_parameters(QUAD.controller, FLEET, Environment()))
+    tilted = STILL._replace(q_world_body=(np.cos(0.05), np.sin(0.05), 0.0, 0.0))
+
+    def corrected(specific_thrust: float) -> float:
+        up, zero = np.array([[0.0, 0.0, specific_thrust - 9.81]]), np.zeros((1, 3))
+        wanted = first_numbers(point_reference(zero, zero, up, zero, 0.0, 9.81))
+        seen = Seen(tilted, (HOVER / 4,) * 4, wanted)
+        state, _ = law.step(FloatOps, model, law.init(FloatOps, model, seen), seen, 1e-3)
+        return float(state.setpoint.omega[0])
+
+    whole = corrected(12.0)
+    assert whole == pytest.approx(-16.0 * 0.1, rel=0.01)
+    assert corrected(0.98) == pytest.approx(0.01 * whole, rel=0.02)
 
 
 def test_flights_of_a_lab_pass_by_rates_as_by_the_tracking_controller() -> None:

@@ -12,6 +12,7 @@ from aerobat.links.commander import Doing
 from aerobat.links.goals import Mode
 from aerobat.links.ros import topics
 from aerobat.links.ros.crazyswarm import FULL_STATE, SERVICES
+from command_lines import run
 from ros_sky import Ros, Sky, crazyflie_aloft
 
 NAME = "/cf231"
@@ -90,6 +91,12 @@ def test_a_full_state_is_the_goal_with_its_rates_in_the_bodys_axes() -> None:
     np.testing.assert_allclose(
         topics.vector(heard[-1].acc), mission.stream.flat(since).acceleration, atol=1e-6
     )
+
+
+def test_a_plan_is_flown_on_board_of_a_crazyflie_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(capsys, "link", "ros", "--onboard")
+    assert code == 2
+    assert err.endswith("--onboard is for a Crazyflie; give --goal crazyswarm2:/NAME, or leave it out\n")
 
 
 def test_a_trajectory_that_was_not_uploaded_does_not_begin() -> None:

@@ -223,6 +223,14 @@ def test_an_error_over_its_bound_gives_the_plan_up() -> None:
     assert not sky.vehicle.crashed
 
 
+def test_a_pilot_who_takes_over_as_a_copter_takes_off_is_not_interfered_with() -> None:
+    sky = Sky(speaks=ARDUPILOT)
+    sky.run(lambda: sky.client.stage is ClientStage.TAKING_OFF)
+    sky.cable.change = changing("HEARTBEAT", custom_mode=0)  # STABILIZE
+    sky.run(lambda: sky.client.stage is ClientStage.LOST, limit=1.0)
+    assert sky.said[-1] == "a pilot has taken over; it is left to the pilot"
+
+
 @pytest.mark.parametrize(("name", "pilots"), [("px4", 1 << 16), ("ardupilot", 0), ("ardupilot", 6)])
 def test_a_pilot_who_takes_over_is_not_interfered_with(name: str, pilots: int) -> None:
     """A heartbeat with a mode that is none of ours: from then on nothing is sent that moves the vehicle."""

@@ -48,6 +48,8 @@ def ros(*problems: str, options: Annotated[RosOptions, Parameter(name="*")] = Ro
         Names that `aerobat show` lists, or problems' TOML files, to be services too, of their names.
     """
     vehicle, crazyflie = named_vehicle(options.vehicle), _crazyflie(options.goal)
+    if options.onboard and not crazyflie:
+        raise SpecError("--onboard is for a Crazyflie; give --goal crazyswarm2:/NAME, or leave it out")
     settings = NodeSettings(
         rate=options.rate,
         takeoff_height=options.takeoff_height,

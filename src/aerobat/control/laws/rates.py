@@ -33,7 +33,7 @@ from aerobat.kernels.vectors import (
 )
 
 _YAW_SHARE = 1.0 / 3.0  # [-] of the inner loop's gain of yaw: a faster outer loop is not damped
-_FULL_THRUST = 8.0  # [m/s²] of less specific thrust, which small errors swing about, less is corrected
+_FULL_THRUST = 9.8  # [m/s²] of less specific thrust, which small errors swing about, less is corrected
 
 
 class RatesState(NamedTuple):
@@ -92,7 +92,8 @@ class Rates(ControlLaw):
         asked_rate = to_body(body_axes, reference.omega)
         correction = add(subtract(to_body(body_axes, attitude.omega), asked_rate), feedback)
         correction = clip_components(ops, correction, self.max_correction)
-        correction = scale(ops.minimum(1.0, norm(ops, attitude.specific_thrust) / _FULL_THRUST), correction)
+        told = ops.minimum(1.0, norm(ops, attitude.specific_thrust) / _FULL_THRUST)
+        correction = scale(told * told, correction)
         omega = add(add(asked_rate, lead), correction)
         thrust = collective(ops, mass_properties.mass, body_axes[2], attitude)
         thrust = thrust + mass_properties.mass * reference.ahead.thrust_change * lag / elapsed

@@ -252,7 +252,7 @@ class Client:
             self._enter(ClientStage.FLYING, now)
         elif self._since(now) > _PATIENCE:
             self._refuse(now, "take off")
-        else:
+        elif not self._yields(now):
             self.link.take_off(_LIFT)
 
     def _give_up_arming(self, now: float) -> None:
