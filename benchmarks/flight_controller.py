@@ -89,4 +89,4 @@ def planned(maneuver: str, vehicle: ab.Vehicle) -> ab.Plan:
 
 if __name__ == "__main__":
     count, *names = sys.argv[1:] or ["20"]
-    main(int(count), names or ["agile-quad", "examples/vehicles/agilicious.toml"])
+    main(int(count), names or ["agile-quad", "agilicious"])

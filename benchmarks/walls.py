@@ -1,11 +1,12 @@
 """Random worlds with walls, planned by the planner that is taken where none is named.
 
-    uv run python benchmarks/walls.py [--count 20] [--more] [--families forest slit window wood]
+    uv run python benchmarks/walls.py [--count 20] [--more] [--families forest slit ...]
 
 Case k of a family is always the same. Forests: 20 cylinders or boxes in 10 x 10 x 4 m, 10 m from rest to
 rest. Slits: a wall with one opening 1.3 times as high as the body is thick, tilted by any angle, 8 m.
 Windows: three rooms, one window from each to the next, 9 m. Woods: 45 trunks of 1 to 1.5 m in 100 x 30 m,
-100 m at 10 m/s an axis, as large as the easy forest of mit-acl/sando. The vehicle is agile-quad, with the
+100 m at 10 m/s an axis. The easy forest and the knots are scenes that others published
+(published_scenes.py), 105 m at 5 m/s an axis. The vehicle is agile-quad, with the
 reserve and the clearance of plans that are flown. Bodies are sampled at 2000 instants a second against exact
 distances.
 With `--more`, the duration is compared with the best of ten times as many routes. Times are of the processor,
@@ -30,6 +31,7 @@ from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.refine import SEGMENTS, Refinement
 from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE
 from aerobat.planning.task import Task
+from published_scenes import easy_forest, knots
 
 VEHICLE = "agile-quad"
 TREES, TREE_GAP = 20, 0.1  # [m] between trees, at least
@@ -119,6 +121,8 @@ FAMILIES: dict[str, Callable[[int], ab.Problem]] = {
     "slit": slit,
     "window": window,
     "wood": wood,
+    "easy-forest": easy_forest,
+    "knots": knots,
 }
 
 
@@ -130,8 +134,8 @@ def least_gap(plan: Plan) -> float:
     found = ab.reference(plan.trajectory, plan.vehicle, times, environment=world)
     offset, shapes = plan.vehicle.bounding_ellipsoid.turned(found.setpoint.q_world_body)
     centres = plan.trajectory.evaluate(times) + offset
-    bodies, pieces = world.pieces.near(centres, plan.vehicle.body_radius, 0.5)
-    gaps = world.pieces.separated(pieces, centres[bodies], shapes[bodies]).gaps
+    bodies, pieces = world.pieces.near(centres, plan.vehicle.body_radius, 0.5, times)
+    gaps = world.pieces.separated(pieces, centres[bodies], shapes[bodies], times=times[bodies]).gaps
     return float(gaps.min(initial=np.inf))
 
 

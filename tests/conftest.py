@@ -10,7 +10,7 @@ from collections.abc import Generator, Iterator
 import pytest
 from _pytest.mark.expression import Expression
 from _pytest.runner import runtestprotocol
-from hypothesis import settings
+from hypothesis import is_hypothesis_test, settings
 
 import budget
 from aerobat.control.law import CONTROL_LAWS
@@ -31,11 +31,15 @@ register_profiles()
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of the two suites."""
     parser.addoption("--full", action="store_true", help=f"Run all tests: {', '.join(GROUPS)} too.")
+    parser.addoption(
+        "--rest", action="store_true", help="Run what --full runs and the default suite does not."
+    )
     parser.addoption("--no-budget", action="store_true", help="Let any test take long, as beside other work.")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Choose the suite; refuse one that needs a part of the system that is not there."""
+    config.option.full |= config.option.rest
     for name, meaning in GROUPS.items():
         config.addinivalue_line("markers", f"{name}: {meaning}")
     settings.load_profile(FULL if config.option.full else FAST)
@@ -48,6 +52,22 @@ def pytest_configure(config: pytest.Config) -> None:
         sentence = missing(group)
         if sentence and chosen.evaluate(lambda name, group=group, **_: name == group):
             raise pytest.UsageError(sentence)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what the default suite runs as `--rest` would; laws draw more examples there, and stay."""
+    if config.option.rest:
+        done = [
+            item
+            for item in items
+            if not (_in_a_group(item) or is_hypothesis_test(getattr(item, "obj", None)))
+        ]
+        config.hook.pytest_deselected(items=done)
+        items[:] = [item for item in items if item not in set(done)]
+
+
+def _in_a_group(item: pytest.Item) -> bool:
+    return any(item.get_closest_marker(name) for name in GROUPS)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
@@ -96,8 +116,7 @@ def _took_long(item: pytest.Item, reports: list[pytest.TestReport]) -> bool:
     """True of a test that passed, is in no group and took more than its time of the processor."""
     options = item.config.option
     is_judged = not (options.full or options.no_budget) and budget.is_measured()
-    in_a_group = any(item.get_closest_marker(name) for name in GROUPS)
-    if not is_judged or in_a_group or not all(report.passed for report in reports):
+    if not is_judged or _in_a_group(item) or not all(report.passed for report in reports):
         return False
     return budget.is_exceeded(item.stash[SPENT])
 

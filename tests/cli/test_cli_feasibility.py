@@ -165,16 +165,19 @@ cli.main(sys.argv[1:])
 
 @pytest.mark.process
 @pytest.mark.parametrize("workers", ["1", "2"])
-@pytest.mark.parametrize("command", [("feasibility", "half-flip", "--over", "speed=4:8:2"), NEED[:-2]])
-def test_an_interrupt_leaves_nothing_but_a_word(command: tuple[str, ...], workers: str) -> None:
+@pytest.mark.parametrize("is_map", [True, False])
+def test_an_interrupt_leaves_what_is_finished_and_a_word(is_map: bool, workers: str) -> None:
+    command = ("feasibility", "half-flip", "--over", "speed=4:8:2") if is_map else NEED[:-2]
     ended = subprocess.run(
         [sys.executable, "-c", INTERRUPTED, *command, "--workers", workers],
         capture_output=True,  # to its end: the pipes close when the last process that holds them ends
         text=True,
         env=os.environ | {"AEROBAT_PROGRESS": "1000"},
     )
-    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "aerobat: interrupted\n")
-    assert not list(Path().iterdir())
+    kept = "aerobat: 1 of 3 cells are kept: the same command goes on from there\n" if is_map else ""
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", f"{kept}aerobat: interrupted\n")
+    left = ["half-flip-map-speed-4-8-2-unfinished"] if is_map else []
+    assert [path.name for path in Path().glob("out/*")] == left
 
 
 def test_progress_says_how_many_and_how_long_still() -> None:

@@ -16,7 +16,7 @@ import pytest
 import aerobat as ab
 from aerobat.cli.progress import Progress
 from aerobat.interchange import read_table
-from aerobat.studies.sweep.kept import KeptChunks
+from aerobat.studies.kept import KeptParts
 from command_lines import code
 from shared_plans import shared_plan
 
@@ -78,13 +78,13 @@ def test_a_repeated_sweep_comes_to_the_same_bits(capsys) -> None:
 KILLED = """
 import os, signal, sys
 from aerobat.cli import main
-from aerobat.studies.sweep.kept import KeptChunks
+from aerobat.studies.kept import KeptParts
 
-write = KeptChunks.write
+write = KeptParts.write
 def write_and_die(self, *chunk):
     write(self, *chunk)
     os.kill(os.getpid(), signal.SIGKILL)
-KeptChunks.write = write_and_die
+KeptParts.write = write_and_die
 main(sys.argv[1:])
 """
 
@@ -94,7 +94,7 @@ main(sys.argv[1:])
 )
 def test_the_same_command_goes_on_where_a_signal_ended_it(ended_by, code, word, monkeypatch, capsys) -> None:
     assert swept("--out", "whole", what="half-flip") == 0  # planned here, there from a file
-    write = KeptChunks.write
+    write = KeptParts.write
 
     def write_and_interrupt(*chunk: object) -> None:
         write(*chunk)
@@ -102,7 +102,7 @@ def test_the_same_command_goes_on_where_a_signal_ended_it(ended_by, code, word, 
 
     capsys.readouterr()
     with monkeypatch.context() as patch:
-        patch.setattr(KeptChunks, "write", write_and_interrupt)
+        patch.setattr(KeptParts, "write", write_and_interrupt)
         assert swept("--out", "there/broken") == code
     assert capsys.readouterr().err.splitlines() == [
         "aerobat: 50 of 60 flights are kept: the same command goes on from there",

@@ -64,7 +64,7 @@ def test_every_vehicle_gets_level_from_any_attitude_and_to_a_hover_from_any_moti
     tilts, _ = tilts_and_speeds(fleet, q, np.zeros((COPIES, 3)), 3.0, by_attitude=True)
     assert (tilts[:, -1] < SETTLED).all()
     assert (tilts.max(axis=1) < 1.02 * tilts[:, 0] + 0.05).all()  # it turns the short way, and stops in time
-    tilts, speeds = tilts_and_speeds(fleet, q, rng.uniform(-4.0, 4.0, (COPIES, 3)), 6.0, by_attitude=False)
+    tilts, speeds = tilts_and_speeds(fleet, q, rng.uniform(-4.0, 4.0, (COPIES, 3)), 7.0, by_attitude=False)
     assert (tilts[:, -1] < SETTLED).all()
     assert (speeds[:, -1] < SETTLED).all()
 

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment.obstacles import ConvexPiece, Pieces
+from aerobat.environment.obstacles.convex_piece import ObstacleMotion
 from fcl_peer import EXACT, distance, solid
 from random_obstacles import KINDS, random_obstacle
 from suites import examples
@@ -154,3 +156,20 @@ def _distance(piece: ConvexPiece, centre: Array, shape: Array, normal: Array) ->
     away = (body - piece.points - rounded).T
     _, distance = nnls(np.vstack([away, np.full(away.shape[1], 1e5)]), np.array([0.0, 0.0, 0.0, 1e5]))
     return float(distance)
+
+
+@given(
+    rows=st.integers(0, 9).flatmap(lambda count: arrays(np.float64, (count, 3), elements=st.floats(-5, 5))),
+    velocity=arrays(np.float64, 3, elements=st.floats(-2, 2)),
+    times=arrays(np.float64, (6, 2), elements=st.floats(-2, 12)),
+)
+def test_what_moves_reaches_as_far_as_it_is_at_any_instant_between(
+    rows: np.ndarray, velocity: np.ndarray, times: np.ndarray
+) -> None:
+    motion = ObstacleMotion(velocity, np.column_stack([np.arange(len(rows)) * 1.25, rows]))
+    begin, end = np.sort(times, axis=1).T
+    lower, upper = motion.reach(begin, end)
+    between = np.clip(motion.times[:, None], begin, end)  # where it turns, and nowhere else
+    seen = motion.moved(np.concatenate([np.linspace(begin, end, 5), between]))
+    assert np.allclose(lower, seen.min(axis=0))
+    assert np.allclose(upper, seen.max(axis=0))

@@ -15,7 +15,6 @@ from aerobat.planning.recorder import Recorder
 from aerobat.planning.rotor_margin import reserve_shortfalls, rotor_findings
 from aerobat.problem import load_problem
 from aerobat.vehicle import load_vehicle
-from places import ROOT
 
 
 def kept(certificate: Certificate | None) -> float:
@@ -82,7 +81,7 @@ def test_what_is_missing_of_a_reserve_is_told_of_the_rotor_that_keeps_least() ->
 @pytest.mark.slow
 def test_a_large_reserve_leaves_strong_rotors_the_room_to_sink() -> None:
     """They hover at 15 % of their range: of that, a reserve of 0.3 keeps two thirds from their lower ends."""
-    vehicle = load_vehicle(ROOT / "examples/vehicles/agilicious.toml")
+    vehicle = load_vehicle("agilicious")
     certificate = FreeKnots(segments=2, reserve=0.3).plan(load_problem("line"), vehicle).certificate
     assert certificate is not None
     hover = 9.81 / vehicle.max_specific_thrust

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
 from math import radians
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from aerobat.reporting.feasibility.facts import requirements
 from aerobat.reporting.plain_data import plain
 from aerobat.studies.feasibility import Feasibility
 from aerobat.studies.feasibility.feasibility_map import Cell
+from aerobat.studies.share import Share
+from interrupted import Interrupted
 from shared_plans import shared_plan
 from suites import examples
 
@@ -125,6 +128,44 @@ def test_an_executor_that_is_handed_in_plans() -> None:
     with ThreadPoolExecutor(1) as executor:
         found = ab.feasibility_map("line", over, executor=executor)
     assert found == ab.feasibility_map("line", over, workers=1)
+
+
+def test_an_interrupted_map_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    over = {"goal.position.x": [1.0, 2.0], "vehicle.mass": [0.85, 3.0]}  # the last too heavy to hover
+    kept = tmp_path / "kept"
+
+    def interrupt(done: int, planned: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        ab.feasibility_map("line", over, workers=1, keep=kept, progress=interrupt)
+    whole = ab.feasibility_map("line", over, workers=1)
+    assert ab.feasibility_map("line", over, keep=kept, executor=Interrupted(1)) == whole
+    with pytest.raises(ab.SpecError, match=r"keeps cells of another map \(planner\); remove it"):
+        ab.feasibility_map("line", over, planner="min-snap", workers=1, keep=kept)
+    for file in kept.glob("*.npz"):
+        file.write_bytes(b"PK")
+    with pytest.raises(KeyboardInterrupt):  # what is damaged is planned again
+        ab.feasibility_map("line", over, keep=kept, executor=Interrupted(0))
+
+
+@given(
+    st.sampled_from(Feasibility),
+    st.tuples(*[st.none() | st.floats(0, 10)] * 2),
+    st.lists(st.text(), max_size=3),
+    st.text(),
+    st.none() | st.builds(Share, st.integers(0, 9), st.just(9)),
+)
+def test_a_cell_that_is_kept_is_the_same(
+    feasibility: Feasibility,
+    numbers: tuple[float | None, float | None],
+    limits: list[str],
+    sentence: str,
+    passed: Share | None,
+) -> None:
+    cell = Cell((1.0, 2.0), feasibility, numbers[0], tuple(limits), numbers[1], sentence, passed)
+    assert Cell.of(cell.values, cell.arrays) == cell
 
 
 @pytest.mark.slow

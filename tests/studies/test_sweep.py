@@ -6,8 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,9 @@ import aerobat as ab
 from aerobat.storage import read_arrays
 from aerobat.studies.flights import CHUNK
 from aerobat.studies.sweep import Share, Sweep, sweep
+from interrupted import Interrupted
 
+HERE = Path(__file__).parent
 RUNS = 2 * CHUNK + 20
 SEED = 7
 SPREAD = ab.Dispersion(mass=0.03, inertia=0.1, rotor=0.03, lag=0.25, start_position=0.02)  # quick to compile
@@ -77,21 +78,6 @@ def test_more_flights_begin_with_those_of_fewer() -> None:
 def test_other_seeds_are_other_flights() -> None:
     other = sweep(hop(), SPREAD, 3, SEED + 1, workers=1)
     assert not np.isin(other.table["mass"], whole().table["mass"]).any()
-
-
-class Interrupted(Executor):
-    """Flies so many chunks, then is interrupted as by Ctrl-C."""
-
-    def __init__(self, chunks: int) -> None:
-        self._left = chunks
-
-    def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        if self._left == 0:
-            raise KeyboardInterrupt
-        self._left -= 1
-        future.set_result(function(*args, **kwargs))
-        return future
 
 
 @pytest.mark.parametrize("chunks", [0, 2])
@@ -189,7 +175,7 @@ def test_a_sweep_that_is_killed_leaves_no_process_and_goes_on_where_it_stopped(
     done = subprocess.run(
         [sys.executable, str(script), str(int(number))],
         cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(HERE), str(HERE.parent / "support")])},
         capture_output=True,  # to its end: the pipes close when the last process that holds them ends
         text=True,
     )

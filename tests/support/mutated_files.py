@@ -39,8 +39,8 @@ from aerobat.simulation import load_flight
 from aerobat.simulation.autopilot import Recoveries
 from aerobat.storage import digest_of
 from aerobat.studies.flights import FlightTask
-from aerobat.studies.sweep.flights import fly_chunk
-from aerobat.studies.sweep.kept import KeptChunks
+from aerobat.studies.kept import KeptParts
+from aerobat.studies.sweep.flights import Chunk, fly_chunk
 from aerobat.trajectory import load_trajectory, save_trajectory
 from aerobat.vehicle.files import write_vehicle
 from damaged_files import csv_files, damaged_bytes, documents, lying_array, mutated_table
@@ -189,7 +189,12 @@ def sweep_task() -> FlightTask:
 
 def sweep_chunk(path: Path) -> None:
     """One kept flight of it."""
-    KeptChunks.of(path.parent, sweep_task()).write(range(1), fly_chunk(sweep_task(), range(1)))
+    kept_parts(path).write("flights-0-1", fly_chunk(sweep_task(), range(1)).arrays)
+
+
+def kept_parts(path: Path) -> KeptParts:
+    """The folder of a file, as parts of a sweep."""
+    return KeptParts.of(path.parent, ("flights", "sweep"), {"seed": 0})
 
 
 def described(path: Path) -> str:
@@ -205,7 +210,7 @@ def both(name: str, reader: Reader) -> dict[str, Reader]:
 
 def kept_chunk(path: Path) -> str:
     """A digest of what a kept chunk holds."""
-    chunk = KeptChunks(path.parent).read(range(1))
+    chunk = Chunk.of(KeptParts(path.parent).read("flights-0-1"), 1)
     if chunk is None:
         raise SpecError("it is flown again")
     return digest_of(dict(chunk.columns))
@@ -233,9 +238,7 @@ READERS: Mapping[str, Reader] = {
         archives,
         refusals=(ValueError, OSError),
     ),
-    "fingerprint": Reader(
-        "fingerprint.json", sweep_chunk, lambda path: KeptChunks.of(path.parent, sweep_task()), texts
-    ),
+    "fingerprint": Reader("fingerprint.json", sweep_chunk, kept_parts, texts),
     "path": Reader("x.csv", lambda path: write_csv(plan().trajectory, path, 20.0), certified_path, tables),
     "columns": Reader("x.csv", lambda path: write_columns(plan(), path, rate=20.0), certified_path, tables),
     "log": Reader("x.csv", flight_log, lambda path: read_flight_log(path, plan()), tables),

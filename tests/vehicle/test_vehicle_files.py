@@ -28,7 +28,7 @@ AGILE_QUAD = (PRESETS / "agile-quad.toml").read_text(encoding="utf-8")
 
 
 def test_the_presets_are_found_by_name_and_say_where_their_numbers_come_from() -> None:
-    assert vehicle_names() == ("agile-quad", "crazyflie", "hexarotor", "section-v")
+    assert vehicle_names() == ("agile-quad", "agilicious", "crazyflie", "hexarotor", "section-v", "x500")
     for name in vehicle_names():
         vehicle = load_vehicle(name)
         assert vehicle.name == name
@@ -63,6 +63,18 @@ def test_section_v_has_the_allocation_of_the_authors_code() -> None:
     vehicle = load_vehicle("section-v")
     np.testing.assert_allclose(vehicle.allocation, matrix)
     assert vehicle.mass == 1.4
+
+
+def test_x500_hovers_where_its_autopilot_looks_for_it() -> None:
+    """At 60 % of the thrust there is: MPC_THR_HOVER of PX4's airframe 4001_gz_x500."""
+    x500 = load_vehicle("x500")
+    assert 1.0 / x500.thrust_to_weight == pytest.approx(0.60, abs=0.01)
+    assert [rotor.spin for rotor in x500.rotors] == [
+        1,
+        1,
+        -1,
+        -1,
+    ]  # front right and rear left counter-clockwise
 
 
 def test_hexarotor_and_crazyflie_are_of_their_class() -> None:
@@ -278,10 +290,10 @@ def test_what_is_no_file_is_said_so(tmp_path: Path) -> None:
     [
         (
             "agile-qad",
-            "no vehicle named 'agile-qad'; did you mean 'agile-quad'? Known: agile-quad, crazyflie",
+            "no vehicle named 'agile-qad'; did you mean 'agile-quad'? Known: agile-quad, agilicious",
         ),
         ("Crazyflie", "no vehicle named 'Crazyflie'; did you mean 'crazyflie'? Known: agile-quad"),
-        ("zeppelin", "no vehicle named 'zeppelin'; known: agile-quad, crazyflie, hexarotor, section-v"),
+        ("zeppelin", "no vehicle named 'zeppelin'; known: agile-quad, agilicious, crazyflie, hexarotor"),
         ("", "no vehicle named ''; known: agile-quad"),
     ],
 )

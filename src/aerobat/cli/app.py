@@ -59,7 +59,7 @@ app = App(
     wrong or the output cannot be written (one sentence says where); 3 no plan was found (one sentence says
     which bound binds, and with --explain another which changes would help); 130 interrupted; 143
     terminated; then with nothing written. A sweep that was flown ends with 0, whatever became of its flights;
-    one that was interrupted keeps those that are finished, and the same command goes on from there. With
+    a sweep or a map that was interrupted keeps what is finished, and the same command goes on there. With
     --json an error is {"error": {"kind", "message", "field"}} on standard output. --traceback shows where a
     plugin fails.
     """,

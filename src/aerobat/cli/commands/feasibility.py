@@ -14,6 +14,7 @@ from aerobat.cli.options import OutputOptions, PlannerOptions, Workers, output, 
 from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import finish_study, is_of_a_run
 from aerobat.cli.runs.record import DEFAULT_TOLERANCE, FlightSettings, RunRecord
+from aerobat.cli.runs.unfinished import Unfinished
 from aerobat.cli.tasks import make_planner, read_task
 from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
@@ -26,6 +27,7 @@ from aerobat.studies.feasibility import (
     feasibility_map,
     min_requirements,
 )
+from aerobat.studies.feasibility.feasibility_map import finished_cells
 from aerobat.studies.feasibility.probe import TIME_LIMIT
 
 
@@ -78,8 +80,9 @@ def feasibility(
     With --over, each cell is planned as `aerobat plan` would plan it. The cell says planned, with duration
     and the limits that bind; not flyable, where the plan's own flight is not as it should be; no plan, where
     none is found; refused at sight, where what is asked contradicts itself or the limits; or no answer.
-    Writes map.csv (a row a cell), map.json, map.png and run.toml, by default to out/PROBLEM-map-FIELDS. Exits
-    with 0 once all cells are done, whatever they say.
+    Writes map.csv (a row a cell), map.json, map.png and run.toml, by default to out/PROBLEM-map-FIELDS. A
+    map that was interrupted or killed goes on where it stopped when the same command is given. Exits with 0
+    once all cells are done, whatever they say.
 
     Each plan has --time-limit seconds, 30 unless given; what has none by then counts as refused.
 
@@ -107,23 +110,26 @@ def feasibility(
     )
     require_replaceable(options.out or record.folder, is_of_a_run)  # before minutes of planning
     if options.over:
-        finish_map(map_of(record, options.workers), record, options)
+        finish_map(map_of(record, options, options.workers), record, options)
     else:
         finish_need(need_of(record, options.workers), record, options)
 
 
-def map_of(record: RunRecord, workers: str | None = None) -> FeasibilityMap:
-    """The map of a run, made anew.
+def map_of(record: RunRecord, options: OutputOptions, workers: str | None = None) -> FeasibilityMap:
+    """The map of a run; cells that are finished are kept beside the run's folder until that is written.
 
     Args:
         record: What is planned, and how.
+        options: Where to.
         workers: Who plans.
     """
     axes = [Axis.parse(text) for text in record.over]
     over = {axis.name: axis.values for axis in axes}
     if len(over) < len(axes):
         raise SpecError(f"--over names {axes[0].name} twice; give another field, or drop one")
-    with showing(Progress("cells", prod(len(axis.values) for axis in axes))) as progress:
+    count = prod(len(axis.values) for axis in axes)
+    unfinished = Unfinished.beside(options.out or record.folder)
+    with unfinished.kept("cells", count, finished_cells), showing(Progress("cells", count)) as progress:
         return feasibility_map(
             record.problem,
             over,
@@ -131,6 +137,7 @@ def map_of(record: RunRecord, workers: str | None = None) -> FeasibilityMap:
             record.planner,
             time_limit=TIME_LIMIT if record.time_limit is None else record.time_limit,
             workers=workers,
+            keep=unfinished.parts,
             progress=progress.counting("planned"),
         )
 
@@ -139,6 +146,7 @@ def finish_map(found: FeasibilityMap, record: RunRecord, options: OutputOptions)
     """Write a map, then show it."""
     name = f"map.{record.flight.table}"
     finish_study(found, record, options, lambda staging: write_table(found.table, staging / name))
+    Unfinished.beside(options.out or record.folder).remove()
 
 
 def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement, ...]:

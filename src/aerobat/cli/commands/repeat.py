@@ -89,7 +89,7 @@ def _repeat_sweep(folder: Path, record: RunRecord, options: RepeatOptions) -> Co
 
 def _repeat_map(folder: Path, record: RunRecord, options: RepeatOptions) -> Compared:
     old = read_table(folder / f"map.{record.flight.table}")
-    found = map_of(record)
+    found = map_of(record, options)
     finish_map(found, record, options)
     return old, found.table
 

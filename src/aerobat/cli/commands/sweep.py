@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,67 +14,42 @@ from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, 
 from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import finish_study, is_of_a_run
 from aerobat.cli.runs.record import RECORD, FlightSettings, RunRecord, read_record, write_record
+from aerobat.cli.runs.unfinished import Unfinished
 from aerobat.cli.tasks import plan_of, planned
-from aerobat.cli.terminal import say
 from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.planning import Plan, load_plan
 from aerobat.storage import require_replaceable
-from aerobat.studies.sweep.kept import finished_flights
 from aerobat.studies.sweep.result import Sweep
+from aerobat.studies.sweep.sweep import finished_flights
 from aerobat.studies.sweep.sweep import sweep as sweep_plan
-from aerobat.studies.workers import WorkerEnded
 
 PLAN = "sweep.plan"
 
 
-@dataclass(frozen=True)
-class Unfinished:
-    """The folder of an unfinished sweep, beside the one that it is for."""
+def _plan_kept(folder: Path, record: RunRecord, make: Callable[[RunRecord], Plan]) -> Plan:
+    """The plan of a sweep, kept or new; new ones are kept.
 
-    folder: Path
+    Args:
+        folder: Of the unfinished sweep.
+        record: Of the sweep.
+        make: Plans.
 
-    @classmethod
-    def beside(cls, folder: Path) -> Unfinished:
-        """Return the unfinished sweep beside the folder that the sweep is to be written to."""
-        return cls(folder.with_name(f"{folder.name}-unfinished"))
-
-    @property
-    def flights(self) -> Path:
-        """The folder of the finished flights."""
-        return self.folder / "flights"
-
-    @property
-    def finished(self) -> int:
-        """The number of finished flights that are kept."""
-        return finished_flights(self.flights)
-
-    def plan(self, record: RunRecord, make: Callable[[RunRecord], Plan]) -> Plan:
-        """The plan of a sweep, kept or new; new ones are kept.
-
-        Args:
-            record: Of the sweep.
-            make: Plans.
-
-        Raises SpecError where the flights are those of another sweep.
-        """
-        if all(os.path.exists(self.folder / name) for name in (RECORD, PLAN)):
-            if _without_runs(read_record(self.folder)) != _without_runs(record):
-                raise SpecError(
-                    f"{self.folder}/ keeps the flights of an unfinished sweep with other settings; repeat "
-                    "those to finish it, remove it, or give another --out"
-                )
-            return load_plan(self.folder / PLAN)
-        found = make(record)
-        found.save(self.folder / PLAN)
-        write_record(record, self.folder)
-        return found
-
-    def remove(self) -> None:
-        """Remove what a sweep needs no longer."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+    Raises SpecError where the flights are those of another sweep.
+    """
+    if all(os.path.exists(folder / name) for name in (RECORD, PLAN)):
+        if _without_runs(read_record(folder)) != _without_runs(record):
+            raise SpecError(
+                f"{folder}/ keeps the flights of an unfinished sweep with other settings; repeat "
+                "those to finish it, remove it, or give another --out"
+            )
+        return load_plan(folder / PLAN)
+    found = make(record)
+    found.save(folder / PLAN)
+    write_record(record, folder)
+    return found
 
 
 def _without_runs(record: RunRecord) -> RunRecord:
@@ -130,7 +104,7 @@ def sweep(
     def kept_or_new(record: RunRecord) -> Plan:
         folder = options.out or record.folder
         require_replaceable(folder, is_of_a_run)  # before hours of flying
-        return Unfinished.beside(folder).plan(record, plan_of)
+        return _plan_kept(Unfinished.beside(folder).folder, record, plan_of)
 
     plan, record = planned(problem, options, "sweep", settings, kept_or_new)
     finish_sweep(sweep_of(plan, record, options, sweeping.workers), record, options)
@@ -153,26 +127,19 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: str
     flight = record.flight
     assert flight.conditions is not None, "a sweep has conditions"
     unfinished = Unfinished.beside(options.out or record.folder)
-    try:
-        with showing(Progress("flown", flight.runs)) as progress:
-            return sweep_plan(
-                plan,
-                flight.conditions,
-                flight.runs,
-                flight.seed,
-                vehicle=record.vehicle,
-                controller=named_controller(flight.controller, record.vehicle.controller),
-                workers=workers,
-                keep=unfinished.flights,
-                progress=progress.counting("went well"),
-            )
-    except BaseException as error:
-        if not unfinished.finished:
-            unfinished.remove()
-        elif isinstance(error, KeyboardInterrupt | WorkerEnded):
-            kept = f"{unfinished.finished} of {flight.runs} flights are kept"
-            say(f"{kept}: the same command goes on from there")
-        raise
+    keeping = unfinished.kept("flights", flight.runs, finished_flights)
+    with keeping, showing(Progress("flown", flight.runs)) as progress:
+        return sweep_plan(
+            plan,
+            flight.conditions,
+            flight.runs,
+            flight.seed,
+            vehicle=record.vehicle,
+            controller=named_controller(flight.controller, record.vehicle.controller),
+            workers=workers,
+            keep=unfinished.parts,
+            progress=progress.counting("went well"),
+        )
 
 
 def finish_sweep(sweep: Sweep, record: RunRecord, options: OutputOptions) -> None:

@@ -57,6 +57,34 @@ class ObstacleMotion:
         """Return its velocity [m/s] at a time [s], (3,)."""
         return np.asarray(self.velocity + self.turns[self.times <= time].sum(axis=0))
 
+    def reach(self, begin: Array, end: Array) -> tuple[Array, Array]:
+        """Return the least and the most of how far it moves [m] from one time (...) to another, (..., 3)."""
+        ends = self.moved(np.stack([begin, end]))
+        lower, upper = ends.min(axis=0), ends.max(axis=0)
+        first = np.searchsorted(self.times, begin)
+        count = np.searchsorted(self.times, end, side="right") - first
+        passed = count > 0
+        if passed.any():
+            level = (
+                np.frexp(count[passed])[1] - 1
+            )  # of the longest stretch of 2^level rows among those passed
+            last = first[passed] + count[passed] - (1 << level)
+            for low, high in (self._extremes[:, level, first[passed]], self._extremes[:, level, last]):
+                lower[passed] = np.minimum(lower[passed], low)
+                upper[passed] = np.maximum(upper[passed], high)
+        return lower, upper
+
+    @cached_property
+    def _extremes(self) -> Array:
+        """The least and the most of how far it moves at 2^level rows from each on, (2, levels, k, 3)."""
+        lower = upper = self.moved(self.times)
+        levels = [(lower, upper)]
+        for level in range(len(self.rows).bit_length() - 1):
+            ahead = np.minimum(np.arange(len(self.rows)) + (1 << level), len(self.rows) - 1)
+            lower, upper = np.minimum(lower, lower[ahead]), np.maximum(upper, upper[ahead])
+            levels.append((lower, upper))
+        return np.stack(levels, axis=1)
+
 
 @dataclass(frozen=True, eq=False)
 class ConvexPiece:

@@ -123,10 +123,9 @@ class Pieces:
         """The corners of the boxes around all pieces over times (...), (..., P, 3) each."""
         lower, upper = (np.broadcast_to(each, (*shape, *each.shape)).copy() for each in self._boxes)
         for number, motion in self.moving:
-            inside = [np.clip(time, begin, end) for time in motion.times.tolist()]
-            moved = motion.moved(np.stack([begin, end, *inside]))
-            lower[..., number, :] += moved.min(axis=0)
-            upper[..., number, :] += moved.max(axis=0)
+            least, most = motion.reach(begin, end)
+            lower[..., number, :] += least
+            upper[..., number, :] += most
         return lower, upper
 
     def separated(

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import product
-from math import floor, isfinite, nan, prod
+from math import floor, isfinite, isnan, nan, prod
+from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
@@ -15,13 +16,24 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field as Bounds
 
-from aerobat.declaration import NonNegative, Seed, by_value, in_notebooks, short, shown, validated
+from aerobat.declaration import (
+    NonNegative,
+    PathName,
+    Seed,
+    by_value,
+    in_notebooks,
+    short,
+    shown,
+    to_table,
+    validated,
+)
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
 from aerobat.planning import Planner, as_planner
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, ProbedTask, least_reserve, probe
 from aerobat.studies.flights import FlightTask, fly_scores
+from aerobat.studies.kept import KeptParts, fingerprint, names_of_parts
 from aerobat.studies.lens import Lens, Scenario, lens
 from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool, Workers, pool
@@ -122,6 +134,24 @@ class Cell:
         """True where there is a plan that is certified and flies."""
         return self.feasibility is Feasibility.PLANNED
 
+    @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays that files keep of it."""
+        numbers = [nan if number is None else number for number in (self.duration, self.reserve)]
+        passed = [] if self.passed is None else [self.passed.count, self.passed.of]
+        words = [self.feasibility.value, self.sentence, *self.limits]
+        return {"numbers": np.array(numbers), "passed": np.array(passed, dtype=int), "words": np.array(words)}
+
+    @classmethod
+    def of(cls, values: tuple[float, ...], arrays: Mapping[str, NDArray[Any]] | None) -> Cell | None:
+        """The cell of these values that a file keeps; None of anything else."""
+        if arrays is None or set(arrays) != {"numbers", "passed", "words"}:
+            return None
+        duration, reserve = (None if isnan(number) else number for number in arrays["numbers"].tolist())
+        feasibility, sentence, *limits = arrays["words"].tolist()
+        passed = Share(*arrays["passed"].tolist()) if len(arrays["passed"]) else None
+        return cls(values, Feasibility(feasibility), duration, tuple(limits), reserve, sentence, passed)
+
 
 @in_notebooks
 @short
@@ -179,6 +209,7 @@ def feasibility_map(
     seed: Seed = 0,
     workers: Workers | None = None,
     executor: Executor | None = None,
+    keep: PathName | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> FeasibilityMap:
     """Plan a problem for all values of one or two fields, and say which limits bind.
@@ -199,9 +230,11 @@ def feasibility_map(
         seed: of the flights.
         workers: processes, by default one a core; 1 plans in this process; dask://HOST:PORT on a cluster.
         executor: any of `concurrent.futures` that plans instead, as a `dask.distributed` client's.
+        keep: a folder for finished cells, from which a map that was ended goes on; it stays.
         progress: called with the cells done, and of them those that are planned, as they are finished.
 
-    Raises SpecError for names of no field, and for values that a field cannot take.
+    Raises SpecError for names of no field, for values that a field cannot take, and for a folder that keeps
+    another map's cells.
     """
     chosen = None if planner is None else as_planner(planner)
     varied = None if conditions is None else as_dispersion(conditions)
@@ -210,15 +243,43 @@ def feasibility_map(
     fields = _fields(axes, scenario)
     task = ProbedTask(scenario, fields, time_limit, range(flights), seed)
     places = list(product(*(axis.values for axis in axes)))
-    cells: dict[tuple[float, ...], Cell] = {}
-    with pool(workers, executor, len(places)) as planning:
-        for values, cell in planning.results(_cell, task, places):
+    kept = None if keep is None else KeptParts.of(Path(keep), ("cells", "map"), _asked(axes, task))
+    known = {} if kept is None else {place: Cell.of(place, kept.read(_name(place))) for place in places}
+    cells = {place: cell for place, cell in known.items() if cell is not None}
+    missing = [place for place in places if place not in cells]
+    with pool(workers, executor, len(missing)) as planning:
+        for values, cell in planning.results(_cell, task, missing):
             cells[values] = cell
+            if kept is not None:
+                kept.write(_name(values), cell.arrays)
             if progress is not None:
                 progress(len(cells), sum(cell.is_planned for cell in cells.values()))
     told = tuple(replace(axis, unit=field.unit) for axis, field in zip(axes, fields, strict=True))
     found = tuple(cells[values] for values in places)
     return FeasibilityMap(scenario.problem, scenario.vehicle, told, found)
+
+
+def finished_cells(folder: Path) -> int:
+    """Return the number of cells that a folder keeps."""
+    return len(names_of_parts(folder))
+
+
+def _name(values: tuple[float, ...]) -> str:
+    return "-".join(["cell", *map(str, values)])
+
+
+def _asked(axes: Sequence[Axis], task: ProbedTask) -> dict[str, Any]:
+    """All that the answers of cells depend on, beside their values."""
+    scenario = task.scenario
+    return {
+        "problem": fingerprint(to_table(scenario.problem)),
+        "vehicle": fingerprint(to_table(scenario.vehicle)),
+        "planner": None if scenario.planner is None else fingerprint(to_table(scenario.planner)),
+        "conditions": None if scenario.conditions is None else fingerprint(to_table(scenario.conditions)),
+        "fields": [axis.name for axis in axes],
+        "time limit": task.time_limit,
+        "flights": [task.flights.stop, task.seed],
+    }
 
 
 def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Lens, ...]:

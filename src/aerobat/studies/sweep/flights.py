@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -24,6 +24,8 @@ NEAREST, CLEARANCE = "nearest", "clearance_m"  # columns where there are obstacl
 AGAIN = "#"  # between a gate's name and the number of its passage, from the second on
 
 Columns = dict[str, NDArray[Any]]
+
+_OVER_TIME = ("times", "position_error", "attitude_error")  # of a chunk
 
 _ERRORS = tuple(field.name for field in fields(Score)[:5])
 _PASSAGE = (  # numbers of a passage, each with the name of its column after the gate's
@@ -47,6 +49,25 @@ class Chunk:
     times: Array  # [s], (T,); none where no flight is sampled
     position_error: Array  # [m], (sampled flights, T)
     attitude_error: Array  # [rad], (sampled flights, T)
+
+    @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays that files keep of it."""
+        columns = {f"column_{k}": column for k, column in enumerate(self.columns.values())}
+        over_time = {name: getattr(self, name) for name in _OVER_TIME}
+        return {"names": np.array(list(self.columns))} | over_time | columns
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, NDArray[Any]] | None, count: int) -> Chunk | None:
+        """The chunk of so many flights that a file keeps; None of anything else."""
+        if arrays is None:
+            return None
+        try:
+            columns = {str(name): arrays[f"column_{k}"] for k, name in enumerate(arrays["names"])}
+            found = cls(columns, *(arrays[name] for name in _OVER_TIME))
+        except (KeyError, TypeError):
+            return None
+        return found if all(column.shape == (count,) for column in columns.values()) else None
 
 
 def fly_chunk(task: FlightTask, flights: range) -> Chunk:

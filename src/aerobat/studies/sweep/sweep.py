@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
 from aerobat.control import ControlLaw, Controller, named_controller
-from aerobat.declaration import PathName, Seed, validated
+from aerobat.declaration import PathName, Seed, to_table, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.flatness import vehicle_of
 from aerobat.planning import Plan
 from aerobat.simulation import Outcome
 from aerobat.studies.flights import CHUNK, TOGETHER, FlightTask, cut
-from aerobat.studies.sweep.flights import Chunk, fly_chunk
-from aerobat.studies.sweep.kept import KeptChunks
+from aerobat.studies.kept import KeptParts, fingerprint, names_of_parts
+from aerobat.studies.sweep.flights import SAMPLED, STRIDE, Chunk, fly_chunk
 from aerobat.studies.sweep.result import Sweep
 from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle
@@ -74,12 +75,12 @@ def sweep(
     if isinstance(controller, str):
         controller = named_controller(controller, vehicle.controller)
     task = FlightTask(plan, vehicle, conditions, seed, controller or vehicle.controller, engine, batch)
-    kept = None if keep is None else KeptChunks.of(Path(keep), task)
+    kept = None if keep is None else KeptParts.of(Path(keep), ("flights", "sweep"), _asked(task))
     spans = cut(range(runs))
     tally = _Tally(progress)
     chunks = {}
     for flights in spans:
-        found = None if kept is None else kept.read(flights)
+        found = None if kept is None else Chunk.of(kept.read(_name(flights)), len(flights))
         if found is not None:
             chunks[flights] = tally.counted(found)
     missing = [flights for flights in spans if flights not in chunks]
@@ -87,9 +88,40 @@ def sweep(
         flown = flying.results(fly_chunk, task, missing, together=TOGETHER, compiles=True)
         for flights, chunk in flown:
             if kept is not None:
-                kept.write(flights, chunk)
+                kept.write(_name(flights), chunk.arrays)
             chunks[flights] = tally.counted(chunk)
     return _joined(task, [chunks[flights] for flights in spans])
+
+
+def finished_flights(folder: Path) -> int:
+    """Return the number of flights that a folder keeps."""
+    spans = (name.split("-")[1:] for name in names_of_parts(folder))
+    return sum(int(end) - int(begin) for begin, end in spans)
+
+
+def _name(flights: range) -> str:
+    return f"flights-{flights.start}-{flights.stop}"
+
+
+def _asked(task: FlightTask) -> dict[str, Any]:
+    """All that the numbers of flights depend on; batches are not among it."""
+    trajectory = task.plan.trajectory
+    plan = {
+        "problem": to_table(task.plan.problem),
+        "stages": [asdict(stage) for stage in task.plan.stages],
+        "durations": trajectory.durations.tolist(),
+        "coefficients": trajectory.coefficients.tolist(),
+        "heading": trajectory.heading,
+    }
+    return {
+        "plan": fingerprint(plan),
+        "vehicle": fingerprint(to_table(task.vehicle)),
+        "conditions": fingerprint(to_table(task.conditions)),
+        "seed": task.seed,
+        "controller": fingerprint(to_table(task.controller)),
+        "engine": task.engine,
+        "chunks": [CHUNK, SAMPLED, STRIDE],
+    }
 
 
 class _Tally:
