@@ -57,6 +57,12 @@ def timed_stages(places: Sequence[PlacedStage], problem: Problem) -> tuple[tuple
     return tuple(found)
 
 
+def as_passed(gates: Sequence[Gate], stages: Sequence[PlacedStage]) -> tuple[Gate, ...]:
+    """Gates where they are when placed stages pass them; those that none passes, where they are at first."""
+    times = {place.gate: place.time for place in stages}
+    return tuple(gate.at(times.get(gate.name, 0.0)) for gate in gates)
+
+
 def planned_passages(stages: Sequence[PlacedStage], problem: Problem) -> tuple[PlannedPassage, ...]:
     """The gates that are passed at placed stages, as the problem's own stages ask, in their order."""
     asked = timed_stages(stages, problem)

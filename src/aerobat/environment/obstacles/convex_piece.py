@@ -47,6 +47,16 @@ class ObstacleMotion:
             moved += np.stack(along, axis=-1)
         return np.asarray(moved)
 
+    @property
+    def turns(self) -> Array:
+        """By how much the velocity jumps at each of `times` [m/s], (k, 3)."""
+        slopes = np.diff(self.rows[:, 1:], axis=0) / np.diff(self.times)[:, None]
+        return np.diff(slopes, axis=0, prepend=0.0, append=0.0) if len(self.rows) else self.rows[:, 1:]
+
+    def velocity_at(self, time: float) -> Array:
+        """Return its velocity [m/s] at a time [s], (3,)."""
+        return np.asarray(self.velocity + self.turns[self.times <= time].sum(axis=0))
+
     def reach(self, begin: Array, end: Array) -> tuple[Array, Array]:
         """Return the least and the most of how far it moves [m] from one time (...) to another, (..., 3)."""
         ends = self.moved(np.stack([begin, end]))
@@ -73,16 +83,6 @@ class ObstacleMotion:
             lower, upper = np.minimum(lower, lower[ahead]), np.maximum(upper, upper[ahead])
             levels.append((lower, upper))
         return np.stack(levels, axis=1)
-
-    @property
-    def turns(self) -> Array:
-        """By how much the velocity jumps at each of `times` [m/s], (k, 3)."""
-        slopes = np.diff(self.rows[:, 1:], axis=0) / np.diff(self.times)[:, None]
-        return np.diff(slopes, axis=0, prepend=0.0, append=0.0) if len(self.rows) else self.rows[:, 1:]
-
-    def velocity_at(self, time: float) -> Array:
-        """Return its velocity [m/s] at a time [s], (3,)."""
-        return np.asarray(self.velocity + self.turns[self.times <= time].sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False)

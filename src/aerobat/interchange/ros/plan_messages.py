@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
+from aerobat.environment.obstacles.surface import Surface
 from aerobat.flatness import Reference, reference
 from aerobat.interchange.ros.messages import BODY, NANOSECONDS, JointMotion, Messages, RosMessage
 from aerobat.interchange.solids import solid_surfaces
@@ -71,19 +73,30 @@ class PlanMessages:
             yield self._array(self._stamp(time), discs)
 
     def lines(self, found: Reference) -> Sequence[RosMessage]:
-        """Markers of the path, sampled as `found`, of the gates and of obstacles."""
+        """Markers of the path, sampled as `found`, and of the gates and obstacles that stand still."""
         stamp, path = self._stamp(0.0), found.setpoint.flat.position + self.origin
-        lines = [self.messages.line(stamp, "path", path, width=PATH_WIDTH, color=GREY)]
+        line = self.messages.line(stamp, "path", path, width=PATH_WIDTH, color=GREY)
+        return [line, *self._around(0.0, moving=False)]
+
+    def _around(self, time: float, moving: bool, when: str = "") -> Iterator[RosMessage]:
+        """Markers of the gates and obstacles that move, or that do not, where they are at a time [s]."""
+        stamp = self._stamp(time)
         for gate in self.plan.problem.gates:
-            frame = np.concatenate([gate.outline, gate.outline[:1]]) + self.origin
-            lines.append(self.messages.line(stamp, gate.name, frame, width=FRAME_WIDTH, color=ORANGE))
-        for number, solid in enumerate(solid_surfaces(self.plan), 1):
-            corners = solid.triangles.reshape(-1, 3) + self.origin
-            lines.append(self.messages.solid(stamp, solid.name, number, corners=corners, color=GREY))
-        return lines
+            if (gate.motion is not None) is moving:
+                outline = gate.at(time).outline
+                frame = np.concatenate([outline, outline[:1]]) + self.origin
+                yield self.messages.line(stamp, gate.name + when, frame, width=FRAME_WIDTH, color=ORANGE)
+        for number, solid in enumerate(self._solids, 1):
+            if (solid.motion is not None) is moving:
+                corners = solid.at(time).triangles.reshape(-1, 3) + self.origin
+                yield self.messages.solid(stamp, solid.name + when, number, corners=corners, color=GREY)
+
+    @cached_property
+    def _solids(self) -> tuple[Surface, ...]:
+        return solid_surfaces(self.plan)
 
     def snapshots(self, every: float = np.inf) -> Iterator[tuple[float, Sequence[RosMessage]]]:
-        """Markers of the vehicle at the start, at each stage and at the end, after their times [s].
+        """Markers of the vehicle and all that moves: at the start, stages and the end, after their times [s].
 
         `every`: so often [s] on the way, too.
         """
@@ -95,7 +108,8 @@ class PlanMessages:
         shown = reference(self.plan, times=[time for _, time in instants]).setpoint
         for row, (name, time) in enumerate(instants):
             position, q = shown.flat.position[row] + self.origin, shown.q_world_body[row]
-            yield time, self._vehicle(f"vehicle: {name}", row, position, q, self._stamp(time))
+            vehicle = self._vehicle(f"vehicle: {name}", row, position, q, self._stamp(time))
+            yield time, [*vehicle, *self._around(time, moving=True, when=f": {name}")]
 
     def _vehicle(self, name: str, row: int, position: Array, q: Array, stamp: int) -> Sequence[RosMessage]:
         """The rotors and arms of the vehicle at one instant, numbered apart from those of others of its name.

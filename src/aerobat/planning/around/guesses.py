@@ -26,6 +26,7 @@ CLOSEST = 0.5  # [m] from one corner of a route to the next
 # how near straight lines cut corners, of a cell, and times the duration of a closed form, in turn: slits are
 # reached from slow ones, windows by those that cut no corner
 STARTS = ((0.1, 1.4), (0.0, 1.4), (0.1, 1.8), (0.0, 1.0))
+SIDEWAYS = (0.1, 2.6)  # the first of a body on its side: from slower ones narrow slits are reached soonest
 HURRIED = 0.5  # of the vehicle's thrust that accelerates it, by which the duration is foreseen
 LATE = (1.0, 1.4, 0.7)  # times that duration, at which routes pass what moves: behind it, or in front
 BOTH_WAYS = 0.5  # of an upright's height, below which the body may turn either way
@@ -68,7 +69,8 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
     narrowest = min((gate.opening.inradius for gate in walls), default=inf)
     body = task.vehicle.bounding_ellipsoid.revolved
     found = [(grid, way) for grid in grids for way in routes(grid, legs, ceil(count / len(grids)))]
-    for turned, (slack, pace) in product(_turned(task) if found else (), STARTS):
+    turns = _turned(task) if found else ()
+    for turned, (slack, pace) in product(turns, (SIDEWAYS, *STARTS) if any(turns) else STARTS):
         paths = []
         for flown, clear in _different(found, slack):
             room = min(narrowest, clear) - min(body.wide, body.high)

@@ -11,6 +11,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.environment.obstacles import ConvexPiece
 from aerobat.planning import PlacedStage
+from aerobat.planning.passages import as_passed
 from aerobat.problem.gate import Gate
 from aerobat.reporting.page import HEADING, legend, size_of
 from aerobat.reporting.panels.poses import PoseHistory
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 POSES = 20  # time steps at which the vehicle is drawn, fewer where it would cover itself
 SIZE = 0.085  # of the vehicle as drawn, relative to the path's extent
 CLEAR = 1.0  # from one drawn vehicle to the next, at least, relative to the vehicle as drawn
+GHOSTS = 6  # one of so many drawn vehicles has all that moves beside it, where it is then
 MARKED = 3  # of so many gaps between drawn vehicles one has an arrowhead
 DIRECTION = 0.03  # of an arrowhead, likewise
 BELOW = 0.06  # by which a reference path is drawn under an actual one, likewise
@@ -65,7 +67,7 @@ def draw_path(
         vehicle: Whose glyph is drawn.
         gates: All gates of the problem; the picture holds each of them.
         stages: Of which those without a gate are marked by diamonds.
-        pieces: Of obstacles, which are drawn where they are near.
+        pieces: Of obstacles, drawn where they are near; those that move where they are beside some vehicles.
         size: Of the vehicle as drawn, relative to the path's extent.
 
     Returns:
@@ -73,14 +75,14 @@ def draw_path(
     """
     scale = enlargement(vehicle, size * reference.extent)
     reach = scale * span(vehicle)
-    paths = [poses.path for poses in (reference, *actual)]
-    surfaces, points = surfaces_beside(pieces, [*paths, gate_corners(gates)])
+    gates, poses = as_passed(gates, stages), actual[0] if actual else reference
+    rows, step = pose_samples(poses, reach, gates)
+    paths = [each.path for each in (reference, *actual)]
+    surfaces, points = surfaces_beside(pieces, [*paths, gate_corners(gates)], poses.times[rows[::GHOSTS]])
     box = box_around(points, 0.6 * reach)
     camera = best_view(reference.path, gates, box.corners, room_for_box(size_of(axes)))
     draw_axes_box(axes, box, camera)
     floor = float(box.lower[2])
-    poses = actual[0] if actual else reference
-    rows, step = pose_samples(poses, reach, gates)
     shapes = _path_shapes(reference, actual, floor) + obstacle_shapes(surfaces, camera)
     for gate in gates:
         lowest = np.sort(gate.outline[:, 2])[:2].mean()  # the middle of the lower edge

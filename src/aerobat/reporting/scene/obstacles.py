@@ -21,15 +21,20 @@ CELLS = 12  # to which the longest side of what is shown is cut: each is before 
 
 
 def surfaces_beside(
-    pieces: Sequence[ConvexPiece], points: Sequence[Array]
+    pieces: Sequence[ConvexPiece], points: Sequence[Array], times: Array | None = None
 ) -> tuple[tuple[Surface, ...], Array]:
     """Return what is seen of obstacles around points, and all points that a picture must hold, (n, 3).
 
     Args:
         pieces: Of the obstacles.
         points: Of paths and gates [m], (n, 3) each.
+        times: At which those that move are seen [s]; without any as they are at first, with their motion.
     """
     surfaces = surfaces_around(pieces, np.concatenate(points)) if pieces else ()
+    if times is not None:
+        still = [each for each in surfaces if each.motion is None]
+        moving = [each for each in surfaces if each.motion is not None]
+        surfaces = (*still, *(each.at(time) for time in times.tolist() for each in moving))
     return surfaces, np.concatenate([*points, *(surface.points for surface in surfaces)])
 
 
