@@ -155,7 +155,7 @@ def test_recoveries_of_unequal_lengths_are_refused(
         ({"problem": {"name": "x"}}, "is missing; add it"),
         ({"evidence": {"planner": 3}}, "it is damaged"),
         ({"durations": np.array([-1.0])}, "durations must be"),
-        ({"heading": np.array([1.0, 2.0])}, "it is damaged"),
+        ({"heading": np.array([1.0, 2.0])}, "heading must be a number"),
     ],
 )
 def test_a_file_that_is_no_plan_is_refused_in_one_sentence(
