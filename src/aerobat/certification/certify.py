@@ -18,7 +18,7 @@ from aerobat.certification import quantities
 from aerobat.certification.attitude import ThrustDirectionRates
 from aerobat.certification.body_path import BodyPath
 from aerobat.certification.certificate import Certificate, Finding, Side
-from aerobat.certification.clearance import clearance_finding
+from aerobat.certification.clearance import clearance_finding, frame_findings
 from aerobat.certification.continuity import discontinuities, seam
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.interpolation_error import accuracy
@@ -33,7 +33,6 @@ from aerobat.certification.enclosure.queries import (
 )
 from aerobat.certification.envelope import Envelope
 from aerobat.certification.path.ends import end_findings
-from aerobat.certification.path.frames import frame_findings
 from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
 from aerobat.certification.subdivision import Subdivision, subdivide

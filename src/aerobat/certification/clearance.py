@@ -10,10 +10,15 @@ above it. With the tangent in place of s, φ is linear in position p and thrust 
 are known. Branch and bound looks at parts of the path, each beside one piece. It takes n at the middle of a
 part and bounds φ along the part. What may yet be nearer than the nearest that was found is cut into shorter
 parts. DERIVATION.md, section 9, has the details.
+
+As flights are judged, a gate's frame is its plane around the opening, without an end and as thin as nothing.
+It counts while the body, or its centre within PASSAGE_DEPTH, is at that plane without a break, near enough to
+touch the circle about the opening.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -26,7 +31,9 @@ from aerobat.certification.certificate import Finding, Side, Verdict
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.extrema import parabola_maximum
 from aerobat.certification.enclosure.queries import SUMMATION_ROUNDING
+from aerobat.certification.envelope import PASSAGE_DEPTH, PlannedPassage
 from aerobat.environment.obstacles import Pieces
+from aerobat.problem import Gate
 from aerobat.trajectory.subintervals import Subintervals
 
 CLEARANCE_TIGHTNESS = 3e-4  # [m] how near the proven bound is to what is reached
@@ -75,6 +82,43 @@ def clearance_finding(attitude: BodyPath | None, ball: BodyPath, pieces: Pieces)
     value = max(nearest.value, bound)  # where bodies overlap, another plane may separate them better
     found = Finding("clearance", "m", Side.MIN, value, bound, nearest.time, 0.0, verdict)
     return replace(found, obstacle=nearest.obstacle, field="environment.obstacles")
+
+
+def frame_findings(
+    attitude: BodyPath | None, ball: BodyPath, passages: Sequence[PlannedPassage]
+) -> list[Finding]:
+    """The findings about the body's least gap from the frame of each gate as it passes.
+
+    Args:
+        attitude: The body where its attitude is determined, if it is anywhere.
+        ball: The ball around the body, on the rest of the path.
+        passages: Where the path passes gates.
+    """
+    return [_clear(attitude, ball, passage) for passage in passages]
+
+
+def _clear(attitude: BodyPath | None, ball: BodyPath, passage: PlannedPassage) -> Finding:
+    """The finding about one passage."""
+    gate, reach = passage.gate, ball.body.reach
+    around = gate.opening.circumradius + reach
+    paths = [path for path in (attitude, ball) if path is not None]
+    away = np.sort(np.concatenate([_away(path, gate, around) for path in paths]))
+    begin = away[away < passage.time].max(initial=0.0)
+    end = away[away > passage.time].min(initial=ball.trajectory.duration)
+    known = None if attitude is None else attitude.during(begin, end)
+    found = clearance_finding(known, ball.during(begin, end), Pieces(gate.plane_around(around + reach)))
+    return replace(found, gate=gate.name, obstacle=None, field="")
+
+
+def _away(path: BodyPath, gate: Gate, around: float) -> Array:
+    """Instants [s] at which the body on a path is not about a gate's opening, within `around` [m] of it."""
+    times, centres, axes = path.sampled
+    offset = centres - gate.places(times)
+    height, along = offset @ gate.normal, axes @ gate.normal
+    body = path.body
+    touched = np.sqrt(body.wide**2 + (body.high**2 - body.wide**2) * along**2) + body.aside
+    is_off = np.minimum(np.abs(height + body.up * along) - touched, np.abs(height) - PASSAGE_DEPTH) > 0.0
+    return np.asarray(times[is_off | (np.linalg.norm(offset, axis=1) > around)])
 
 
 def least_gap(path: BodyPath, pieces: Pieces) -> LeastGap:
