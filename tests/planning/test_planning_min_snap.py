@@ -21,6 +21,7 @@ from aerobat.problem import (
 )
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import load_vehicle
+from shared_plans import closed_form
 
 
 @pytest.fixture(scope="module")
@@ -91,10 +92,9 @@ def test_a_path_through_waypoints_meets_them_all_and_is_certified(order: int) ->
 
 
 def test_a_gate_is_passed_with_its_attitude() -> None:
-    problem, vehicle = load_problem("half-flip"), load_vehicle("agile-quad")
-    found = plan(problem, MinSnap(), vehicle)
+    found, vehicle = closed_form(), load_vehicle("agile-quad")
     (stage,) = found.stages
-    gate = problem.gate(stage.gate)
+    gate = found.problem.gate(stage.gate)
     setpoint = reference(found.trajectory, vehicle, times=[stage.time]).setpoint
     np.testing.assert_allclose(setpoint.flat.position[0], gate.position, atol=1e-9)
     thrust = setpoint.flat.acceleration[0] + [0.0, 0.0, STANDARD_GRAVITY]

@@ -142,7 +142,8 @@ def test_the_thrust_to_weight_ratio_is_what_it_is_set_to_and_shared_as_before(ra
         ("vehicle.masss", "vehicle.masss is not a known key; did you mean 'mass'?"),
         (
             "velocity",
-            "velocity may be start.velocity or goal.velocity or limits.velocity; give the whole name",
+            "velocity may be start.velocity or goal.velocity or gates[0].velocity or limits.velocity; "
+            "give the whole name",
         ),
         ("gates[3].width", "gates has no [3]; give a number from [0] to [0]"),
         ("goal.position", "goal.position: this is an array of the shape (3,), which cannot be varied"),

@@ -36,7 +36,7 @@ from aerobat.problem import problem_names
 from aerobat.storage import digest_of
 from aerobat.vehicle import vehicle_names
 from random_command_lines import faults
-from shared_plans import shared_plan
+from shared_plans import closed_form
 
 NUMBERS = (0, -1, 1e300, -1e300, 1e-300, 1e-7, 1e17, 1e29, float("nan"), float("inf"), 3, 2**70)
 VALUES = (*NUMBERS, "", "text\nof two lines", True, [], {}, [1.0], [[1.0, 2.0], [3.0]], None)
@@ -213,8 +213,8 @@ def planning_lines(rng: random.Random) -> Iterator[list[str]]:
 
 def checking_lines(rng: random.Random) -> Iterator[list[str]]:
     """Write a damaged plan or CSV file, and yield a command line that reads it, without end."""
-    shared_plan("half-flip", planner="min-snap").save("whole.plan")
-    write_columns(shared_plan("half-flip", planner="min-snap"), "whole.csv")
+    closed_form().save("whole.plan")
+    write_columns(closed_form(), "whole.csv")
     whole = {kind: Path(f"whole.{kind}").read_bytes() for kind in ("plan", "csv")}
     drawn = {"plan": plan_files(whole["plan"], rng), "csv": csv_files(whole["csv"], rng)}
     while True:

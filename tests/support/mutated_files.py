@@ -46,7 +46,7 @@ from aerobat.vehicle.files import write_vehicle
 from damaged_files import csv_files, damaged_bytes, documents, lying_array, mutated_table
 from flight_package import read_flight_package
 from places import CASES
-from shared_plans import shared_flight, shared_plan
+from shared_plans import closed_form, shared_flight
 
 MAX_SECONDS, MAX_MEGABYTES = 5.0, 500.0
 LONG = (  # what parsers take long or much memory for
@@ -140,7 +140,7 @@ def swelling(content: Mapping[str, Any], rng: random.Random) -> bytes:
 @cache
 def plan() -> ab.Plan:
     """A plan with all that a file may hold of one."""
-    found = shared_plan("half-flip", planner="min-snap")
+    found = closed_form()
     return replace(found, recoveries=Recoveries(*np.ones((4, 5)), reaction=0.1, ground=None))
 
 

@@ -64,6 +64,8 @@ def _columns(path: Path, duration: float) -> dict[str, Array]:
         text = read_whole(path, MAX_LOG).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise SpecError("it is no text; give a CSV file") from None
+    except OSError as error:
+        raise SpecError(f"it cannot be read ({error.strerror or error}); check the path") from None
     if not has_header(text):
         raise SpecError("line 1: it names no columns; a log needs t, x, y, z, qw, qx, qy, qz and f0, f1, ...")
     needed = (*NAMES["time"], *NAMES["position"], *NAMES["attitude"])

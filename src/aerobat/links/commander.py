@@ -88,7 +88,7 @@ class Commander:
         return "" if self.mission is None else self.mission.reason
 
     def way(self, now: float) -> tuple[Array, float, float] | None:
-        """Where a way to a hover or to the ground ends [m], its yaw [rad], and its time left [s]."""
+        """The end of a way to a hover or to the ground [m], its yaw [rad], and its time left [s]."""
         if self._way is None:
             return None
         path, began, yaw = self._way

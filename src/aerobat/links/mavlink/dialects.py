@@ -1,4 +1,4 @@
-"""Where autopilots' MAVLink differs: modes, thrust, states, taking off, refusals. One value for each."""
+"""The dialects of autopilots' MAVLink: modes, thrust, states, taking off, refusals. One value for each."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class RequiredBits(NamedTuple):
 
 @dataclass(frozen=True)
 class Dialect:
-    """How one autopilot speaks MAVLink."""
+    """The words in which one autopilot speaks MAVLink."""
 
     autopilot: int  # its number in heartbeats, MAV_AUTOPILOT
     firmware: int  # the version for which clients take the simulated vehicle

@@ -40,14 +40,14 @@ class Ros2(Middleware, Protocol):
     """A node's access to ROS 2, with services of others."""
 
     def client(self, service: str, kind: str) -> Callable[..., None]:
-        """What asks a service that is there, by its request's fields; its answer is not waited for."""
+        """Return a function that asks a service by its request's fields, and waits for no answer."""
 
     def serve(self, service: str, kind: str, take: Callable[[RosMessage], None]) -> None:
         """Offer a service whose answer is empty."""
 
 
 class Crazyflie:
-    """What the server is told at each tick; see `take`."""
+    """The orders that the server is given at each tick; see `take`."""
 
     def __init__(self, ros: Ros2, name: str) -> None:
         """Find the services of a Crazyflie by its name, as in /cf231."""

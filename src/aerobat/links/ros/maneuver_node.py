@@ -48,7 +48,7 @@ class NodeSettings:
 
 
 class Tick(NamedTuple):
-    """What is due at one tick, for what flies the vehicle."""
+    """The orders that are due at one tick, for what flies the vehicle."""
 
     piece: PathPiece | None  # of the path, that begins; None where there is no goal
     seen: Observed | None  # the last state, None before the first
