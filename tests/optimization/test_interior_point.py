@@ -174,12 +174,3 @@ def test_known_multipliers_lead_to_the_same_minimum_sooner(seed: int) -> None:
     assert again.converged
     assert abs(program.cost @ (again.x - found.x)) < 1e-5 * (1.0 + abs(program.cost @ found.x))
     assert again.iterations <= found.iterations
-
-
-def test_a_run_that_no_step_takes_further_ends_long_before_its_iterations() -> None:
-    """No x mends 0 x ≤ −1, and the box is soon reached."""
-    nothing = np.zeros((1, 1))
-    program = Quadratics(np.ones(1), nothing[None], nothing, -np.ones(1), np.zeros((0, 1)), np.zeros(0))
-    found = interior_point(program, np.array([0.5]), replace(ACCURATE, iterations=1000, gain=1e-3))
-    assert not found.converged
-    assert found.iterations < 200

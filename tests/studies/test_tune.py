@@ -10,15 +10,16 @@ import pytest
 import aerobat as ab
 from aerobat.control import Controller, named_controller
 from aerobat.studies.tune import MAX_FACTOR, TUNED
-from shared_plans import shared_plan
+from shared_plans import GENTLE, shared_plan
 
 WEAK = ab.Dispersion(name="weak", mass=0.03, rotor=0.03, lag=0.1, start_position=0.02, start_velocity=0.02)
 FLIGHTS = 20
 HALVED = replace(Controller(), **{name: 0.5 * getattr(Controller(), name) for name in TUNED})
 
 
+@cache
 def half_flip() -> ab.Plan:
-    return shared_plan("half-flip", "agile-quad", ab.Miqp(order=4, reserve=0.15))
+    return ab.plan(GENTLE, ab.Miqp(order=4, reserve=0.15), "agile-quad")
 
 
 @cache

@@ -107,7 +107,7 @@ def test_what_cannot_be_flown_is_said_in_a_sentence_and_the_last_plan_stays_fain
 
 def test_the_gate_goes_with_its_sliders_before_anything_is_planned(show) -> None:
     seen = show()
-    place = "replay.world.gates.children[0].matrix.toArray()"
+    place = "replay.world.gates.children[0].children[0].matrix.toArray()"
     seen.page.evaluate("live.ask = () => {}")
     for key, value in (("gates[0].position.x", 1.5), ("gates[0].tilt", 60.0)):
         seen.page.evaluate(f"live.move('{key}', {value})")

@@ -48,8 +48,6 @@ _SWITCH_POWERS = 2.3, 1.1  # of the promised fall and of the violation, as Wäch
 _CORRIDOR = 1e10  # the factor by which s z may differ from μ
 _EQUALITY_WEIGHT = 1e-2  # of the matrix's largest entry, by which equalities are added to it
 _ITERATIONS_FLAT = 3  # over which the cost has to stand still
-_ITERATIONS_STUCK = 15  # over which it changes by less than
-_STUCK = 1e-2  # of the gain that is standing still: where steps come to nothing at any barrier
 _LARGE_MULTIPLIER = 100.0  # on average: larger ones make the dual error count less
 
 
@@ -226,12 +224,14 @@ class _InteriorPoint:
     def run(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
         """Descend."""
         iterate, costs = self._begun(start, multipliers), []
+        if not np.isfinite(iterate.point.inequalities).all():
+            return InteriorPointResult(iterate.x, False, 0, iterate.z)  # no step leads on from there
         self._filter.first = max(_violation(iterate.point, iterate.slacks), 1.0)
         for iteration in range(self._settings.iterations):
             costs.append(float(self._cost @ iterate.x))
             if self._error(iterate, 0.0) < self._settings.tolerance or self._stands_still(iterate, costs):
                 return InteriorPointResult(iterate.x, True, iteration, iterate.z)
-            if out_of_time() or self._is_stuck(costs):
+            if out_of_time():
                 return InteriorPointResult(iterate.x, False, iteration, iterate.z)
             self._lower_barrier(iterate)
             if not self._advance(iterate):
@@ -282,11 +282,6 @@ class _InteriorPoint:
         at_end = self._barrier <= self._settings.least_barrier
         missed = max(float(at.point.inequalities.max(initial=0.0)), _largest(at.point.equalities))
         return still and at_end and missed < self._settings.violation
-
-    def _is_stuck(self, costs: list[float]) -> bool:
-        """True where no step has changed the cost for so long that none will, whichever the barrier."""
-        recent = costs[-_ITERATIONS_STUCK:]
-        return len(costs) > _ITERATIONS_STUCK and max(recent) - min(recent) < _STUCK * self._settings.gain
 
     def _lower_barrier(self, at: _Iterate) -> None:
         least = self._settings.least_barrier
