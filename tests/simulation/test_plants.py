@@ -69,7 +69,7 @@ PATHS = pytest.mark.parametrize(
 
 @PATHS
 def test_drag_wind_and_full_inertia_are_the_same_in_mujoco(path: Callable[[], Any]) -> None:
-    """Its drag, unknown to the controller, is held for a step of a millisecond, hence 0.1 mm."""
+    """Its drag, unknown to the controller, is held for a step of a millisecond, hence 0.5 mm."""
     known = ab.load_vehicle("agile-quad")
     vehicle = replace(
         known,
@@ -81,7 +81,7 @@ def test_drag_wind_and_full_inertia_are_the_same_in_mujoco(path: Callable[[], An
         ab.fly(path(), vehicle, environment=windy, nominal=known, plant=plant) for plant in (None, "mujoco")
     ]
     assert flights[0].position_error.max() > 1e-3
-    np.testing.assert_allclose(flights[1].position, flights[0].position, rtol=0, atol=1e-4)
+    np.testing.assert_allclose(flights[1].position, flights[0].position, rtol=0, atol=5e-4)
 
 
 @pytest.mark.parametrize(
