@@ -7,7 +7,7 @@ later or sooner, and its certificate says whether it passes them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from typing import TypeVar
@@ -17,6 +17,7 @@ import numpy as np
 from aerobat.certification.envelope import CROSSING_SPEED
 from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.optimization.deadline import within_time
+from aerobat.planning.passages import as_passed
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
 from aerobat.problem import Gate, Problem
@@ -42,14 +43,12 @@ def through_moving_gates(
         if not moving:
             return method(self, problem, vehicle, progress)
         _require_once(problem, moving)
-        times, why = dict.fromkeys(moving, 0.0), ""
+        gates, why = as_passed(problem.gates, ()), ""
         with within_time(getattr(self, "time_limit", None)):
             for _ in range(ROUNDS):
-                gates = tuple(gate.at(times.get(gate.name, 0.0)) for gate in problem.gates)
                 found = method(self, replace(problem, gates=gates), vehicle, progress)
-                passed = {place.gate: place.time for place in found.stages}
-                planned, times = times, {name: passed[name] for name in moving}
-                if all(_moved(gate, planned[name], times[name]) < SETTLED for name, gate in moving.items()):
+                planned, gates = gates, as_passed(problem.gates, found.stages)
+                if _farthest(planned, gates) < SETTLED:
                     crossing = _crossing(found, problem, moving)
                     if crossing.certificate is None or crossing.certified:
                         return crossing
@@ -71,10 +70,9 @@ def _require_once(problem: Problem, moving: dict[str, Gate]) -> None:
             raise SpecError(f"gate '{name}' moves, and is not passed once; let it stand still")
 
 
-def _moved(gate: Gate, begin: float, end: float) -> float:
-    """The distance [m] from where a gate is at one time [s] to where it is at another."""
-    first, last = gate.places(np.array([begin, end]))
-    return float(np.linalg.norm(last - first))
+def _farthest(gates: Sequence[Gate], others: Sequence[Gate]) -> float:
+    """The largest distance [m] between gates of both that are the same."""
+    return max(float(np.linalg.norm(a.position - b.position)) for a, b in zip(gates, others, strict=True))
 
 
 def _crossing(found: Plan, problem: Problem, moving: dict[str, Gate]) -> Plan:

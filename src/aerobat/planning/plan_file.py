@@ -35,7 +35,7 @@ from aerobat.problem.problem import Problem
 from aerobat.simulation.autopilot import Recoveries
 from aerobat.storage import digest_of, format_of, read_arrays, whole_file
 from aerobat.trajectory import Trajectory
-from aerobat.trajectory.files import trajectory_in
+from aerobat.trajectory.files import arrays_of, trajectory_in
 from aerobat.vehicle import Vehicle
 
 FORMAT = "aerobat-plan-1"  # another number where something goes, or means something else
@@ -100,10 +100,7 @@ def write_plan_file(
     }
     content: dict[str, Any] = {
         "format": np.asarray(FORMAT),
-        "durations": trajectory.durations,
-        "coefficients": trajectory.coefficients,
-        "heading": np.asarray(trajectory.heading),
-        **({} if trajectory.yaw is None else {"yaw": trajectory.yaw}),
+        **arrays_of(trajectory),
         "document": np.frombuffer(json.dumps(document).encode(), dtype=np.uint8),
     }
     with whole_file(path) as temporary, temporary.open("wb") as file:

@@ -21,9 +21,7 @@ from aerobat.vehicle import Vehicle
 # without a vehicle, stages that ask a fraction of its thrust assume what a hexarotor in the paper's class has
 ASSUMED_THRUST_TO_WEIGHT = 5.0
 SHARE = 0.5  # of the room that a narrow passage leaves to the body, which is kept clear
-BALL_SHARE = (
-    0.1  # of a ball's radius, which is kept inside it at most: flights under lab stray by half of that
-)
+KEPT_INSIDE = 0.1  # of a ball's radius, at most, from its surface: flights under lab stray by half of that
 LEAST_CLEARANCE = 0.001  # [m] that is kept clear in the narrowest: what lies between places is within it
 
 
@@ -115,7 +113,7 @@ def _well_inside(stage: Stage, clearance: float) -> Stage:
     """The stage with a smaller ball, if it has one."""
     if stage.ball is None or not clearance:
         return stage
-    kept = min(clearance, BALL_SHARE * stage.ball.radius)
+    kept = min(clearance, KEPT_INSIDE * stage.ball.radius)
     return replace(stage, ball=replace(stage.ball, radius=stage.ball.radius - kept))
 
 

@@ -30,7 +30,7 @@ from aerobat.so3 import UP
 from aerobat.states import FlatState
 from aerobat.trajectory import minimum_effort
 
-NEAR = 0.1  # [m] within which a point has no direction to speak of
+AT_POINT = 0.1  # [m] within which a point has no direction to speak of
 SLOW = 0.5  # [m/s] below which a velocity has none
 
 
@@ -105,7 +105,7 @@ class Heading:
         """
         upright = (1.0 + b3[:, 2:]) / 2.0
         if self.mode is HeadingMode.TOWARDS:
-            return upright * _softened(self.point - flat.position, NEAR)
+            return upright * _softened(self.point - flat.position, AT_POINT)
         if self.mode is HeadingMode.VELOCITY:
             return upright * _softened(flat.velocity, SLOW)
         angle = self._angles(fractions)

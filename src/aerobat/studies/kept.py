@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerobat.declaration import PathName
 from aerobat.documents import read_json
 from aerobat.errors import SpecError
 from aerobat.provenance import installed_versions
@@ -23,23 +24,30 @@ LIBRARIES = ("aerobat", "numpy", "llvmlite", "jax")  # that the numbers of fligh
 
 @dataclass(frozen=True)
 class KeptParts:
-    """The folder of a study's finished parts, each a file of arrays that is whole or absent."""
+    """The folder of a study's finished parts, each a file of arrays that is whole or absent.
 
-    folder: Path
+    Without a folder, nothing is kept and nothing is found.
+    """
+
+    folder: Path | None
 
     @classmethod
-    def of(cls, folder: Path, what: tuple[str, str], asked: Mapping[str, Any]) -> KeptParts:
+    def of(
+        cls, folder: PathName | None, what: tuple[str, str], asked: Callable[[], Mapping[str, Any]]
+    ) -> KeptParts:
         """The folder, new or of the same study.
 
         Args:
-            folder: Where parts are kept.
+            folder: Where parts are kept, if they are.
             what: What the parts are called, and the study.
-            asked: All that their numbers depend on, in few words; workers are not among it.
+            asked: Tells all that their numbers depend on, in few words; workers are not among it.
 
         Raises SpecError, one sentence, for a folder of any other study.
         """
-        parts, study = what
-        own = {"format": f"aerobat-{study}-1", **asked, "versions": installed_versions(LIBRARIES)}
+        if folder is None:
+            return cls(None)
+        folder, (parts, study) = Path(folder), what
+        own = {"format": f"aerobat-{study}-1", **asked(), "versions": installed_versions(LIBRARIES)}
         path = folder / FINGERPRINT
         try:
             is_new = not folder.exists() or not any(folder.iterdir())
@@ -60,6 +68,8 @@ class KeptParts:
 
     def read(self, name: str) -> dict[str, NDArray[Any]] | None:
         """A finished part; None where there is none, or none as it was kept."""
+        if self.folder is None:
+            return None
         try:
             arrays = read_arrays(self.folder / f"{name}.npz", "part")
             return arrays if str(arrays.pop("digest")) == digest_of(arrays) else None
@@ -67,7 +77,9 @@ class KeptParts:
             return None
 
     def write(self, name: str, arrays: Mapping[str, Any]) -> None:
-        """Keep a finished part."""
+        """Keep a finished part, where there is a folder."""
+        if self.folder is None:
+            return
         with whole_file(self.folder / f"{name}.npz") as temporary, temporary.open("wb") as file:
             np.savez(file, **arrays, digest=digest_of(arrays))
 

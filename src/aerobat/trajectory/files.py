@@ -27,10 +27,7 @@ def save_trajectory(trajectory: Trajectory | Carrier, path: PathName) -> None:
     trajectory = as_trajectory(trajectory)
     content: dict[str, ArrayLike] = {
         "format": _WITHOUT_YAW if trajectory.yaw is None else _FORMAT,
-        "durations": trajectory.durations,
-        "coefficients": trajectory.coefficients,
-        "heading": trajectory.heading,
-        **({} if trajectory.yaw is None else {"yaw": trajectory.yaw}),
+        **arrays_of(trajectory),
     }
     with whole_file(path) as temporary, temporary.open("wb") as file:
         np.savez(file, allow_pickle=False, **content)
@@ -49,6 +46,12 @@ def load_trajectory(path: PathName) -> Trajectory:
         raise SpecError(f"trajectory file {path}: it has no array {error.args[0]!r}; save it again") from None
     except SpecError as error:
         raise SpecError(f"trajectory file {path}: {error}") from None
+
+
+def arrays_of(trajectory: Trajectory) -> dict[str, Array]:
+    """The arrays of a file by which a trajectory is known, bit for bit."""
+    names = ("durations", "coefficients", "heading", *(() if trajectory.yaw is None else ("yaw",)))
+    return {name: np.asarray(getattr(trajectory, name)) for name in names}
 
 
 def trajectory_in(arrays: Mapping[str, Array]) -> Trajectory:

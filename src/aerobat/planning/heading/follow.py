@@ -28,7 +28,7 @@ SHARE = 0.5  # of the reserve that the path keeps for the controller, which turn
 PLACES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])  # of each part, where limits are looked at: off its knots
 SMOOTH = 1e-6  # [s⁶] of the third derivative's square: what is asked faster than some 10 rad/s is rounded
 ASKED = 0.3  # [-] of full weight from which on what is asked counts
-NEAR = 0.5  # of its size, how near to its end a limit may be to matter to a step
+AT_ITS_END = 0.5  # of its size, how near to its end a limit may be to matter to a step
 SLACK = 1e-3  # of its size, by which a sampled limit may be exceeded
 REACH, LEAST_REACH = 0.6, 2e-3  # [rad] of a step at first, and of the last
 ROUNDS = 60
@@ -231,7 +231,7 @@ class _YawProgram:
         for _ in range(ROUNDS):
             yaw = self.yaw(x)
             excess, (gradient, hessian) = limits.excess(yaw), self.slopes(yaw)
-            at, which = np.nonzero(excess > -NEAR)
+            at, which = np.nonzero(excess > -AT_ITS_END)
             slopes = limits.slopes(yaw)[:, at, which]
             linear = sum(slope[:, None] * each[at] for slope, each in zip(slopes, self.rows, strict=True))
             near = excess[at, which]

@@ -18,7 +18,7 @@ from aerobat.planning.task import Task
 from aerobat.states import Setpoint
 from aerobat.trajectory import Trajectory
 
-STEP = 1e-6  # of central differences, in SI units
+DIFFERENCE = 1e-6  # to both sides, in SI units of the yaw and its derivatives
 ORDERS = 4  # the yaw and its three derivatives, that a rotor's command knows
 
 
@@ -47,8 +47,8 @@ class YawLimits:
     def slopes(self, yaw: Array) -> Array:
         """Derivatives of `excess` by the yaw and its derivatives, (4, m, c)."""
         found = []
-        for step in STEP * np.eye(ORDERS)[..., None]:
-            found.append((self._values(yaw + step) - self._values(yaw - step)) / (2 * STEP))
+        for step in DIFFERENCE * np.eye(ORDERS)[..., None]:
+            found.append((self._values(yaw + step) - self._values(yaw - step)) / (2 * DIFFERENCE))
         return np.array(found)
 
     @cached_property
@@ -75,8 +75,7 @@ class YawLimits:
         angle, rate, acceleration, jerk = yaw
         cosine, sine = np.cos(angle), np.sin(angle)
         still, first, second = ((cosine * x + sine * y, cosine * y - sine * x) for x, y, _ in self._turning)
-        omega = (*still, rate)
-        omega_dot = (first[0] + rate * still[1], first[1] - rate * still[0], acceleration)
+        omega, omega_dot = kernel.spun((*still, 0.0), (*first, 0.0), (rate, acceleration))
         angular_jerk = (
             second[0] + 2 * rate * first[1] + acceleration * still[1] - rate**2 * still[0],
             second[1] - 2 * rate * first[0] - acceleration * still[0] - rate**2 * still[1],

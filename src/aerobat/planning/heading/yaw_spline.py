@@ -13,7 +13,7 @@ from aerobat.arrays import Array
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 
-STEP = 0.2  # [s] between knots, at most: yaw is slower than tilt
+KNOT_STEP = 0.2  # [s] between knots, at most: yaw is slower than tilt
 MOST = 150  # knots of a long path beside its own
 PER_KNOT = 3  # variables: the yaw, its rate, and that rate's derivative
 UNITS = np.eye(2 * PER_KNOT)
@@ -30,7 +30,7 @@ class YawSpline:
     @classmethod
     def along(cls, path: Trajectory) -> YawSpline:
         """Cut long segments of a path."""
-        step = max(STEP, path.duration / MOST)
+        step = max(KNOT_STEP, path.duration / MOST)
         counts = [ceil(seconds / step - 1e-9) for seconds in path.durations.tolist()]
         segment = np.repeat(np.arange(path.segments), counts)
         start = np.concatenate([np.arange(count) / count for count in counts])
@@ -77,7 +77,7 @@ class YawSpline:
     @cached_property
     def _blocks(self) -> Array:
         """From a part's own variables to its coefficients, (n, 6, 6)."""
-        scale = np.tile((self.seconds[:, None] / STEP) ** np.arange(PER_KNOT), 2)
+        scale = np.tile((self.seconds[:, None] / KNOT_STEP) ** np.arange(PER_KNOT), 2)
         return np.asarray(HERMITE * scale[:, None])
 
     def _own(self, variables: Array) -> Array:

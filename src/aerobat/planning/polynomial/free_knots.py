@@ -133,8 +133,7 @@ class FreeKnots(Planner):
         if not (plan.certified and plan.keeps(self.reserve)) or plan.planner == "free-knots":
             return None
         said = f"free-knots found none faster than the path that it began from, {plan.planner}'s"
-        kept = replace(plan, planner="free-knots", attempts=tuple(refinement.recorder.attempts), rescue=said)
-        return _Found(not plan.certified, plan.duration, kept)
+        return _Found(not plan.certified, plan.duration, replace(plan, planner="free-knots", rescue=said))
 
     def _refined(self, refinement: Refinement, start: WarmStart) -> _Found | None:
         """The certified plan near a start; None where there is none."""

@@ -243,15 +243,14 @@ def feasibility_map(
     fields = _fields(axes, scenario)
     task = ProbedTask(scenario, fields, time_limit, range(flights), seed)
     places = list(product(*(axis.values for axis in axes)))
-    kept = None if keep is None else KeptParts.of(Path(keep), ("cells", "map"), _asked(axes, task))
-    known = {} if kept is None else {place: Cell.of(place, kept.read(_name(place))) for place in places}
+    kept = KeptParts.of(keep, ("cells", "map"), lambda: _asked(axes, task))
+    known = {place: Cell.of(place, kept.read(_name(place))) for place in places}
     cells = {place: cell for place, cell in known.items() if cell is not None}
     missing = [place for place in places if place not in cells]
     with pool(workers, executor, len(missing)) as planning:
         for values, cell in planning.results(_cell, task, missing):
             cells[values] = cell
-            if kept is not None:
-                kept.write(_name(values), cell.arrays)
+            kept.write(_name(values), cell.arrays)
             if progress is not None:
                 progress(len(cells), sum(cell.is_planned for cell in cells.values()))
     told = tuple(replace(axis, unit=field.unit) for axis, field in zip(axes, fields, strict=True))

@@ -22,6 +22,7 @@ from aerobat.studies.kept import KeptParts, fingerprint, names_of_parts
 from aerobat.studies.sweep.flights import SAMPLED, STRIDE, Chunk, fly_chunk
 from aerobat.studies.sweep.result import Sweep
 from aerobat.studies.workers import Workers, pool
+from aerobat.trajectory.files import arrays_of
 from aerobat.vehicle import Vehicle
 
 Runs = Annotated[int, Field(ge=1, le=10**7, description="whole number from 1 to ten million")]
@@ -75,20 +76,19 @@ def sweep(
     if isinstance(controller, str):
         controller = named_controller(controller, vehicle.controller)
     task = FlightTask(plan, vehicle, conditions, seed, controller or vehicle.controller, engine, batch)
-    kept = None if keep is None else KeptParts.of(Path(keep), ("flights", "sweep"), _asked(task))
+    kept = KeptParts.of(keep, ("flights", "sweep"), lambda: _asked(task))
     spans = cut(range(runs))
     tally = _Tally(progress)
     chunks = {}
     for flights in spans:
-        found = None if kept is None else Chunk.of(kept.read(_name(flights)), len(flights))
+        found = Chunk.of(kept.read(_name(flights)), len(flights))
         if found is not None:
             chunks[flights] = tally.counted(found)
     missing = [flights for flights in spans if flights not in chunks]
     with pool(workers, executor, len(missing)) as flying:
         flown = flying.results(fly_chunk, task, missing, together=TOGETHER, compiles=True)
         for flights, chunk in flown:
-            if kept is not None:
-                kept.write(_name(flights), chunk.arrays)
+            kept.write(_name(flights), chunk.arrays)
             chunks[flights] = tally.counted(chunk)
     return _joined(task, [chunks[flights] for flights in spans])
 
@@ -105,14 +105,10 @@ def _name(flights: range) -> str:
 
 def _asked(task: FlightTask) -> dict[str, Any]:
     """All that the numbers of flights depend on; batches are not among it."""
-    trajectory = task.plan.trajectory
     plan = {
         "problem": to_table(task.plan.problem),
         "stages": [asdict(stage) for stage in task.plan.stages],
-        "durations": trajectory.durations.tolist(),
-        "coefficients": trajectory.coefficients.tolist(),
-        "heading": trajectory.heading,
-        **({} if trajectory.yaw is None else {"yaw": trajectory.yaw.tolist()}),
+        **{name: array.tolist() for name, array in arrays_of(task.plan.trajectory).items()},
     }
     return {
         "plan": fingerprint(plan),
