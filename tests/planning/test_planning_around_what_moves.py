@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import aerobat as ab
 from aerobat.certification import Verdict, certify
+from aerobat.planning.around.guesses import guesses
+from aerobat.planning.task import Task
 from aerobat.simulation.outcome import Outcome
 
 QUAD = ab.load_vehicle("agile-quad")
@@ -42,6 +46,15 @@ def test_a_box_is_passed_behind_where_it_has_crossed_and_in_front_where_it_has_n
     for plant in (None, "mujoco"):
         flight = ab.fly(plan, plant=plant)
         assert ab.score(flight, plan).outcome is Outcome.COMPLETE
+
+
+@pytest.mark.parametrize(("speed", "blocks"), [(8.0, True), (0.8, False)])
+def test_a_box_blocks_the_way_only_of_who_is_fast_enough_to_meet_it(speed: float, blocks: bool) -> None:
+    """A box across the whole room leaves by its side within six seconds."""
+    room = replace(ROOM, velocity=np.full(3, speed))
+    box = ab.Box((5.0, 0.0, 2.0), (1.0, 9.0, 4.0), velocity=(0.0, 1.5, 0.0))
+    problem = replace(crossing(0.0, 1.5), limits=room, environment=ab.Environment(obstacles=(box,)))
+    assert any(guesses(Task.of(problem, QUAD))) != blocks
 
 
 @pytest.mark.parametrize("late", [-0.02, 0.02])

@@ -80,9 +80,12 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
 
 
 def _hurried(task: Task, corners: Array) -> float:
-    """The duration [s] from rest to rest along corners (k, 3) at much of the vehicle's thrust, about."""
-    length = float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum())
-    return 2.0 * sqrt(length / (HURRIED * task.vehicle.max_specific_thrust))
+    """The duration [s] from rest to rest along corners (k, 3) at much of the thrust, or at greatest speed."""
+    _, greatest = task.problem.path_limits.of(1)
+    way = np.diff(corners, axis=0)
+    length = float(np.linalg.norm(way, axis=1).sum())
+    at_speed = float((np.abs(way) / greatest).max(axis=1).sum())
+    return max(2.0 * sqrt(length / (HURRIED * task.vehicle.max_specific_thrust)), at_speed)
 
 
 def _different(found: Iterable[tuple[Cells, Way]], slack: float) -> Iterator[tuple[list[Array], float]]:
