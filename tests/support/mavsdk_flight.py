@@ -44,8 +44,8 @@ def main(address: str) -> None:
     wait(lambda: near(0.0, 0.0, -2.0))
     assert telemetry.in_air()
     print("took off")
-    home = telemetry.position()
-    action.goto_location(home.latitude_deg + 2e-5, home.longitude_deg, home.absolute_altitude_m + 1.0, 0.0)
+    home = telemetry.home()  # on the ground: the vehicle may still be a few centimetres below its height
+    action.goto_location(home.latitude_deg + 2e-5, home.longitude_deg, home.absolute_altitude_m + 3.0, 0.0)
     wait(lambda: near(2.22, 0.0, -3.0))
     print("went there")
     offboard.set_position_ned(PositionNedYaw(0.0, 1.0, -2.0, 0.0))
