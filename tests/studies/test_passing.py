@@ -61,14 +61,14 @@ def test_a_probability_that_is_met_already_costs_nothing():
     assert len(found.rounds) == 1
 
 
-@given(first=st.integers(1, 5), need=st.integers(1, 20), room=st.integers(0, 20))
-def test_the_least_reserve_is_found_wherever_plans_end(first: int, need: int, room: int):
+@given(need=st.integers(0, 20), room=st.integers(0, 20))
+def test_the_least_reserve_is_found_wherever_plans_end(need: int, room: int):
     """Without a plan above some reserve, a smaller one that is enough is found all the same."""
     tightening = object.__new__(_Tightening)
-    tightening.task = SimpleNamespace(is_enough=lambda share: share)
+    tightening.task = SimpleNamespace(is_likely_enough=lambda share: share)
     most = need + room
     tightening._round = lambda steps: None if steps > most else SimpleNamespace(share=steps >= need)
-    steps, done = tightening._smallest(first)
+    steps, done = tightening._smallest()
     assert (steps, done.share) == (need, True)
 
 
@@ -93,6 +93,25 @@ def test_a_saved_plan_carries_its_tube(tmp_path):
 
 
 @pytest.mark.slow
+def test_where_rotors_lag_otherwise_than_known_turning_slower_costs_less_than_any_reserve():
+    """At a quarter more or less than a lag of 33 ms, a flip of 860°/s is 7° late; half of that is as fast."""
+    found = ab.plan_to_pass(
+        "flip-roll",
+        ab.Miqp(reserve=0.15),
+        "agilicious",
+        probability=0.9,
+        conditions=ab.Dispersion(name="lags", lag=0.25),
+        flights=200,
+        fresh=300,
+        workers=1,
+    )
+    assert found.before.fraction < 0.8
+    assert found.plan.assessment.max_body_rate < 0.7 * found.plain.assessment.max_body_rate
+    assert found.price < 0.03 * found.plain.duration
+    assert found.plan.vehicle == ab.load_vehicle("agilicious")
+
+
+@pytest.mark.slow
 def test_what_cannot_be_reached_names_the_cause_in_the_way():
     rounds: list[Round] = []
     with pytest.raises(ab.Infeasible, match=r"the start stands in the way: without it .* pass") as refused:
@@ -107,7 +126,7 @@ def test_what_cannot_be_reached_names_the_cause_in_the_way():
         )
     assert "harsh" in str(refused.value)
     assert rounds[0].reserve == 0.26
-    assert all(0.26 < trial.reserve < 0.5 for trial in rounds[1:])
+    assert all(0.26 <= trial.reserve < 0.5 for trial in rounds[1:])
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from math import ceil, log
-from typing import Annotated, Any
+from math import ceil, inf, log, sqrt
+from typing import Annotated, Any, cast
 
 from pydantic import Field
 
@@ -16,7 +16,9 @@ from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
 from aerobat.evaluation import Score
 from aerobat.evaluation.opening import Probability
+from aerobat.optimization.deadline import processor, within_time
 from aerobat.planning import Attempt, Plan, Planner, as_planner, plan
+from aerobat.planning.planners import planner_with_reserve
 from aerobat.planning.tube import Tube
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.flights import FlightTask, cut, fly_scores
@@ -28,14 +30,22 @@ from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 STEP = 0.02  # of every limit's range, between reserves that are tried
-STRIDE = 4  # steps from one round to the next until flights pass
-# steps in the first round: flights that are lost ask for all the range, and less is enough to keep them
-MAX_FIRST = 5
+STRIDE = 3  # steps from one round to the next until flights pass
 MAX_STEPS = 20  # a reserve of two fifths at either end leaves a fifth of the range to fly with
-# fresh flights that are expected to fail at the probability asked: half as many failures are then a proof
-PROVING_FAILURES = 20
+# fresh flights that are expected to fail at the probability asked: two thirds as many failures are a proof
+PROVING_FAILURES = 50
 # proofs are attempted on flights of their own: each errs with 2.5 % at most, both together with 5 %
 PROOFS = 2
+SCREENED = 200  # flights after which a plan that passes too seldom for its share to be doubtful is left
+# fractions of the plain plan's largest body rate, to which tightened ones keep: rotors that lag otherwise
+# than known are late, by the more degrees the faster a vehicle turns. Half the body rate made flips of five
+# vehicles at most 2 % longer, with a fifth as many off their attitude; a third gained nothing (lab book)
+CALMS = (1.0, 0.8, 0.65, 0.5)
+KEPT_WAYS = 3  # that go on from a round in which too few flights pass
+REFINING = "free-knots"  # the planner that goes on from a plan where the one asked for cannot
+KEPT = ("segments", "clearance", "time_limit")  # of the settings of the one asked for
+DEAR = 1.15  # times a round's shortest plan: longer ones lost their way, and a larger reserve costs less
+TIGHTENING_TIME = 5.0  # [s] of the processor for one tightened plan: those that are found take 0.3 to 3
 Flights = Annotated[int, Field(ge=1, le=10**6, description="whole number from 1 to a million")]
 
 
@@ -58,12 +68,12 @@ def plan_to_pass(
 ) -> Passing:
     """Plan a problem so that flights under conditions pass with a probability, proven on fresh flights.
 
-    The plain plan is flown many times. Where too few flights pass, their spread says which reserve of the
-    rotors' limits to begin with, by how much to narrow the gates for planning, and how much thrust to ask for
-    in them; the smallest reserve of a ladder is sought with which enough of the same flights pass. The plan
-    found is then flown on flights that nothing was learned from: it is returned if the lower end of Clopper
-    and Pearson's interval reaches the probability. A flight passes where nothing goes wrong, as its `Outcome`
-    says.
+    The plain plan is flown many times. Where too few flights pass, their spread says by how much to narrow
+    the gates for planning, and how much thrust to ask for in them; plans go on from the plain one with more
+    reserve and less body rate, and the smallest reserve of a ladder is sought with which enough of the same
+    flights pass. The plan found is then flown on flights that nothing was learned from: it is returned if the
+    lower end of Clopper and Pearson's interval reaches the probability. A flight passes where nothing goes
+    wrong, as its `Outcome` says.
 
     Args:
         problem: What is planned, or its name.
@@ -74,7 +84,7 @@ def plan_to_pass(
         seed: Of the flights.
         controller: The name of what flies: full, or a control law.
         flights: How many tell how to tighten, numbered from 0.
-        fresh: How many prove it, numbered behind those; by default 20 over the probability of failing.
+        fresh: How many prove it, numbered behind those; by default 50 over the probability of failing.
         workers: Processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
         executor: Any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
         progress: Called with every attempt at a plan as it ends.
@@ -124,6 +134,17 @@ def _require_enough(name: str, flights: int, probability: float) -> None:
         )
 
 
+@dataclass(frozen=True)
+class _Way:
+    """A way to tighten a plan, beside its reserve."""
+
+    calm: float  # [-] of the plain plan's largest body rate, that is left
+    goes_on: bool  # from the plain plan; else the planner begins anew
+
+
+WAYS = (*(_Way(calm, True) for calm in CALMS), *(_Way(calm, False) for calm in CALMS[::2]))
+
+
 @dataclass(frozen=True, eq=False)
 class _PassingTask:
     """What is planned, flown and asked."""
@@ -138,16 +159,45 @@ class _PassingTask:
     progress: Callable[[Attempt], None] | None
     flying: Pool
 
-    def plan(self, reserve: float, problem: Problem) -> Plan:
-        """The plan with a reserve, and through gates as `problem` has them, judged by the task's own."""
-        found = plan(problem, replace(self.planner, reserve=reserve), self.vehicle, self.progress)
-        return replace(found, problem=self.problem)
+    def plain(self) -> Plan:
+        """The plan as the planner finds it."""
+        return plan(self.problem, self.planner, self.vehicle, self.progress)
+
+    def tightened(self, plain: Plan, reserve: float, way: _Way, problem: Problem) -> Plan:
+        """The plan of a problem with a reserve, in some way; judged by the task's own problem and vehicle."""
+        vehicle, planner = self.vehicle, self._anew(reserve)
+        if way.calm < 1.0 and plain.assessment is not None:
+            vehicle = replace(vehicle, max_body_rate=way.calm * (plain.assessment.max_body_rate or inf))
+        if way.goes_on:
+            planner = self._from(plain, reserve)
+        with within_time(TIGHTENING_TIME, processor):
+            found = plan(problem, planner, vehicle, self.progress)
+        return replace(found, problem=self.problem, vehicle=self.vehicle)
+
+    def _from(self, start: Plan, reserve: float) -> Planner:
+        """The planner with a reserve, or for one that takes no start, the refinement from a plan on."""
+        if hasattr(self.planner, "start"):
+            return cast(Planner, replace(self.planner, reserve=reserve, start=start))
+        kept = {name: getattr(self.planner, name) for name in KEPT if hasattr(self.planner, name)}
+        return planner_with_reserve(REFINING, reserve, start=start, **kept)
+
+    def _anew(self, reserve: float) -> Planner:
+        """The planner with a reserve, and no other in its place."""
+        own = {"rescue": False} if hasattr(self.planner, "rescue") else {}
+        return cast(Planner, replace(self.planner, reserve=reserve, **own))
 
     def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Score:
         """Scores of flights of a plan, by default under the task's conditions."""
         controller = named_controller(self.controller, self.vehicle.controller)
         task = FlightTask(found, self.vehicle, conditions or self.conditions, self.seed, controller)
         return fly_scores(self.flying, (task,), flights)[0]
+
+    def training(self, found: Plan, flights: range) -> Score:
+        """Scores of the flights that tell how to tighten, of the first ones where these tell that enough."""
+        first = self.scores(found, flights[:SCREENED])
+        if len(flights) <= SCREENED or _passed(first).interval[1] < self.probability:
+            return first
+        return self.scores(found, flights)
 
     def share(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Share:
         """The share of flights of a plan that pass."""
@@ -156,6 +206,20 @@ class _PassingTask:
     def is_enough(self, share: Share) -> bool:
         """True where so many flights prove the probability."""
         return share.interval[0] >= self.probability
+
+    def is_likely_enough(self, share: Share) -> bool:
+        """True where others would prove it too, even if one standard deviation fewer of them pass."""
+        deviation = sqrt(share.of * share.fraction * (1.0 - share.fraction))
+        return self.is_enough(Share(max(share.count - ceil(deviation), 0), share.of))
+
+
+@dataclass(frozen=True, eq=False)
+class _Flown:
+    """A round, with what tells how to go on from it."""
+
+    round: Round
+    scores: Score
+    way: _Way
 
 
 @dataclass
@@ -167,20 +231,21 @@ class _Tightening:
     proving: int
     tried: Callable[[Round], None]
     rounds: list[Round] = field(default_factory=list)
+    _ways: tuple[_Way, ...] = WAYS
 
     def passing(self) -> Passing:
         """The plan that passes, proven. Raises Infeasible where there is none."""
         plain, scores = self._plain()
-        self._narrowed = self.task.problem
         steps, done = 0, plain
-        if not self.task.is_enough(plain.share):
+        if not self.task.is_likely_enough(plain.share):
             self._narrowed = narrowed(self.task.problem, self.task.vehicle, scores)
-            steps, done = self._smallest(self._first_steps(plain.plan))
+            steps, done = self._smallest()
         for attempt in range(PROOFS):
             fresh = self._fresh(attempt)
             share = self.task.share(done.plan, fresh)
             if self.task.is_enough(share):
                 return self._proven(done, share, fresh)
+            self._ways = WAYS
             following = self._round(steps + STRIDE) if attempt + 1 < PROOFS else None
             if following is None:
                 raise self._unreachable(done, fresh)
@@ -188,77 +253,82 @@ class _Tightening:
         raise AssertionError("a proof ends one way or the other")
 
     def _plain(self) -> tuple[Round, Score]:
-        found = self.task.plan(self.task.planner.reserve, self.task.problem)
-        scores = self.task.scores(found, self.training)
-        return self._noted(Round(self.task.planner.reserve, found, _passed(scores))), scores
+        found = self.task.plain()
+        self._least = self.task.planner.reserve if found.keeps(self.task.planner.reserve) else 0.0
+        scores = self.task.training(found, self.training)
+        return self._noted(Round(self._least, found, _passed(scores))), scores
 
-    def _first_steps(self, plain: Plan) -> int:
-        """The steps of reserve that the spread of the plain plan's commands asks for."""
-        task = self.task
-        spread = spread_of(plain, task.vehicle, task.conditions, task.seed, task.controller, self.training)
-        return min(max(ceil(spread.reserve / STEP), 1), MAX_FIRST)
-
-    def _smallest(self, first: int) -> tuple[int, Round]:
-        """The fewest steps of reserve with which enough training flights pass, or nearly, and that round.
-
-        Args:
-            first: Steps to begin with.
-        """
-        low, high, steps = 0, MAX_STEPS + 1, first  # high: without a plan
+    def _smallest(self) -> tuple[int, Round]:
+        """The fewest steps of reserve with which enough training flights pass, or nearly, and that round."""
+        low, high, steps = -1, MAX_STEPS + 1, 0  # high: without a plan
         while steps > low:
             done = self._round(steps)
             if done is None:
                 high = steps
-            elif self.task.is_enough(done.share):
+            elif self.task.is_likely_enough(done.share):
                 return self._refined(low, steps, done)
             else:
                 low = steps
             steps = min(low + STRIDE, (low + high) // 2)
-        best = max(self.rounds, key=lambda each: each.share.count)
+        best = max(self.rounds, key=_fraction)
         if best.share.fraction < self.task.probability:
             raise self._unreachable(best, self.training)
-        return round((best.reserve - self.task.planner.reserve) / STEP), best
+        return round((best.reserve - self._least) / STEP), best
 
     def _refined(self, low: int, high: int, best: Round) -> tuple[int, Round]:
         """The fewest steps between too few and enough, by bisection."""
         while high - low > 1:
             middle = (low + high) // 2
             done = self._round(middle)
-            if done is not None and self.task.is_enough(done.share):
+            if done is not None and self.task.is_likely_enough(done.share):
                 high, best = middle, done
             else:
                 low = middle
         return high, best
 
     def _round(self, steps: int) -> Round | None:
-        """A round with so many steps of reserve; None where there is no such plan.
+        """The best round with so many steps of reserve; None where there is no such plan.
 
-        Where too many flights stray off their attitude in a gate, one more with more thrust there, which
-        stays for the rounds that follow if it is better.
+        Ways are tried until enough flights pass, from when on none but the last one is. Until then the best
+        ones go on to the next round, and the best is tried again with more thrust in gates that flights pass
+        off their attitude, which stays if that helps.
         """
-        found = self._planned(steps, self._narrowed)
-        if found is None:
+        tried: list[_Flown] = []
+        for way in self._ways:
+            longest = DEAR * min((each.round.plan.duration for each in tried), default=inf)
+            found = self._planned(steps, way, self._narrowed, longest)
+            if found is not None:
+                tried.append(found)
+            if found is not None and self.task.is_likely_enough(found.round.share):
+                self._ways = (way,)
+                return found.round
+        if not tried:
             return None
-        done, scores = found
-        if self.task.is_enough(done.share):
-            return done
-        kept = 0.5 * (1.0 + self.task.probability)  # half of those that may fail
-        firm = firmer(self._narrowed, self.task.vehicle, done.plan, scores, kept)
-        again = None if firm == self._narrowed else self._planned(steps, firm)
-        if again is None or again[0].share.count <= done.share.count:
-            return done
-        self._narrowed = firm
-        return again[0]
+        tried.sort(key=lambda each: _fraction(each.round), reverse=True)
+        self._ways = tuple(each.way for each in tried[:KEPT_WAYS])
+        return self._firmer(steps, tried[0])
 
-    def _planned(self, steps: int, problem: Problem) -> tuple[Round, Score] | None:
-        """A round with so many steps of reserve through gates as a problem has them, and its scores."""
-        reserve = round(self.task.planner.reserve + steps * STEP, 9)
+    def _firmer(self, steps: int, best: _Flown) -> Round:
+        """A round with more thrust in gates, if more of its flights pass; else the one that is known."""
+        kept = 0.5 * (1.0 + self.task.probability)  # half of those that may fail
+        firm = firmer(self._narrowed, self.task.vehicle, best.round.plan, best.scores, kept)
+        again = None if firm == self._narrowed else self._planned(steps, best.way, firm)
+        if again is None or _fraction(again.round) <= _fraction(best.round):
+            return best.round
+        self._narrowed = firm
+        return again.round
+
+    def _planned(self, steps: int, way: _Way, problem: Problem, longest: float = inf) -> _Flown | None:
+        """A round with so many steps of reserve, in some way; None without a plan, or a short enough one."""
+        reserve = round(self._least + steps * STEP, 9)
         try:
-            found = self.task.plan(reserve, problem)
+            found = self.task.tightened(self.rounds[0].plan, reserve, way, problem)
         except (Infeasible, SpecError):  # no plan, or no such reserve
             return None
-        scores = self.task.scores(found, self.training)
-        return self._noted(Round(reserve, found, _passed(scores))), scores
+        if found.duration > longest:
+            return None
+        scores = self.task.training(found, self.training)
+        return _Flown(self._noted(Round(reserve, found, _passed(scores))), scores, way)
 
     def _noted(self, done: Round) -> Round:
         self.rounds.append(done)
@@ -310,6 +380,10 @@ class _Tightening:
             [attempt for done in self.rounds for attempt in done.plan.attempts],
             remedy="",
         )
+
+
+def _fraction(done: Round) -> float:
+    return done.share.fraction
 
 
 def _passed(scores: Score) -> Share:

@@ -1,4 +1,4 @@
-"""The spread of flights, and what it asks of the next plan: a reserve of thrust, and narrower gates."""
+"""The spread of flights, and what it asks of the next plan: narrower gates, and more thrust in them."""
 
 from __future__ import annotations
 
@@ -34,12 +34,6 @@ class Spread:
     position_error: Array  # [m], (T,)
     attitude_error: Array  # [rad], (T,)
     rotor_margin: Array  # [-] of a rotor's range, (T,)
-    departure: Array  # [-] of a rotor's range, of the commands from their median, (T,)
-
-    @property
-    def reserve(self) -> float:
-        """The part of the rotors' range that flights ask for beyond the plan, on average along time [-]."""
-        return float(self.departure.mean())
 
 
 def spread_of(
@@ -68,13 +62,11 @@ def spread_of(
     span = vehicle.thrust_ranges
     commands = batch.commands[:, rows]
     margins = np.minimum(commands - vehicle.min_thrusts, vehicle.max_thrusts - commands) / span
-    departures = np.abs(commands - np.median(commands, axis=0)) / span
     return Spread(
         times=batch.times[rows],
         position_error=np.quantile(batch.position_error[:, rows], LEVEL, axis=0),
         attitude_error=np.quantile(batch.attitude_error[:, rows], LEVEL, axis=0),
         rotor_margin=np.quantile(margins.min(axis=-1), 1.0 - LEVEL, axis=0),
-        departure=np.quantile(departures.max(axis=-1), LEVEL, axis=0),
     )
 
 
