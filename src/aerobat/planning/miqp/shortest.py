@@ -10,9 +10,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
 
+from aerobat.errors import Infeasible
 from aerobat.optimization.deadline import out_of_time
+from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.certified_solve import Judged
+from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.attempts import Attempts, Placement
+from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.refinement.excess import Excess
 from aerobat.planning.refinement.refine import RefinedPath, Refinement
 from aerobat.planning.warm_start import WarmStart
@@ -52,11 +56,33 @@ def shortest(
             rough.append(path)
         if len(rough) >= STARTS or begun >= MAX_STARTS or out_of_time():
             break
+    found: Judged[RefinedPath] | None = None
     for path in sorted(rough, key=_duration):
         judged = refinement.finished(path)
         if judged.feasible:
-            return _shortened(judged, scan, segments)
-    return scan.certified()
+            found = _shortened(judged, scan, segments)
+            break
+    return _from_closed_form(found, scan, segments) or scan.certified()
+
+
+def _from_closed_form(
+    known: Judged[RefinedPath] | None, scan: _Scan, segments: int
+) -> Judged[RefinedPath] | None:
+    """A path from the closed form through points where the known one is slow, or missing; else that one."""
+    task = scan.refinement.task
+    is_slow = known is None or known.solution.duration > SUSPICIOUS * scan.least
+    if not (is_slow and task.problem.maneuver.through_points) or is_course(task.stages) or out_of_time():
+        return known
+    try:
+        start = WarmStart.of(MinSnap().plan(task.problem, task.vehicle), task.stages)
+    except Infeasible:
+        return known
+    shortest_known = inf if known is None else known.solution.duration
+    path = scan.refinement.rough(start, segments, shortest_known)
+    if not scan.refinement.is_promising(path) or _duration(path) >= shortest_known:
+        return known
+    found = scan.refinement.finished(path)
+    return found if found.feasible and found.solution.duration < shortest_known else known
 
 
 def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judged[RefinedPath]:

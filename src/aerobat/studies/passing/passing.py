@@ -19,6 +19,7 @@ from aerobat.evaluation.opening import Probability
 from aerobat.optimization.deadline import processor, within_time
 from aerobat.planning import Attempt, Plan, Planner, as_planner, plan
 from aerobat.planning.planners import planner_with_reserve
+from aerobat.planning.result import LITTLE_RESERVE
 from aerobat.planning.tube import Tube
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.flights import FlightTask, cut, fly_scores
@@ -41,7 +42,7 @@ SCREENED = 200  # flights after which a plan that passes too seldom for its shar
 # than known are late, by the more degrees the faster a vehicle turns. Half the body rate made flips of five
 # vehicles at most 2 % longer, with a fifth as many off their attitude; a third gained nothing (lab book)
 CALMS = (1.0, 0.8, 0.65, 0.5)
-KEPT_WAYS = 3  # that go on from a round in which too few flights pass
+KEPT_VARIANTS = 3  # that go on from a round in which too few flights pass
 REFINING = "free-knots"  # the planner that goes on from a plan where the one asked for cannot
 KEPT = ("segments", "clearance", "time_limit")  # of the settings of the one asked for
 DEAR = 1.15  # times a round's shortest plan: longer ones lost their way, and a larger reserve costs less
@@ -135,14 +136,14 @@ def _require_enough(name: str, flights: int, probability: float) -> None:
 
 
 @dataclass(frozen=True)
-class _Way:
-    """A way to tighten a plan, beside its reserve."""
+class _Variant:
+    """How a plan is tightened, beside its reserve."""
 
     calm: float  # [-] of the plain plan's largest body rate, that is left
     goes_on: bool  # from the plain plan; else the planner begins anew
 
 
-WAYS = (*(_Way(calm, True) for calm in CALMS), *(_Way(calm, False) for calm in CALMS[::2]))
+VARIANTS = (*(_Variant(calm, True) for calm in CALMS), *(_Variant(calm, False) for calm in CALMS[::2]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,12 +164,12 @@ class _PassingTask:
         """The plan as the planner finds it."""
         return plan(self.problem, self.planner, self.vehicle, self.progress)
 
-    def tightened(self, plain: Plan, reserve: float, way: _Way, problem: Problem) -> Plan:
-        """The plan of a problem with a reserve, in some way; judged by the task's own problem and vehicle."""
+    def tightened(self, plain: Plan, reserve: float, variant: _Variant, problem: Problem) -> Plan:
+        """A variant of the plan with a reserve, judged by the task's own problem and vehicle."""
         vehicle, planner = self.vehicle, self._anew(reserve)
-        if way.calm < 1.0 and plain.assessment is not None:
-            vehicle = replace(vehicle, max_body_rate=way.calm * (plain.assessment.max_body_rate or inf))
-        if way.goes_on:
+        if variant.calm < 1.0 and plain.assessment is not None:
+            vehicle = replace(vehicle, max_body_rate=variant.calm * (plain.assessment.max_body_rate or inf))
+        if variant.goes_on:
             planner = self._from(plain, reserve)
         with within_time(TIGHTENING_TIME, processor):
             found = plan(problem, planner, vehicle, self.progress)
@@ -219,7 +220,7 @@ class _Flown:
 
     round: Round
     scores: Score
-    way: _Way
+    variant: _Variant
 
 
 @dataclass
@@ -231,7 +232,7 @@ class _Tightening:
     proving: int
     tried: Callable[[Round], None]
     rounds: list[Round] = field(default_factory=list)
-    _ways: tuple[_Way, ...] = WAYS
+    _variants: tuple[_Variant, ...] = VARIANTS
 
     def passing(self) -> Passing:
         """The plan that passes, proven. Raises Infeasible where there is none."""
@@ -245,7 +246,7 @@ class _Tightening:
             share = self.task.share(done.plan, fresh)
             if self.task.is_enough(share):
                 return self._proven(done, share, fresh)
-            self._ways = WAYS
+            self._variants = VARIANTS
             following = self._round(steps + STRIDE) if attempt + 1 < PROOFS else None
             if following is None:
                 raise self._unreachable(done, fresh)
@@ -254,7 +255,8 @@ class _Tightening:
 
     def _plain(self) -> tuple[Round, Score]:
         found = self.task.plain()
-        self._least = self.task.planner.reserve if found.keeps(self.task.planner.reserve) else 0.0
+        asked = self.task.planner.reserve  # which a plan without one that keeps it gives up
+        self._least = next((each for each in (asked, LITTLE_RESERVE) if found.keeps(each)), 0.0)
         scores = self.task.training(found, self.training)
         return self._noted(Round(self._least, found, _passed(scores))), scores
 
@@ -289,46 +291,48 @@ class _Tightening:
     def _round(self, steps: int) -> Round | None:
         """The best round with so many steps of reserve; None where there is no such plan.
 
-        Ways are tried until enough flights pass, from when on none but the last one is. Until then the best
-        ones go on to the next round, and the best is tried again with more thrust in gates that flights pass
-        off their attitude, which stays if that helps.
+        Variants are tried until enough flights pass, from when on none but the last one is. Until then the
+        best ones go on to the next round, and the best is tried again with more thrust in gates that flights
+        pass off their attitude, which stays if that helps.
         """
         tried: list[_Flown] = []
-        for way in self._ways:
+        for variant in self._variants:
             longest = DEAR * min((each.round.plan.duration for each in tried), default=inf)
-            found = self._planned(steps, way, self._narrowed, longest)
+            found = self._planned(steps, variant, self._narrowed, longest)
             if found is not None:
                 tried.append(found)
             if found is not None and self.task.is_likely_enough(found.round.share):
-                self._ways = (way,)
+                self._variants = (variant,)
                 return found.round
         if not tried:
             return None
         tried.sort(key=lambda each: _fraction(each.round), reverse=True)
-        self._ways = tuple(each.way for each in tried[:KEPT_WAYS])
+        self._variants = tuple(each.variant for each in tried[:KEPT_VARIANTS])
         return self._firmer(steps, tried[0])
 
     def _firmer(self, steps: int, best: _Flown) -> Round:
         """A round with more thrust in gates, if more of its flights pass; else the one that is known."""
         kept = 0.5 * (1.0 + self.task.probability)  # half of those that may fail
         firm = firmer(self._narrowed, self.task.vehicle, best.round.plan, best.scores, kept)
-        again = None if firm == self._narrowed else self._planned(steps, best.way, firm)
+        again = None if firm == self._narrowed else self._planned(steps, best.variant, firm)
         if again is None or _fraction(again.round) <= _fraction(best.round):
             return best.round
         self._narrowed = firm
         return again.round
 
-    def _planned(self, steps: int, way: _Way, problem: Problem, longest: float = inf) -> _Flown | None:
-        """A round with so many steps of reserve, in some way; None without a plan, or a short enough one."""
+    def _planned(
+        self, steps: int, variant: _Variant, problem: Problem, longest: float = inf
+    ) -> _Flown | None:
+        """A round with so many steps of reserve; None without a plan, or one that is short enough."""
         reserve = round(self._least + steps * STEP, 9)
         try:
-            found = self.task.tightened(self.rounds[0].plan, reserve, way, problem)
+            found = self.task.tightened(self.rounds[0].plan, reserve, variant, problem)
         except (Infeasible, SpecError):  # no plan, or no such reserve
             return None
         if found.duration > longest:
             return None
         scores = self.task.training(found, self.training)
-        return _Flown(self._noted(Round(reserve, found, _passed(scores))), scores, way)
+        return _Flown(self._noted(Round(reserve, found, _passed(scores))), scores, variant)
 
     def _noted(self, done: Round) -> Round:
         self.rounds.append(done)
