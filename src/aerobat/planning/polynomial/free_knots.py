@@ -95,7 +95,8 @@ class FreeKnots(Planner):
         where = "between obstacles no way was found, and " if is_closed else ""
         sentence = (
             f"no polynomials are certified to fly '{problem.name}' with {task.vehicle.name}: "
-            f"{where}at the last attempt {last}; widen what binds there, or give other --segments"
+            f"{where}at the last attempt {last}, which does not prove that there are none; "
+            "widen what binds there, or give other --segments"
         )
         raise Infeasible(Reason(sentence, limits_of(last)), recorder.attempts)
 
