@@ -92,6 +92,24 @@ def test_a_saved_plan_carries_its_tube(tmp_path):
     assert ab.load_plan(tmp_path / "flip.plan").tube == found.tube
 
 
+def test_a_plain_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened():
+    """Its proof fails on fresh flights; the next round is of the problem as it is, and proven on others."""
+    tightening = object.__new__(_Tightening)
+    tightening.task = SimpleNamespace(
+        problem="as it is",
+        is_likely_enough=lambda share: True,
+        is_enough=lambda share: share,
+        share=lambda plan, fresh: plan == "tightened",
+    )
+    tightening.training, tightening.proving = range(4), 10
+    tightening._plain = lambda: (SimpleNamespace(plan="plain", share=1.0), None)
+    tightening._planned = lambda steps, variant, problem, longest: SimpleNamespace(
+        round=SimpleNamespace(plan="tightened", share=1.0, problem=problem)
+    )
+    tightening._proven = lambda done, share, fresh: (done.plan, done.problem, fresh)
+    assert tightening.passing() == ("tightened", "as it is", range(14, 24))
+
+
 @pytest.mark.slow
 def test_where_rotors_lag_otherwise_than_known_turning_slower_costs_less_than_any_reserve():
     """At a quarter more or less than a lag of 33 ms, a flip of 860°/s is 7° late; half of that is as fast."""

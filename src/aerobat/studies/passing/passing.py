@@ -46,7 +46,8 @@ KEPT_VARIANTS = 3  # that go on from a round in which too few flights pass
 REFINING = "free-knots"  # the planner that goes on from a plan where the one asked for cannot
 KEPT = ("segments", "clearance", "time_limit")  # of the settings of the one asked for
 DEAR = 1.15  # times a round's shortest plan: longer ones lost their way, and a larger reserve costs less
-TIGHTENING_TIME = 5.0  # [s] of the processor for one tightened plan: those that are found take 0.3 to 3
+# [s] of the processor for one tightened plan, or what the plain one took: those that are found take 0.3 to 3
+TIGHTENING_TIME = 5.0
 Flights = Annotated[int, Field(ge=1, le=10**6, description="whole number from 1 to a million")]
 
 
@@ -164,14 +165,19 @@ class _PassingTask:
         """The plan as the planner finds it."""
         return plan(self.problem, self.planner, self.vehicle, self.progress)
 
-    def tightened(self, plain: Plan, reserve: float, variant: _Variant, problem: Problem) -> Plan:
-        """A variant of the plan with a reserve, judged by the task's own problem and vehicle."""
+    def tightened(
+        self, plain: Plan, reserve: float, variant: _Variant, problem: Problem, limit: float
+    ) -> Plan:
+        """A variant of the plan with a reserve, judged by the task's own problem and vehicle.
+
+        It is found within `limit` [s] of the processor.
+        """
         vehicle, planner = self.vehicle, self._anew(reserve)
         if variant.calm < 1.0 and plain.assessment is not None:
             vehicle = replace(vehicle, max_body_rate=variant.calm * (plain.assessment.max_body_rate or inf))
         if variant.goes_on:
             planner = self._from(plain, reserve)
-        with within_time(TIGHTENING_TIME, processor):
+        with within_time(limit, processor):
             found = plan(problem, planner, vehicle, self.progress)
         return replace(found, problem=self.problem, vehicle=self.vehicle)
 
@@ -237,6 +243,7 @@ class _Tightening:
     def passing(self) -> Passing:
         """The plan that passes, proven. Raises Infeasible where there is none."""
         plain, scores = self._plain()
+        self._narrowed = self.task.problem
         steps, done = 0, plain
         if not self.task.is_likely_enough(plain.share):
             self._narrowed = narrowed(self.task.problem, self.task.vehicle, scores)
@@ -254,7 +261,10 @@ class _Tightening:
         raise AssertionError("a proof ends one way or the other")
 
     def _plain(self) -> tuple[Round, Score]:
+        began = processor()
         found = self.task.plain()
+        took = 0.0 if found.rescue else processor() - began
+        self._limit = max(took, TIGHTENING_TIME)
         asked = self.task.planner.reserve  # which a plan without one that keeps it gives up
         self._least = next((each for each in (asked, LITTLE_RESERVE) if found.keeps(each)), 0.0)
         scores = self.task.training(found, self.training)
@@ -326,7 +336,7 @@ class _Tightening:
         """A round with so many steps of reserve; None without a plan, or one that is short enough."""
         reserve = round(self._least + steps * STEP, 9)
         try:
-            found = self.task.tightened(self.rounds[0].plan, reserve, variant, problem)
+            found = self.task.tightened(self.rounds[0].plan, reserve, variant, problem, self._limit)
         except (Infeasible, SpecError):  # no plan, or no such reserve
             return None
         if found.duration > longest:
