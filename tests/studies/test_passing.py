@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.studies.passing import Passing, Round
-from aerobat.studies.passing.passing import _Tightening
 from aerobat.studies.passing.spread import firmer
+from aerobat.studies.passing.tightening import Tightening
 
 WEAK = ab.Dispersion(name="weak", mass=0.05, rotor=0.04, start_position=0.02)
 HARSH = ab.Dispersion(name="harsh", start_velocity=30.0, mass=1e-4)
@@ -64,7 +64,7 @@ def test_a_probability_that_is_met_already_costs_nothing():
 @given(need=st.integers(0, 20), room=st.integers(0, 20))
 def test_the_least_reserve_is_found_wherever_plans_end(need: int, room: int):
     """Without a plan above some reserve, a smaller one that is enough is found all the same."""
-    tightening = object.__new__(_Tightening)
+    tightening = object.__new__(Tightening)
     tightening.task = SimpleNamespace(is_likely_enough=lambda share: share)
     most = need + room
     tightening._round = lambda steps: None if steps > most else SimpleNamespace(share=steps >= need)
@@ -94,7 +94,7 @@ def test_a_saved_plan_carries_its_tube(tmp_path):
 
 def test_a_plain_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened():
     """Its proof fails on fresh flights; the next round is of the problem as it is, and proven on others."""
-    tightening = object.__new__(_Tightening)
+    tightening = object.__new__(Tightening)
     tightening.task = SimpleNamespace(
         problem="as it is",
         is_likely_enough=lambda share: True,

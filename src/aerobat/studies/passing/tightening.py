@@ -1,0 +1,207 @@
+"""The search for the smallest reserve with which enough flights pass, and its proof on fresh flights."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import inf
+
+from aerobat.errors import Infeasible, SpecError
+from aerobat.evaluation import Score
+from aerobat.optimization.deadline import processor
+from aerobat.planning.result import LITTLE_RESERVE
+from aerobat.planning.tube import Tube
+from aerobat.problem import Problem
+from aerobat.studies.passing.causes import standing_in_the_way
+from aerobat.studies.passing.result import Passing, Round
+from aerobat.studies.passing.spread import LEVEL, firmer, narrowed, spread_of
+from aerobat.studies.passing.task import VARIANTS, PassingTask, Variant, passed
+from aerobat.studies.share import Share, percent
+
+STEP = 0.02  # of every limit's range, between reserves that are tried
+STRIDE = 3  # steps from one round to the next until flights pass
+MAX_STEPS = 20  # a reserve of two fifths at either end leaves a fifth of the range to fly with
+# proofs are attempted on flights of their own: each errs with 2.5 % at most, both together with 5 %
+PROOFS = 2
+KEPT_VARIANTS = 3  # that go on from a round in which too few flights pass
+DEAR = 1.15  # times a round's shortest plan: longer ones lost their way, and a larger reserve costs less
+# [s] of the processor for one tightened plan, or what the plain one took: those that are found take 0.3 to 3
+TIGHTENING_TIME = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Flown:
+    """A round, with what tells how to go on from it."""
+
+    round: Round
+    scores: Score
+    variant: Variant
+
+
+@dataclass
+class Tightening:
+    """The search for the smallest reserve that is enough."""
+
+    task: PassingTask
+    training: range
+    proving: int
+    tried: Callable[[Round], None]
+    rounds: list[Round] = field(default_factory=list)
+    _variants: tuple[Variant, ...] = VARIANTS
+
+    def passing(self) -> Passing:
+        """The plan that passes, proven. Raises Infeasible where there is none."""
+        plain, scores = self._plain()
+        self._narrowed = self.task.problem
+        steps, done = 0, plain
+        if not self.task.is_likely_enough(plain.share):
+            self._narrowed = narrowed(self.task.problem, self.task.vehicle, scores)
+            steps, done = self._smallest()
+        for attempt in range(PROOFS):
+            fresh = self._fresh(attempt)
+            share = self.task.share(done.plan, fresh)
+            if self.task.is_enough(share):
+                return self._proven(done, share, fresh)
+            self._variants = VARIANTS
+            following = self._round(steps + STRIDE) if attempt + 1 < PROOFS else None
+            if following is None:
+                raise self._unreachable(done, fresh)
+            steps, done = steps + STRIDE, following
+        raise AssertionError("a proof ends one way or the other")
+
+    def _plain(self) -> tuple[Round, Score]:
+        began = processor()
+        found = self.task.plain()
+        took = 0.0 if found.rescue else processor() - began
+        self._limit = max(took, TIGHTENING_TIME)
+        asked = self.task.planner.reserve  # which a plan without one that keeps it gives up
+        self._least = next((each for each in (asked, LITTLE_RESERVE) if found.keeps(each)), 0.0)
+        scores = self.task.training(found, self.training)
+        return self._noted(Round(self._least, found, passed(scores))), scores
+
+    def _smallest(self) -> tuple[int, Round]:
+        """The fewest steps of reserve with which enough training flights pass, or nearly, and that round."""
+        low, high, steps = -1, MAX_STEPS + 1, 0  # high: without a plan
+        while steps > low:
+            done = self._round(steps)
+            if done is None:
+                high = steps
+            elif self.task.is_likely_enough(done.share):
+                return self._refined(low, steps, done)
+            else:
+                low = steps
+            steps = min(low + STRIDE, (low + high) // 2)
+        best = max(self.rounds, key=_fraction)
+        if best.share.fraction < self.task.probability:
+            raise self._unreachable(best, self.training)
+        return round((best.reserve - self._least) / STEP), best
+
+    def _refined(self, low: int, high: int, best: Round) -> tuple[int, Round]:
+        """The fewest steps between too few and enough, by bisection."""
+        while high - low > 1:
+            middle = (low + high) // 2
+            done = self._round(middle)
+            if done is not None and self.task.is_likely_enough(done.share):
+                high, best = middle, done
+            else:
+                low = middle
+        return high, best
+
+    def _round(self, steps: int) -> Round | None:
+        """The best round with so many steps of reserve; None where there is no such plan.
+
+        Variants are tried until enough flights pass, from when on none but the last one is. Until then the
+        best ones go on to the next round, and the best is tried again with more thrust in gates that flights
+        pass off their attitude, which stays if that helps.
+        """
+        tried: list[_Flown] = []
+        for variant in self._variants:
+            longest = DEAR * min((each.round.plan.duration for each in tried), default=inf)
+            found = self._planned(steps, variant, self._narrowed, longest)
+            if found is not None:
+                tried.append(found)
+            if found is not None and self.task.is_likely_enough(found.round.share):
+                self._variants = (variant,)
+                return found.round
+        if not tried:
+            return None
+        tried.sort(key=lambda each: _fraction(each.round), reverse=True)
+        self._variants = tuple(each.variant for each in tried[:KEPT_VARIANTS])
+        return self._firmer(steps, tried[0])
+
+    def _firmer(self, steps: int, best: _Flown) -> Round:
+        """A round with more thrust in gates, if more of its flights pass; else the one that is known."""
+        kept = 0.5 * (1.0 + self.task.probability)  # half of those that may fail
+        firm = firmer(self._narrowed, self.task.vehicle, best.round.plan, best.scores, kept)
+        again = None if firm == self._narrowed else self._planned(steps, best.variant, firm)
+        if again is None or _fraction(again.round) <= _fraction(best.round):
+            return best.round
+        self._narrowed = firm
+        return again.round
+
+    def _planned(self, steps: int, variant: Variant, problem: Problem, longest: float = inf) -> _Flown | None:
+        """A round with so many steps of reserve; None without a plan, or one that is short enough."""
+        reserve = round(self._least + steps * STEP, 9)
+        try:
+            found = self.task.tightened(self.rounds[0].plan, reserve, variant, problem, self._limit)
+        except (Infeasible, SpecError):  # no plan, or no such reserve
+            return None
+        if found.duration > longest:
+            return None
+        scores = self.task.training(found, self.training)
+        return _Flown(self._noted(Round(reserve, found, passed(scores))), scores, variant)
+
+    def _noted(self, done: Round) -> Round:
+        self.rounds.append(done)
+        self.tried(done)
+        return done
+
+    def _fresh(self, attempt: int) -> range:
+        """Numbers of flights that nothing was learned from."""
+        first = len(self.training) + attempt * self.proving
+        return range(first, first + self.proving)
+
+    def _proven(self, done: Round, share: Share, fresh: range) -> Passing:
+        task, plain = self.task, self.rounds[0]
+        spread = spread_of(done.plan, task.vehicle, task.conditions, task.seed, task.controller, fresh)
+        tube = Tube(
+            conditions=task.conditions.name,
+            seed=task.seed,
+            level=LEVEL,
+            times=tuple(spread.times.tolist()),
+            position_error=tuple(spread.position_error.tolist()),
+            attitude_error=tuple(spread.attitude_error.tolist()),
+            rotor_margin=tuple(spread.rotor_margin.tolist()),
+            reserve=done.reserve,
+            plain_duration=plain.plan.duration,
+            probability=task.probability,
+            passed=share.count,
+            flights=share.of,
+            lower_bound=share.interval[0],
+        )
+        return Passing(
+            plan=replace(done.plan, tube=tube),
+            plain=plain.plan,
+            before=share if done is plain else task.share(plain.plan, fresh),
+            after=share,
+            probability=task.probability,
+            fresh=fresh,
+            rounds=tuple(self.rounds),
+        )
+
+    def _unreachable(self, best: Round, flights: range) -> Infeasible:
+        """The error that says how often flights pass at most, and which cause stands in the way."""
+        task, share = self.task, self.task.share(best.plan, flights)
+        cause = standing_in_the_way(task.conditions, lambda without: task.share(best.plan, flights, without))
+        why = "" if cause is None else f"; {cause.sentence(task.probability)}"
+        return Infeasible(
+            f"'{task.problem.name}' on {task.vehicle.name} is not proven to pass as often as asked, "
+            f"{percent(task.probability)} %: under {task.conditions.name} {share} pass at best, with a "
+            f"reserve of {best.reserve:g}{why}; ask for less, or better that",
+            [attempt for done in self.rounds for attempt in done.plan.attempts],
+            remedy="",
+        )
+
+
+def _fraction(done: Round) -> float:
+    return done.share.fraction
