@@ -30,7 +30,7 @@ KEPT = ("segments", "clearance", "time_limit")  # of the settings of the one ask
 
 @dataclass(frozen=True)
 class Variant:
-    """How a plan is tightened, beside its reserve."""
+    """Kind of tightening, beside the reserve."""
 
     calm: float  # [-] of the plain plan's largest body rate, that is left
     goes_on: bool  # from the plain plan; else the planner begins anew
@@ -41,7 +41,7 @@ VARIANTS = (*(Variant(calm, True) for calm in CALMS), *(Variant(calm, False) for
 
 @dataclass(frozen=True, eq=False)
 class PassingTask:
-    """What is planned, flown and asked."""
+    """Problem, vehicle and flights of a plan that is to pass."""
 
     problem: Problem
     planner: Any  # a planner with a reserve
