@@ -1,16 +1,25 @@
 """Tutorials run from top to bottom, and show what they showed."""
 
+import re
+
 import nbformat
 import pytest
 from nbclient import NotebookClient
 
 from places import ROOT
 
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.ipynb"))
 
 
+def beginnings(text):
+    """How lines begin: words, and numbers, which rounding on another processor changes a little."""
+    lines = [line[:24] for line in text.splitlines()]
+    return [NUMBER.sub("#", line) for line in lines], list(map(float, NUMBER.findall(" ".join(lines))))
+
+
 def texts(notebook):
-    """What the cells print, without what differs from one machine to another."""
+    """What the cells print."""
     return [
         [output["text"] for output in cell.outputs if output.output_type == "stream"]
         for cell in notebook.cells
@@ -28,4 +37,6 @@ def test_a_tutorial_runs_from_top_to_bottom_and_shows_pictures_and_sentences(pat
     for before, after in zip(texts(kept), texts(again), strict=True):
         assert len(before) == len(after)
         for one, other in zip(before, after, strict=True):
-            assert [line[:24] for line in one.splitlines()] == [line[:24] for line in other.splitlines()]
+            (words, numbers), (words_again, numbers_again) = beginnings(one), beginnings(other)
+            assert words == words_again
+            assert numbers == pytest.approx(numbers_again, rel=0.01)

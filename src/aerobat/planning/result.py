@@ -24,7 +24,6 @@ from aerobat.vehicle import Vehicle
 # of every limit's range, kept from either end for the controller by planners that use all of it, where a
 # plan shall be flown: rotors without lag leave it nothing otherwise
 FLYING_RESERVE = 0.15
-LITTLE_RESERVE = FLYING_RESERVE / 3  # what vehicles keep that are too weak for more, as in a flip
 FLYING_CLEARANCE = 0.1  # [m] from obstacles, of plans that are flown: what errors take under lab
 
 

@@ -16,7 +16,7 @@ from aerobat.planning.miqp.attempts import default_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES, MAX_INTERVALS
 from aerobat.planning.planners import Planner, planner_class, planner_with_reserve
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.result import FLYING_RESERVE, LITTLE_RESERVE, Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -125,7 +125,6 @@ class Rescue:
         where they have none, more intervals.
         """
         if self.asked.reserve == FLYING_RESERVE:  # is kept where it can be
-            yield replace(self.asked, reserve=LITTLE_RESERVE, rescue=False), "with a third of the reserve"
             yield replace(self.asked, reserve=0.0, rescue=False), "without a reserve"
         more = with_more_intervals(self.asked, self.problem, self.vehicle)
         if any(attempt.cost is not None for attempt in self.recorder.attempts):

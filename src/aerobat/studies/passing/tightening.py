@@ -9,7 +9,6 @@ from math import inf
 from aerobat.errors import Infeasible, SpecError
 from aerobat.evaluation import Score
 from aerobat.optimization.deadline import processor
-from aerobat.planning.result import LITTLE_RESERVE
 from aerobat.planning.tube import Tube
 from aerobat.problem import Problem
 from aerobat.studies.passing.causes import standing_in_the_way
@@ -74,8 +73,8 @@ class Tightening:
         found = self.task.plain()
         took = 0.0 if found.rescue else processor() - began
         self._limit = max(took, TIGHTENING_TIME)
-        asked = self.task.planner.reserve  # which a plan without one that keeps it gives up
-        self._least = next((each for each in (asked, LITTLE_RESERVE) if found.keeps(each)), 0.0)
+        asked = self.task.planner.reserve
+        self._least = asked if found.keeps(asked) else 0.0  # which a rescued plan gives up
         scores = self.task.training(found, self.training)
         return self._noted(Round(self._least, found, passed(scores))), scores
 
