@@ -63,7 +63,7 @@ def fly_scores(flying: Pool, tasks: tuple[FlightTask, ...], flights: range) -> l
     """
     parts = [(k, numbers) for k in range(len(tasks)) for numbers in cut(flights)]
     found = dict(flying.results(_score_chunk, tasks, parts, together=TOGETHER, compiles=True))
-    return [_joined([found[k, numbers] for numbers in cut(flights)]) for k in range(len(tasks))]
+    return [joined([found[k, numbers] for numbers in cut(flights)]) for k in range(len(tasks))]
 
 
 def fly_trials(task: FlightTask, progress: Callable[[int, int], None] | None = None) -> Trials:
@@ -92,14 +92,14 @@ def _score_chunk(tasks: tuple[FlightTask, ...], part: tuple[int, range]) -> Scor
     return score_flights(task.plan, task.vehicle, config=task.config(flights))
 
 
-def _joined(parts: list[Any]) -> Any:
-    """Scores of many flights from those of some: their arrays behind one another, whatever holds them."""
+def joined(parts: list[Any]) -> Any:
+    """Join scores of some flights to those of all: their arrays behind one another, whatever holds them."""
     first = parts[0]
     if isinstance(first, np.ndarray):
         return np.concatenate(parts)
     if isinstance(first, tuple):
-        return tuple(_joined(list(each)) for each in zip(*parts, strict=True))
+        return tuple(joined(list(each)) for each in zip(*parts, strict=True))
     if is_dataclass(first) and not isinstance(first, type):
         names = [field.name for field in fields(first)]
-        return replace(first, **{name: _joined([getattr(part, name) for part in parts]) for name in names})
+        return replace(first, **{name: joined([getattr(part, name) for part in parts]) for name in names})
     return first

@@ -77,12 +77,7 @@ def _from_closed_form(
         start = WarmStart.of(MinSnap().plan(task.problem, task.vehicle), task.stages)
     except Infeasible:
         return known
-    shortest_known = inf if known is None else known.solution.duration
-    path = scan.refinement.rough(start, segments, shortest_known)
-    if not scan.refinement.is_promising(path) or _duration(path) >= shortest_known:
-        return known
-    found = scan.refinement.finished(path)
-    return found if found.feasible and found.solution.duration < shortest_known else known
+    return _shorter(scan.refinement, start, segments, known) or known
 
 
 def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judged[RefinedPath]:
@@ -90,7 +85,7 @@ def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judge
 
     The scan's starts are slower than what they lead to, and have stages where a slower path has them.
     """
-    refinement, best = scan.refinement, judged
+    best = judged
     for fraction in SHORTER:
         duration = judged.solution.duration
         if duration <= SLOW * scan.least or fraction * duration < scan.least or out_of_time():
@@ -98,12 +93,20 @@ def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judge
         start = scan.start(fraction * duration / scan.attempts.formulation.chain.intervals)
         if start is None:
             continue
-        path = refinement.rough(start, segments, best.solution.duration)
-        if refinement.is_promising(path) and _duration(path) < best.solution.duration:
-            found = refinement.finished(path)
-            if found.feasible and found.solution.duration < best.solution.duration:
-                best = found
+        best = _shorter(scan.refinement, start, segments, best) or best
     return best
+
+
+def _shorter(
+    refinement: Refinement, start: WarmStart, segments: int, known: Judged[RefinedPath] | None
+) -> Judged[RefinedPath] | None:
+    """The certified path near a start, where it is shorter than a known one; else None."""
+    longest = inf if known is None else known.solution.duration
+    path = refinement.rough(start, segments, longest)
+    if not refinement.is_promising(path) or _duration(path) >= longest:
+        return None
+    found = refinement.finished(path)
+    return found if found.feasible and found.solution.duration < longest else None
 
 
 def _duration(path: RefinedPath) -> float:

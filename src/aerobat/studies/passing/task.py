@@ -14,7 +14,7 @@ from aerobat.optimization.deadline import processor, within_time
 from aerobat.planning import Attempt, Plan, Planner, plan
 from aerobat.planning.planners import planner_with_reserve
 from aerobat.problem import Problem
-from aerobat.studies.flights import FlightTask, fly_scores
+from aerobat.studies.flights import FlightTask, fly_scores, joined
 from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool
 from aerobat.vehicle import Vehicle
@@ -64,11 +64,10 @@ class PassingTask:
 
         It is found within `limit` [s] of the processor.
         """
-        vehicle, planner = self.vehicle, self._anew(reserve)
+        vehicle = self.vehicle
         if variant.calm < 1.0 and plain.assessment is not None:
             vehicle = replace(vehicle, max_body_rate=variant.calm * (plain.assessment.max_body_rate or inf))
-        if variant.goes_on:
-            planner = self._from(plain, reserve)
+        planner = self._from(plain, reserve) if variant.goes_on else self._anew(reserve)
         with within_time(limit, processor):
             found = plan(problem, planner, vehicle, self.progress)
         return replace(found, problem=self.problem, vehicle=self.vehicle)
@@ -96,7 +95,8 @@ class PassingTask:
         first = self.scores(found, flights[:SCREENED])
         if len(flights) <= SCREENED or passed(first).interval[1] < self.probability:
             return first
-        return self.scores(found, flights)
+        scores: Score = joined([first, self.scores(found, flights[SCREENED:])])
+        return scores
 
     def share(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Share:
         """The share of flights of a plan that pass."""
