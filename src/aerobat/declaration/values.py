@@ -14,6 +14,7 @@ _REPORTER = "aerobat.reporting.notebooks"
 T = TypeVar("T")
 
 _NAN = "nan"  # in place of what is not equal to itself
+_known_names: dict[type[Any], tuple[str, ...]] = {}  # of fields, by class
 _FEW = 9  # entries: a longer list is told by its length
 
 
@@ -64,8 +65,15 @@ def _representation(self: Any) -> str:
     return text if text.startswith(f"{name}(") else f"<{name}: {text}>"
 
 
+def _names(cls: type[Any]) -> tuple[str, ...]:
+    known = _known_names.get(cls)
+    if known is None:
+        known = _known_names[cls] = tuple(field.name for field in dataclasses.fields(cls))
+    return known
+
+
 def _content(self: Any) -> tuple[Any, ...]:
-    return tuple(_comparable(getattr(self, field.name)) for field in dataclasses.fields(self))
+    return tuple(_comparable(getattr(self, name)) for name in _names(type(self)))
 
 
 def _comparable(value: Any) -> Any:
@@ -82,7 +90,10 @@ def _comparable(value: Any) -> Any:
 def _equal(self: Any, other: object) -> Any:
     if type(self) is not type(other):
         return NotImplemented
-    return self is other or (hash(self) == hash(other) and _content(self) == _content(other))
+    if self is other or hash(self) != hash(other):
+        return self is other
+    pairs = ((getattr(self, name), getattr(other, name)) for name in _names(type(self)))
+    return all(mine is its or _comparable(mine) == _comparable(its) for mine, its in pairs)
 
 
 def _hash(self: Any) -> int:
@@ -90,7 +101,7 @@ def _hash(self: Any) -> int:
     known: int | None = self.__dict__.get("_hash")
     if known is None:
         known = hash((type(self).__qualname__, _content(self)))
-        parts = (getattr(self, field.name) for field in dataclasses.fields(self))
+        parts = (getattr(self, name) for name in _names(type(self)))
         if not any(isinstance(part, np.ndarray) and part.flags.writeable for part in parts):
             object.__setattr__(self, "_hash", known)
     return known
@@ -98,7 +109,7 @@ def _hash(self: Any) -> int:
 
 def _reduce(self: Any) -> tuple[Any, ...]:
     """Pickled by its fields and checked anew: what comes back is read-only too."""
-    values = (getattr(self, field.name) for field in dataclasses.fields(self))
+    values = (getattr(self, name) for name in _names(type(self)))
     return type(self), tuple(dict(value) if isinstance(value, Mapping) else value for value in values)
 
 

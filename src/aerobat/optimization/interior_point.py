@@ -375,8 +375,7 @@ class _InteriorPoint:
         equal = at.point.equality_rows
         weight = max(1.0, np.abs(np.diag(matrix)).max()) * _EQUALITY_WEIGHT if len(equal) else 0.0
         matrix += weight * (equal.T @ equal)
-        box = -at.z_lower + at.z_upper + self._barrier * (1.0 / lower - 1.0 / upper)
-        residual = at.dual_residual(self._cost) - at.point.rows.transposed(at.z) - box
+        residual = self._cost + equal.T @ at.y - self._barrier * (1.0 / lower - 1.0 / upper)
         least = damping = self._settings.damping
         while damping < _LARGEST_DAMPING:
             try:

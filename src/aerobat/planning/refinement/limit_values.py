@@ -98,7 +98,7 @@ class LimitValues:
         found = self._functions.values(self._shared, self._given(derivatives, near), NO_DIRECTION)
         with np.errstate(invalid="ignore"):
             values = found[0].T @ self.measured.T
-        values[:, self.linear] = np.tensordot(derivatives, self.path[self.linear], ([1, 2], [1, 2]))
+        values[:, self.linear] = derivatives.reshape(-1, 18) @ self.path.T
         values -= self._bounds
         values = np.where(np.isnan(values), np.inf, values)
         if near.planes is None:
@@ -127,8 +127,9 @@ class LimitValues:
         given = self._given(derivatives, near, *of_measures)
         second = np.zeros((len(derivatives), 18, 18))
         second[:, 3:, 3:] = self._functions.curvature(self._shared, given, DIRECTIONS).transpose(2, 1, 0)
-        rows = self.path[self.linear].reshape(-1, 18)
-        second += np.tensordot(squares[:, :held][:, self.linear], rows[:, :, None] * rows[:, None], 1)
+        if len(self.path):
+            products = self.path[:, :, None] * self.path[:, None]
+            second += np.tensordot(squares[:, :held][:, self.linear], products, 1)
         if near.planes is not None:
             beside = self.clearances.slopes(derivatives, near.planes).reshape(len(derivatives), -1, 18)
             second += np.swapaxes(beside, 1, 2) @ (squares[:, held:, None] * beside)
@@ -187,9 +188,9 @@ class LimitValues:
 
     @cached_property
     def path(self) -> Array:
-        """Weights on the path's derivatives, (c, 6, 3)."""
+        """Weights of the limits that are linear in the path's derivatives, (l, 18)."""
         rows = [sign / limit.size * limit.quantity.path for limit, sign in self._held]
-        return np.array(rows).reshape(-1, 6, 3)
+        return np.array(rows).reshape(-1, 18)[self.linear]
 
     @cached_property
     def _bounds(self) -> Array:
@@ -210,7 +211,7 @@ class LimitSlopes:
         limits, count = self.limits, len(change)
         moved = self.measures @ change[:, MOVING].reshape(count, MOTION, 1)
         found = moved[..., 0] @ limits.measured.T
-        found[:, limits.linear] = np.tensordot(change, limits.path[limits.linear], ([1, 2], [1, 2]))
+        found[:, limits.linear] = change.reshape(count, 18) @ limits.path.T
         if self.beside is None:
             return np.asarray(found)
         return np.concatenate([found, np.einsum("mcka,mka->mc", self.beside, change)], axis=1)
@@ -219,7 +220,7 @@ class LimitSlopes:
         """The sum of the slopes (m, 6, 3), weighted (m, c)."""
         limits, held = self.limits, len(self.limits.measured)
         by_measure = weights[:, None, :held] @ limits.measured
-        total = np.tensordot(weights[:, :held][:, limits.linear], limits.path[limits.linear], 1)
+        total = (weights[:, :held][:, limits.linear] @ limits.path).reshape(-1, 6, 3)
         total[:, MOVING] += (by_measure @ self.measures).reshape(-1, 5, 3)
         if self.beside is not None:
             total += np.einsum("mc,mcka->mka", weights[:, held:], self.beside)

@@ -16,7 +16,7 @@ from aerobat.arrays import Array, Indices, Mask
 from aerobat.planning.refinement.closure import Closure
 from aerobat.planning.refinement.excess import chebyshev
 from aerobat.planning.refinement.limit_values import Frames, LimitSlopes, LimitValues
-from aerobat.planning.refinement.spline import Motion, Spline, basis
+from aerobat.planning.refinement.spline import KnotData, Motion, Spline, basis
 from aerobat.planning.refinement.stage_values import KNOWN, STATE, StageValues
 
 AT_END = basis(np.array([1.0]))  # of a segment, (1, 6, 10)
@@ -81,7 +81,7 @@ class RefinementProgram:
         """Body axes along the path that it begins with."""
         trajectory = self.spline.trajectory(self.spline.start)
         times = trajectory.knots[:-1, None] + trajectory.durations[:, None] * self.fractions
-        derivatives = self.spline.derivatives(self.spline.start, self.places).reshape(-1, 6, 3)
+        derivatives = self.spline.data(self.spline.start).derivatives(self.places).reshape(-1, 6, 3)
         return self.limits.frames(np.minimum(times.ravel(), trajectory.duration), derivatives)
 
     @cached_property
@@ -212,22 +212,22 @@ class RefinedPoint:
         """The second derivatives of their weighted sum, and of squares of what moves inequalities, (n, n)."""
         program, spline = self.program, self.program.spline
         segments, count, kinds = program.counts.shape
-        parts = np.cumsum([program.counts.size, len(program.windows[1])])
-        at_places, at_windows, at_stages = np.split(inequality_weights, parts)
+        size, windows = program.counts.size, len(program.windows[1])
+        at_places, others = inequality_weights[:size], inequality_weights[size:]
         faded = program.weights.reshape(-1, kinds)
         weights = at_places.reshape(-1, kinds) * faded
-        squared = squares[: parts[0]].reshape(-1, kinds) * faded**2
+        squared = squares[:size].reshape(-1, kinds) * faded**2
         derivatives = self._motion.derivatives.reshape(-1, 6, 3)
         second = program.limits.curvature(derivatives, program.near, weights, squared)
         moving = self._motion.slopes.reshape(segments, count, 18, -1)
         bent = (second.reshape(segments, count, 18, 18) @ moving).reshape(segments, count * 18, -1)
         blocks = np.swapaxes(moving.reshape(bent.shape), 1, 2) @ bent
         blocks += self._motion.curvature(self.rows.limits.weighted(weights).reshape(segments, count, 6, 3))
-        timed, equal = np.split(equality_weights[: self._linear_equalities], [len(program.timed[1])])
-        blocks += self._stage_blocks(at_stages, equal)
-        others = self.rows.others
-        matrix = spline.assembled(blocks) + others.T @ (squares[parts[0] :, None] * others)
-        by_ratio = at_windows @ program.windows[0] + timed @ program.timed[0]
+        count = len(program.timed[1])
+        blocks += self._stage_blocks(others[windows:], equality_weights[count : self._linear_equalities])
+        rows = self.rows.others
+        matrix = spline.assembled(blocks) + rows.T @ (squares[size:, None] * rows)
+        by_ratio = others[:windows] @ program.windows[0] + equality_weights[:count] @ program.timed[0]
         columns = spline.ratio_columns
         matrix[columns, columns] += by_ratio * self._ratios
         return matrix
@@ -251,11 +251,11 @@ class RefinedPoint:
     def _stage_rows(self, at: Indices, weights: Array) -> Array:
         """Rows (q, n) of Σ weights · derivatives at stages (q,), (q, 6, 3)."""
         spline = self.program.spline
+        segments = np.array(self.program.stage_segments, dtype=np.intp)[at]
+        slopes = self._ends.slopes[segments, 0].reshape(len(at), 18, spline.columns.shape[1])
         rows = np.zeros((len(at), spline.size + 1))
-        for row, stage, by_state in zip(rows, at, weights, strict=True):
-            segment = self.program.stage_segments[stage]
-            slopes = self._ends.slopes[segment, 0].reshape(18, -1)
-            np.add.at(row, spline.columns[segment], by_state.ravel() @ slopes)
+        by_local = (weights.reshape(len(at), 1, 18) @ slopes)[:, 0]
+        np.put_along_axis(rows, spline.columns[segments], by_local, axis=1)
         return rows[:, :-1]
 
     @property
@@ -266,24 +266,28 @@ class RefinedPoint:
     @property
     def _durations(self) -> Array:
         """Of all segments [s], (S,)."""
-        return np.asarray(self._ratios * np.exp(self.x[self.program.spline.mean_column]))
+        return self._data.durations
 
     @property
     def _ratios(self) -> Array:
         """τ of all segments, (S,)."""
-        return np.exp(self.x[self.program.spline.ratio_columns])
+        return self._data.ratios
+
+    @cached_property
+    def _data(self) -> KnotData:
+        return self.program.spline.data(self.x)
 
     @cached_property
     def _derivatives(self) -> Array:
-        return self.program.spline.derivatives(self.x, self.program.places)
+        return self._data.derivatives(self.program.places)
 
     @cached_property
     def _motion(self) -> Motion:
-        return self.program.spline.motion(self.x, self.program.places)
+        return self.program.spline.motion(self._data, self.program.places)
 
     @cached_property
     def _ends(self) -> Motion:
-        return self.program.spline.motion(self.x, AT_END)
+        return self.program.spline.motion(self._data, AT_END)
 
     @cached_property
     def _stage_slopes(self) -> tuple[Indices, Array]:
@@ -293,7 +297,7 @@ class RefinedPoint:
     @cached_property
     def _at_stages(self) -> Array:
         """Derivatives at stages, (stages, 6, 3)."""
-        found = self.program.spline.derivatives(self.x, AT_END)[:, 0]
+        found = self._data.derivatives(AT_END)[:, 0]
         return np.asarray(found[list(self.program.stage_segments)])
 
 
@@ -315,7 +319,7 @@ class RefinedRows:
     def transposed(self, weights: Array) -> Array:
         """The sum of weighted rows, (n,)."""
         counts = self.program.counts
-        at_places, others = np.split(weights, [counts.size])
+        at_places, others = weights[: counts.size], weights[counts.size :]
         at_places = at_places * self.program.weights.ravel()
         by_motion = self.limits.weighted(at_places.reshape(-1, counts.shape[-1]))
         parts = np.swapaxes(self._flat, 1, 2) @ by_motion.reshape(len(counts), -1, 1)

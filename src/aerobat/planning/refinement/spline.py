@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import log, perm
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,6 +43,25 @@ def basis(fractions: Array) -> Array:
     return np.stack(powers, axis=-2) @ TO_COEFFICIENTS
 
 
+class KnotData(NamedTuple):
+    """The data of the knots at both ends of all segments, and how long these last."""
+
+    values: Array  # Z, (S, 10, 3)
+    fixed: Array  # its part that is fixed in SI units
+    ratios: Array  # τ, (S,)
+    durations: Array  # [s], (S,)
+
+    def scaled(self, places: Array) -> Array:
+        """T^-k B at places, (S, p, 6, 10) or (p, 6, 10) as `basis` has them, (S, 6 p, 10)."""
+        found = places * (self.durations[:, None] ** -POWERS[:, 0])[:, None, :, None]
+        return np.asarray(found.reshape(len(self.durations), -1, 2 * END_ORDER))
+
+    def derivatives(self, places: Array) -> Array:
+        """Derivatives of position at places, (S, p, 6, 3)."""
+        found = self.scaled(places) @ self.values
+        return np.asarray(found.reshape(len(found), -1, DERIVATIVES, 3))
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Derivatives of position at places of all segments, and how they follow from the variables.
@@ -51,37 +71,36 @@ class Motion:
 
     derivatives: Array  # (S, p, 6, 3)
     slopes: Array  # by local variables, (S, p, 6, 3, K + 2)
-    _scaled: Array  # T^-k B, (S, p, 6, 10)
-    _by_knots: Array  # the same times τ^m
-    _data: Array  # Z, (S, 10, 3)
-    _fixed: Array  # its part that is fixed in SI units
-    _effect: Array  # of local variables on Y, (S, 10, 3, K)
+    _scaled: Array  # T^-k B, (S, 6 p, 10)
+    _data: KnotData
+    _effect: Array  # of local variables on Z, (S, 10, 3, K)
 
     def curvature(self, weights: Array) -> Array:
         """Second derivatives of Σ weights · derivatives, weights (S, p, 6, 3), by local variables."""
         count = self._effect.shape[-1]
         found = np.zeros((len(weights), count + 2, count + 2))
         ratio, mean = count, count + 1
-        lowered = -POWERS * weights
-        plain, low = (np.einsum("spka,spkm->sma", each, self._by_knots) for each in (weights, lowered))
-        by_ratio = np.einsum("sma,smaK->sK", ORDERS[:, None] * plain + low, self._effect)
-        by_mean = np.einsum("sma,smaK->sK", low, self._effect)
+        flat = weights.reshape(len(weights), -1, 3)
+        both = np.concatenate([flat, (-POWERS * weights).reshape(flat.shape)], axis=2)
+        by_data = np.swapaxes(self._scaled, 1, 2) @ both
+        plain, low = by_data[..., :3], by_data[..., 3:]
+        orders = ORDERS[:, None]
+        by_ratio, by_mean = (
+            (each.reshape(len(weights), 1, -1) @ self._effect.reshape(len(weights), -1, count))[:, 0]
+            for each in (orders * plain + low, low)
+        )
         found[:, :count, ratio] = found[:, ratio, :count] = by_ratio
         found[:, :count, mean] = found[:, mean, :count] = by_mean
-        once, once_fixed, twice, twice_fixed = (
-            self._scaled @ (ORDERS[:, None] ** power * data)[:, None]
-            for power in (1, 2)
-            for data in (self._data, self._fixed)
-        )
-        squared = POWERS**2 * self.derivatives
+        squared = (weights * self.derivatives).sum(axis=(1, 3)) @ POWERS[:, 0] ** 2
+        twice, data = orders**2 * plain, self._data
 
-        def total(values: Array) -> Array:
-            return np.asarray(np.sum(weights * values, axis=(1, 2, 3)))
+        def total(by_data: Array, data: Array) -> Array:
+            return np.asarray(np.einsum("sma,sma->s", by_data, data))
 
-        found[:, ratio, ratio] = total(squared - 2.0 * POWERS * once + twice)
-        both = total(squared - POWERS * (once + once_fixed) + twice_fixed)
+        found[:, ratio, ratio] = squared + total(2.0 * orders * low + twice, data.values)
+        both = squared + total(orders * low, data.values + data.fixed) + total(twice, data.fixed)
         found[:, ratio, mean] = found[:, mean, ratio] = both
-        found[:, mean, mean] = total(squared - 2.0 * POWERS * once_fixed + twice_fixed)
+        found[:, mean, mean] = squared + total(2.0 * orders * low + twice, data.fixed)
         return found
 
 
@@ -127,7 +146,7 @@ class Spline:
 
     @property
     def columns(self) -> Indices:
-        """The variables of each segment, (S, K + 2); -1 in place of those that a segment lacks."""
+        """The variables of each segment, (S, K + 2); n in place of those that a segment lacks."""
         return self._arranged[0]
 
     @cached_property
@@ -144,31 +163,29 @@ class Spline:
 
     def trajectory(self, x: Array) -> Trajectory:
         """The path of variables (n,)."""
-        data, _, _, durations = self._data(x)
-        return Trajectory(durations, TO_COEFFICIENTS @ data, self.task.problem.heading.start)
+        data = self.data(x)
+        coefficients = TO_COEFFICIENTS @ data.values
+        return Trajectory(data.durations, coefficients, self.task.problem.heading.start)
 
-    def derivatives(self, x: Array, places: Array) -> Array:
-        """Derivatives of position (S, p, 6, 3) at places, (S, p, 6, 10) or (p, 6, 10) as `basis` has them."""
-        data, _, _, durations = self._data(x)
-        scaled = places * (durations[:, None] ** -POWERS[:, 0])[:, None, :, None]
-        return np.asarray(scaled @ data[:, None])
+    def data(self, x: Array) -> KnotData:
+        """The data of all knots."""
+        local = self.gathered(x)
+        ratios = np.exp(local[:, -2])
+        durations = ratios * np.exp(local[:, -1])
+        fixed = (durations[:, None] ** ORDERS)[..., None] * self._fixed_data
+        moved = (self._arranged[1] @ local[:, None, :-2, None])[..., 0]
+        return KnotData((ratios[:, None] ** ORDERS)[..., None] * moved + fixed, fixed, ratios, durations)
 
-    def motion(self, x: Array, places: Array) -> Motion:
-        """The same with their slopes."""
-        data, fixed, ratios, durations = self._data(x)
-        effect = self._arranged[1]
-        scaled = places * (durations[:, None] ** -POWERS[:, 0])[:, None, :, None]
-        derivatives = scaled @ data[:, None]
-        by_knots = scaled * (ratios[:, None] ** ORDERS)[:, None, None]
-        segments, count, local = len(data), places.shape[-3], effect.shape[-1]
-        slopes = np.empty((segments, count, DERIVATIVES, 3, local + 2))
-        flat = by_knots.reshape(segments, count * DERIVATIVES, -1) @ effect.reshape(
-            segments, 2 * END_ORDER, -1
-        )
-        slopes[..., :local] = flat.reshape(segments, count, DERIVATIVES, 3, local)
-        for column, moved in ((local, data), (local + 1, fixed)):
-            slopes[..., column] = scaled @ (ORDERS[:, None] * moved)[:, None] - POWERS * derivatives
-        return Motion(derivatives, slopes, scaled, by_knots, data, fixed, effect)
+    def motion(self, data: KnotData, places: Array) -> Motion:
+        """Derivatives at places, as `KnotData.derivatives` has them, with their slopes."""
+        segments, scaled = self.segments, data.scaled(places)
+        derivatives = (scaled @ data.values).reshape(segments, -1, DERIVATIVES, 3)
+        effect = (data.ratios[:, None] ** ORDERS)[..., None, None] * self._arranged[1]
+        by_durations = np.stack([ORDERS[:, None] * each for each in (data.values, data.fixed)], axis=-1)
+        moved = np.concatenate([effect, by_durations], axis=-1)
+        slopes = (scaled @ moved.reshape(segments, 2 * END_ORDER, -1)).reshape(*derivatives.shape, -1)
+        slopes[..., -2:] -= (POWERS * derivatives)[..., None]
+        return Motion(derivatives, slopes, scaled, data, effect)
 
     def gathered(self, step: Array) -> Array:
         """Each segment's own part of a step (n,), (S, K + 2)."""
@@ -176,25 +193,20 @@ class Spline:
 
     def scattered(self, parts: Array) -> Array:
         """The sum (n,) of segments' parts (S, K + 2)."""
-        total = np.zeros(self.size + 1)
-        np.add.at(total, self.columns, parts)
-        return total[:-1]
+        total = np.bincount(self.columns.ravel(), parts.ravel(), self.size + 1)
+        return np.asarray(total[:-1], dtype=float)
 
     def assembled(self, blocks: Array) -> Array:
         """The sum (n, n) of segments' blocks (S, K + 2, K + 2)."""
-        total = np.zeros((self.size + 1, self.size + 1))
-        for columns, block in zip(self.columns, blocks, strict=True):
-            total[np.ix_(columns, columns)] += block
-        return total[:-1, :-1]
+        width = self.size + 1
+        total = np.bincount(self._entries, blocks.ravel(), width**2)
+        return np.asarray(total.reshape(width, width)[:-1, :-1], dtype=float)
 
-    def _data(self, x: Array) -> tuple[Array, Array, Array, Array]:
-        """Z (S, 10, 3), its part that is fixed in SI units, τ (S,) and durations [s] (S,)."""
-        local = self.gathered(x)
-        ratios = np.exp(local[:, -2])
-        durations = ratios * np.exp(local[:, -1])
-        fixed = (durations[:, None] ** ORDERS)[..., None] * self._fixed_data
-        moved = (self._arranged[1] @ local[:, None, :-2, None])[..., 0]
-        return (ratios[:, None] ** ORDERS)[..., None] * moved + fixed, fixed, ratios, durations
+    @cached_property
+    def _entries(self) -> Indices:
+        """Where the blocks' entries are in a matrix (n + 1, n + 1), flat."""
+        rows = self.columns[:, :, None] * (self.size + 1)
+        return np.asarray((rows + self.columns[:, None]).ravel())
 
     @property
     def _shared(self) -> int:
@@ -311,7 +323,7 @@ class Spline:
         for segment, _, _, column in moved:
             local[segment].setdefault(column, len(local[segment]))
         widest = max(map(len, local))
-        columns = np.full((self.segments, widest + 2), -1, dtype=np.intp)
+        columns = np.full((self.segments, widest + 2), mean + 1, dtype=np.intp)
         effect = np.zeros((self.segments, 2 * END_ORDER, 3, widest))
         for segment, row, direction, column in moved:
             place = local[segment][column]

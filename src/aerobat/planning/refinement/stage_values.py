@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,15 +44,15 @@ class StageValues:
         linear = np.sum(weights[~equal] * derivatives[at[~equal]], axis=(1, 2)) - bounds[~equal]
         balls = [float(offset @ offset) - BALL_SHARE for _, offset, _ in self._in_balls(derivatives)]
         rooms = [
-            _room_scale(body) * functions.values(*self._given(body, derivatives), NO_DIRECTION)[0, :, 0]
-            for body, functions in self._rooms
+            room.scale * room.functions.values(*room.given(derivatives), NO_DIRECTION)[0, :, 0]
+            for room in self._rooms
         ]
         return np.concatenate([linear, balls, *rooms])
 
     @property
     def inequality_count(self) -> int:
         """q."""
-        rooms = sum(len(_room_scale(body)) for body in self.in_gates)
+        rooms = sum(len(room.scale) for room in self._rooms)
         return int((~self._linear[3]).sum()) + len(self._balls) + rooms
 
     def equalities(self, derivatives: Array) -> Array:
@@ -67,10 +68,10 @@ class StageValues:
             stages.append(stage)
             slopes.append(np.zeros((6, 3)))
             slopes[-1][0] = 2.0 * offset / radius
-        for body, functions in self._rooms:
-            found = functions.slopes(*self._given(body, derivatives), DIRECTIONS)[..., 0].T
-            for value in _room_scale(body)[:, None] * found:
-                stages.append(body.stage)
+        for room in self._rooms:
+            found = room.functions.slopes(*room.given(derivatives), DIRECTIONS)[..., 0].T
+            for value in room.scale[:, None] * found:
+                stages.append(room.stage)
                 slopes.append(np.zeros((6, 3)))
                 slopes[-1][:KNOWN] = value.reshape(KNOWN, 3)
         return np.array(stages, dtype=np.intp), np.array(slopes).reshape(-1, 6, 3)
@@ -90,11 +91,10 @@ class StageValues:
         for stage, _, radius in self._in_balls(derivatives):
             found[stage, :3, :3] += weights[first] * 2.0 / radius**2 * np.eye(3)
             first += 1
-        for body, functions in self._rooms:
-            scale = _room_scale(body)
-            own = scale * weights[first : first + len(scale)]
-            found[body.stage] += functions.curvature(*self._given(body, derivatives, own), DIRECTIONS)[..., 0]
-            first += len(scale)
+        for room in self._rooms:
+            own = room.scale * weights[first : first + len(room.scale)]
+            found[room.stage] += room.functions.curvature(*room.given(derivatives, own), DIRECTIONS)[..., 0]
+            first += len(room.scale)
         return found
 
     def _in_balls(self, derivatives: Array) -> Iterator[tuple[int, Array, float]]:
@@ -123,16 +123,32 @@ class StageValues:
         )
 
     @cached_property
-    def _rooms(self) -> tuple[tuple[BodyInGate, SmoothFunctions], ...]:
+    def _rooms(self) -> tuple[_Room, ...]:
         """Each body in a gate, with the functions of its room."""
-        return tuple((body, room_functions(len(body.gate.opening.sides[1]))) for body in self.in_gates)
-
-    def _given(self, body: BodyInGate, derivatives: Array, *more: Array) -> tuple[Array, Array]:
-        """What the functions of a gate take: body, balance and opening, and the state there, then more."""
         balance, revolved = self.task.balance, self.task.vehicle.bounding_ellipsoid.revolved
-        state = derivatives[body.stage, :KNOWN].ravel()
-        shared = [*revolved, balance.drag, *balance.constant, *body.parameters]
-        return np.array(shared), np.concatenate([state, *more])[None]
+        return tuple(
+            _Room(
+                stage=body.stage,
+                functions=room_functions(len(body.gate.opening.sides[1])),
+                shared=np.array([*revolved, balance.drag, *balance.constant, *body.parameters]),
+                scale=_room_scale(body),
+            )
+            for body in self.in_gates
+        )
+
+
+class _Room(NamedTuple):
+    """The room of a body in a gate."""
+
+    stage: int
+    functions: SmoothFunctions
+    shared: Array  # body, balance and opening, as the functions take them
+    scale: Array  # of the values, (2 K + 1,)
+
+    def given(self, derivatives: Array, *more: Array) -> tuple[Array, Array]:
+        """What the functions take: what is shared, and the state at the stage, then more."""
+        state = derivatives[self.stage, :KNOWN].ravel()
+        return self.shared, np.concatenate([state, *more])[None]
 
 
 @lru_cache(maxsize=8)
