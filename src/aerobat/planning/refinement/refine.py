@@ -76,6 +76,7 @@ class RefinedPath:
     path: WarmStart
     excess: Excess
     multipliers: Array | None = None  # of the last program's inequalities
+    certified: Judged[RefinedPath] | None = None  # the shortest that is, of the rough rounds that led to it
 
     @property
     def placed(self) -> tuple[PlacedStage, ...]:
@@ -157,16 +158,18 @@ class Refinement:
             found = self._rough(knots_at_stages(guess, number), known)
             while number < segments and not out_of_time():
                 number = min(2 * number, segments)
+                rougher = found.certified
                 found = self._rough(knots_at_stages(found.path, number), known)
+                found = replace(found, certified=_shortest(rougher, found.certified))
         return found
 
     def _rough(self, guess: WarmStart, known: float) -> RefinedPath:
         """The fastest path near one with knots at the stages, or one far behind a known duration [s]."""
         rounds = Rounds(self, guess)
-        before = np.inf
+        before, certified = np.inf, None
         for number in range(ROUGH_ROUNDS):
             solution = rounds.solve()
-            judge(solution, self.task, self.recorder)
+            certified = _shortest(certified, judge(solution, self.task, self.recorder))
             duration = solution.duration
             gains_little = number and duration > (1.0 - LITTLE_GAIN) * before
             is_over = gains_little or duration > (1.0 + BEHIND) * known
@@ -174,14 +177,15 @@ class Refinement:
                 break
             before = duration
             rounds.go_on(solution.source)
-        return solution.source
+        return replace(solution.source, certified=certified)
 
     def finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
-        """The certified path near a rough one, or the last one that was tried.
+        """The shortest certified path near a rough one, or the last one that was tried.
 
         Where the duration still falls, it goes on from the path that is certified.
         """
         judged = self._finished(rough)
+        judged = _shortest(judged, rough.certified) or judged
         for _ in range(MORE_ROUNDS):
             solution = judged.solution
             if not judged.feasible or solution.status == CONVERGED or out_of_time():
@@ -342,6 +346,12 @@ class Rounds:
             radius=self._radius,
             stretch=self._stretch,
         )
+
+
+def _shortest(*found: Judged[RefinedPath] | None) -> Judged[RefinedPath] | None:
+    """The shortest of the certified paths among those found; None where there is none."""
+    certified = (each for each in found if each is not None and each.feasible)
+    return min(certified, key=lambda each: each.solution.duration, default=None)
 
 
 def _refuted(certificate: Certificate, reserve: float) -> float:
