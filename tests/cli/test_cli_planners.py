@@ -99,13 +99,13 @@ def test_check_refuses_by_limit_time_and_size(capsys) -> None:
 
 @pytest.mark.slow
 def test_compare_puts_all_planners_side_by_side(capsys) -> None:
-    code, out, err = run(capsys, "compare", "section-v", "--vehicle", "section-v", "--json")
+    code, out, err = run(capsys, "compare", "race-7", "--json")
     assert (code, err) == (0, "")
     rows = json.loads(out)["planners"]
     assert [r["planner"] for r in rows] == ["miqp", "min-snap", "free-knots", "free-knots", "time-optimal"]
     assert all(row.keys() >= ROW_KEYS for row in rows)
-    assert json.loads(out) == json.loads(Path("out/section-v-section-v-compare/compare.json").read_text())
-    assert Path("out/section-v-section-v-compare/compare.png").read_bytes().startswith(b"\x89PNG")
+    assert json.loads(out) == json.loads(Path("out/race-7-compare/compare.json").read_text())
+    assert Path("out/race-7-compare/compare.png").read_bytes().startswith(b"\x89PNG")
     ratios = np.array([row["ratio"] for row in rows])
     assert ratios[-1] == 1.0
     assert (ratios[:-1] > 1.0).all()

@@ -117,7 +117,7 @@ def test_what_rotors_just_can_is_planned_by_whichever_planner_finds_it(ratio: fl
 @pytest.mark.slow
 def test_what_is_needed_is_what_any_planner_needs() -> None:
     """It was 1.147, the least of the MIQP alone."""
-    (found,) = min_requirements("half-flip", "agile-quad", ["thrust-to-weight"], workers=1)
+    (found,) = min_requirements("half-flip", "agile-quad", ["thrust-to-weight"], tolerance=0.05, workers=1)
     assert found.value is not None
     assert found.value <= 1.10
 

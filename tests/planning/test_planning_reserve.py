@@ -36,7 +36,7 @@ def kept(certificate: Certificate | None) -> float:
     [
         (Miqp(reserve=0.03), 0.03, "half-flip"),
         pytest.param(Miqp(reserve=0.1), 0.1, "flip-roll", marks=pytest.mark.slow),
-        pytest.param(Miqp(reserve=0.34), 0.34, "flip-roll", marks=pytest.mark.slow),
+        pytest.param(Miqp(reserve=0.3), 0.3, "flip-roll", marks=pytest.mark.slow),
         (FreeKnots(segments=2, reserve=0.03), 0.03, "line"),
         pytest.param(FreeKnots(reserve=0.03), 0.03, "flip-roll", marks=pytest.mark.slow),
         pytest.param(TimeOptimal(8, 0.1, starts=1), 0.1, "half-flip", marks=pytest.mark.slow),

@@ -131,16 +131,16 @@ def test_a_faster_plan_is_a_start_of_its_own_and_compare_says_so():
 
     class Other(Planner):
         def plan(self, problem, vehicle=None, progress=None):
-            return replace(TimeOptimal(30, starts=4).plan(problem, vehicle), planner="other")
+            return replace(TimeOptimal(16, starts=2).plan(problem, vehicle), planner="other")
 
-    alone = TimeOptimal(20, starts=1).plan(problem, vehicle)
-    planners = (("time-optimal", TimeOptimal(20, starts=1)), ("other", Other()))
+    planners = (("time-optimal", TimeOptimal(12, starts=1)), ("other", Other()))
     entry, other = compare(problem, vehicle, planners).entries
-    assert other.plan.duration < 0.99 * alone.duration
+    alone = float(entry.note.removesuffix(" s alone").split()[-1])
+    assert other.plan.duration < 0.95 * alone
     assert entry.plan.duration <= 1.01 * other.plan.duration
     assert entry.plan.planner == "time-optimal"
     assert entry.note == (
-        f"begun again from the plan of {other.plan.duration:.3f} s by other; {alone.duration:.3f} s alone"
+        f"begun again from the plan of {other.plan.duration:.3f} s by other; {alone:.3f} s alone"
     )
 
 

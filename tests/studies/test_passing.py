@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
-from aerobat.studies.passing import Passing, Round
+from aerobat.studies.passing import Passing, Round, tightening
 from aerobat.studies.passing.spread import firmer
 from aerobat.studies.passing.tightening import Tightening
 
@@ -64,11 +64,11 @@ def test_a_probability_that_is_met_already_costs_nothing():
 @given(need=st.integers(0, 20), room=st.integers(0, 20))
 def test_the_least_reserve_is_found_wherever_plans_end(need: int, room: int):
     """Without a plan above some reserve, a smaller one that is enough is found all the same."""
-    tightening = object.__new__(Tightening)
-    tightening.task = SimpleNamespace(is_likely_enough=lambda share: share)
+    search = object.__new__(Tightening)
+    search.task = SimpleNamespace(is_likely_enough=lambda share: share)
     most = need + room
-    tightening._round = lambda steps: None if steps > most else SimpleNamespace(share=steps >= need)
-    steps, done = tightening._smallest()
+    search._round = lambda steps: None if steps > most else SimpleNamespace(share=steps >= need)
+    steps, done = search._smallest()
     assert (steps, done.share) == (need, True)
 
 
@@ -112,11 +112,11 @@ def test_a_plain_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened():
 
 @pytest.mark.slow
 def test_where_rotors_lag_otherwise_than_known_turning_slower_costs_less_than_any_reserve():
-    """At a quarter more or less than a lag of 33 ms, a flip of 860°/s is 7° late; half of that is as fast."""
+    """At a quarter more or less than a lag of 72 ms, 840°/s is 15° late; half of that is as fast."""
     found = ab.plan_to_pass(
-        "flip-roll",
+        "flip-pitch",
         ab.Miqp(reserve=0.15),
-        "agilicious",
+        "crazyflie",
         probability=0.9,
         conditions=ab.Dispersion(name="lags", lag=0.25),
         flights=200,
@@ -126,11 +126,13 @@ def test_where_rotors_lag_otherwise_than_known_turning_slower_costs_less_than_an
     assert found.before.fraction < 0.8
     assert found.plan.assessment.max_body_rate < 0.7 * found.plain.assessment.max_body_rate
     assert found.price < 0.03 * found.plain.duration
-    assert found.plan.vehicle == ab.load_vehicle("agilicious")
+    assert found.plan.vehicle == ab.load_vehicle("crazyflie")
 
 
 @pytest.mark.slow
-def test_what_cannot_be_reached_names_the_cause_in_the_way():
+def test_what_cannot_be_reached_names_the_cause_in_the_way(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(tightening, "MAX_STEPS", 3)
+    monkeypatch.setattr(tightening, "TIGHTENING_TIME", 0.5)
     rounds: list[Round] = []
     with pytest.raises(ab.Infeasible, match=r"the start stands in the way: without it .* pass") as refused:
         ab.plan_to_pass(
