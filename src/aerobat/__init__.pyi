@@ -120,7 +120,7 @@ from .studies.compare import Comparison, compare
 from .studies.error_causes import Cause, ErrorCauses, error_causes
 from .studies.feasibility import FeasibilityMap, Requirement, feasibility_map, min_requirements
 from .studies.inspection import ErrorShare, Inspection, inspect_flight
-from .studies.passing import Passing, plan_to_pass
+from .studies.passing import Passing, plan_to_pass, steadied
 from .studies.sweep import Share, Sweep, sweep
 from .studies.tune import Tuning, tune
 from .studies.why import Remedy, Why, why
@@ -286,6 +286,7 @@ __all__ = [
     "score_flights",
     "sensitivity",
     "smallest_opening",
+    "steadied",
     "sweep",
     "sweep_figure",
     "tilted_gate",

@@ -267,6 +267,14 @@ def _calls(folder: Path) -> dict[str, dict[str, Any]]:
             **here,
             "config": ab.FlightConfig(rate=100.0, engine="floats"),
         },
+        "steadied": {
+            "plan": plan(),
+            "planner": ab.Miqp(reserve=0.1),
+            "conditions": "lab",
+            "seed": 1,
+            "controller": "full",
+            "progress": ignored,
+        },
         "sweep": {
             "plan": plan(),
             "conditions": ab.load_dispersion("none"),

@@ -26,6 +26,7 @@ from aerobat.errors import Infeasible, SpecError
 from aerobat.interchange import column_groups
 from aerobat.optimization.deadline import within_time
 from aerobat.planning import (
+    Attempt,
     Plan,
     Planner,
     command_settings,
@@ -186,7 +187,27 @@ def _plan_made(record: RunRecord, explain: bool) -> Plan:
             found = found.for_vehicle(record.vehicle)
         else:
             found = plan(record.problem, record.planner, record.vehicle, progress.record)
+            found = _steadied(found, record, progress.record)
         return with_explanation(found, progress.record) if explain else found
+
+
+def _steadied(found: Plan, record: RunRecord, progress: Callable[[Attempt], None]) -> Plan:
+    """The plan, or one as fast of which more flights succeed under the run's conditions, or a lab's."""
+    from aerobat.studies.passing import steadied
+
+    assert record.planner is not None, "a plan that came from a file is not made"
+    flight = record.flight
+    conditions = flight.conditions
+    if conditions is None or conditions == load_dispersion("none"):
+        conditions = load_dispersion(USUAL_CONDITIONS)
+    return steadied(
+        found,
+        record.planner,
+        conditions,
+        seed=flight.seed,
+        controller=flight.controller,
+        progress=progress,
+    )
 
 
 def _plan_that_passes(record: RunRecord, workers: str | None) -> Plan:

@@ -146,7 +146,7 @@ class _Room(NamedTuple):
     scale: Array  # of the values, (2 K + 1,)
 
     def given(self, derivatives: Array, *more: Array) -> tuple[Array, Array]:
-        """What the functions take: what is shared, and the state at the stage, then more."""
+        """Inputs of the functions: what is shared, and the state at the stage, then more."""
         state = derivatives[self.stage, :KNOWN].ravel()
         return self.shared, np.concatenate([state, *more])[None]
 

@@ -1,0 +1,46 @@
+"""Plans that turn slower: as fast, and flown better by rotors that lag otherwise than known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import aerobat as ab
+from aerobat.planning.result import FLYING_RESERVE
+from aerobat.studies.passing import steadied
+from aerobat.studies.passing.steadying import CHOOSING, LONGEST
+from aerobat.vehicle import load_vehicle
+
+PLANNER = ab.Miqp(reserve=FLYING_RESERVE)
+FRESH = range(200)
+
+
+def succeeded(plan: ab.Plan) -> int:
+    return int(ab.score_flights(plan, conditions="lab", flights=FRESH).succeeded.sum())
+
+
+@pytest.mark.slow
+def test_a_steadied_plan_is_as_fast_turns_slower_and_more_other_flights_succeed():
+    assert not set(FRESH) & set(CHOOSING)
+    first = ab.plan("flip-pitch", PLANNER, "agilicious")
+    found = steadied(first, PLANNER, ab.load_dispersion("lab"))
+    assert found.certified
+    assert found.flies
+    assert found.keeps(FLYING_RESERVE)
+    assert (found.problem, found.vehicle) == (first.problem, first.vehicle)
+    assert found.duration <= LONGEST * first.duration
+    assert found.assessment.max_body_rate < 0.85 * first.assessment.max_body_rate
+    assert succeeded(found) > succeeded(first) + 10
+    assert "instead of" in found.rescue
+
+
+def test_plans_stay_where_the_lag_turns_little_or_no_reserve_is_asked():
+    lab, planner = ab.load_dispersion("lab"), ab.MinSnap()
+    calm = ab.plan("line", planner, "crazyflie")
+    assert steadied(calm, planner, lab) is calm
+    assert steadied(calm, PLANNER, lab) is calm
+    prompt = load_vehicle("agile-quad")
+    rotors = tuple(replace(rotor, lag=0.0) for rotor in prompt.rotors)
+    figure = ab.plan("line", PLANNER, replace(prompt, rotors=rotors))
+    assert steadied(figure, PLANNER, lab) is figure
