@@ -34,6 +34,8 @@ LEFT_OUT = {
 }
 ENDS = {  # of commands that do not end with 0, as the pages say
     "--to crazyflie": 0,
+    "fly flip-roll --vehicle crazyflie": 0,
+    "fly flip-pitch --vehicle crazyflie": 0,
     "crazyflie": 1,
     "--paper": 1,
     "min-snap": 1,

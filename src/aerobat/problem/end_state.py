@@ -33,7 +33,9 @@ class EndState:
     def __post_init__(self) -> None:
         """Check."""
         if np.isnan(self.position).any() and not self.is_left_out:
-            raise FieldError("position", "must be given in all components; add those that are missing")
+            raise FieldError(
+                "position", "must be a number in all components; give those that are missing or NaN"
+            )
         if self.free_velocity and self.velocity.any():
             raise FieldError("free_velocity", "stands beside velocity, which gives one; drop either")
 

@@ -48,6 +48,7 @@ FINE = Settings(
 ROUGH_ROUNDS = 8  # at most
 FINE_ROUNDS = 10
 MORE_ROUNDS = 1  # of such fine rounds, from a path that is certified on
+SPREADS = 4  # of a rough path's knots anew, at most: 1.2 % shorter on average of 60 random problems
 ROUGH_SHARE = 0.5  # of the time that is left, so that there is some to certify what is found
 ROUGH_PLACES = 16  # of a segment: as many as a polynomial of degree 9 needs
 FINE_PLACES = 24
@@ -61,7 +62,8 @@ BACKOFF = 1e-4  # of every limit's size, at places
 MAX_BACKOFF = 0.03  # that one round adds: where much is exceeded, it moves elsewhere
 MORE_BACKOFF = 1.3  # times what is exceeded, in fine rounds
 FINE_BACKOFF = 2e-4  # of a limit's size, and so much more, as for what a certificate refutes beside
-NEARLY_EXCEEDED = 2e-3  # of a limit's size: where a certificate may refute what a dense look does not
+# of a limit's size, beyond what is kept from it: there a certificate may refute what dense looks do not
+NEARLY_EXCEEDED = 2e-3
 MENDABLE = 0.5  # of a limit's size: a solve that leaves more has lost its way
 RELATIVE_STAGE_TOLERANCE = 1e-5  # of a condition's size: by how much a stage may be missed through rounding
 NEARLY_MISSED = 0.02  # likewise, where rounds that follow may mend it
@@ -161,6 +163,20 @@ class Refinement:
                 rougher = found.certified
                 found = self._rough(knots_at_stages(found.path, number), known)
                 found = replace(found, certified=_shortest(rougher, found.certified))
+            return self._spread_anew(found, known)
+
+    def _spread_anew(self, found: RefinedPath, known: float) -> RefinedPath:
+        """A rough path whose knots are spread evenly between stages again, as long as it gains by that."""
+        for _ in range(SPREADS):
+            duration = found.path.trajectory.duration
+            if out_of_time() or not self.is_promising(found) or duration > (1.0 + BEHIND) * known:
+                break
+            again = self._rough(knots_at_stages(found.path, found.path.trajectory.segments), duration)
+            if not self.is_promising(again) or again.path.trajectory.duration >= duration:
+                break
+            found = replace(again, certified=_shortest(found.certified, again.certified))
+            if again.path.trajectory.duration > (1.0 - LITTLE_GAIN) * duration:
+                break
         return found
 
     def _rough(self, guess: WarmStart, known: float) -> RefinedPath:
@@ -310,7 +326,9 @@ class Rounds:
         self.back_off(excess, MORE_BACKOFF, FINE_BACKOFF)
         if certificate is not None:
             refuted = _refuted(certificate, self._refinement.task.reserve)
-            self._backoff += (MORE_BACKOFF * refuted + FINE_BACKOFF) * (excess.nearby > -NEARLY_EXCEEDED)
+            kept = self._backoff - self._refinement.limits.reserve
+            is_near = excess.nearby + kept > -NEARLY_EXCEEDED
+            self._backoff += (MORE_BACKOFF * refuted + FINE_BACKOFF) * is_near
         self._guess = solution.source.path
         return True
 
