@@ -14,7 +14,7 @@ from aerobat.reporting.plain_data import plain, to_json
 from aerobat.reporting.report import Report
 from shared_plans import shared_plan
 
-LOW = -0.3  # [m] a ground so near under the flip that there is a point of no return
+LOW = -0.15  # [m] a ground so near under the flip that there is a point of no return
 
 
 @pytest.fixture(scope="module")
