@@ -38,7 +38,7 @@ BOX = Limits(
 @pytest.fixture(scope="module")
 def flown() -> Trajectory:
     """A flip, cut into many parts: body axes are exact where places are near each other."""
-    whole = WarmStart(shared_plan("flip-roll").trajectory, (), ())
+    whole = WarmStart(shared_plan("flip-roll-translation").trajectory, (), ())
     return knots_at_stages(whole, 40).trajectory
 
 
@@ -179,7 +179,7 @@ def test_a_certificate_states_every_limit_as_far_as_samples_reach_and_little_fur
                 assert finding.limit == pytest.approx(end)
                 assert finding.field == limit.fields[side is Side.MAX]
                 beyond = (finding.bound - reached) * (1.0 if side is Side.MAX else -1.0)
-                assert -1e-4 * limit.size <= beyond <= 0.1 * limit.size, limit.name
+                assert -1e-4 * limit.size <= beyond <= 0.06 * limit.size, limit.name
 
 
 def test_the_search_holds_the_linear_limits_and_no_other(craft: Vehicle) -> None:

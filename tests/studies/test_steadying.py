@@ -9,7 +9,7 @@ import pytest
 import aerobat as ab
 from aerobat.planning.result import FLYING_RESERVE
 from aerobat.studies.passing import steadied
-from aerobat.studies.passing.steadying import CHOOSING, LONGEST
+from aerobat.studies.passing.steadying import CHOOSING, LATE, LONGEST
 from aerobat.vehicle import load_vehicle
 
 PLANNER = ab.Miqp(reserve=FLYING_RESERVE)
@@ -39,8 +39,9 @@ def test_plans_stay_where_the_lag_turns_little_or_no_reserve_is_asked():
     lab, planner = ab.load_dispersion("lab"), ab.MinSnap()
     calm = ab.plan("line", planner, "crazyflie")
     assert steadied(calm, planner, lab) is calm
-    assert steadied(calm, PLANNER, lab) is calm
-    prompt = load_vehicle("agile-quad")
-    rotors = tuple(replace(rotor, lag=0.0) for rotor in prompt.rotors)
-    figure = ab.plan("line", PLANNER, replace(prompt, rotors=rotors))
-    assert steadied(figure, PLANNER, lab) is figure
+    assert steadied(calm, PLANNER, lab) is calm  # no gate is passed
+    fast = ab.plan("half-flip", PLANNER, "crazyflie")
+    assert steadied(fast, ab.Miqp(), lab) is fast
+    slow = replace(load_vehicle("crazyflie"), max_body_rate=0.9 * LATE / load_vehicle("crazyflie").lags.max())
+    flip = ab.plan("half-flip", PLANNER, slow)
+    assert steadied(flip, PLANNER, lab) is flip

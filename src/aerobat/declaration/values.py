@@ -14,8 +14,8 @@ _REPORTER = "aerobat.reporting.notebooks"
 T = TypeVar("T")
 
 _NAN = "nan"  # in place of what is not equal to itself
-_known_names: dict[type[Any], tuple[str, ...]] = {}  # of fields, by class
 _FEW = 9  # entries: a longer list is told by its length
+_known_names: dict[type[Any], tuple[str, ...]] = {}  # of fields, by class
 
 
 def in_notebooks(cls: type[T]) -> type[T]:

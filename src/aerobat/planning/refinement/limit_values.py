@@ -127,9 +127,8 @@ class LimitValues:
         given = self._given(derivatives, near, *of_measures)
         second = np.zeros((len(derivatives), 18, 18))
         second[:, 3:, 3:] = self._functions.curvature(self._shared, given, DIRECTIONS).transpose(2, 1, 0)
-        if len(self.path):
-            products = self.path[:, :, None] * self.path[:, None]
-            second += np.tensordot(squares[:, :held][:, self.linear], products, 1)
+        products = self.path[:, :, None] * self.path[:, None]
+        second += np.tensordot(squares[:, :held][:, self.linear], products, 1)
         if near.planes is not None:
             beside = self.clearances.slopes(derivatives, near.planes).reshape(len(derivatives), -1, 18)
             second += np.swapaxes(beside, 1, 2) @ (squares[:, held:, None] * beside)

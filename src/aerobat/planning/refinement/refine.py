@@ -160,9 +160,7 @@ class Refinement:
             found = self._rough(knots_at_stages(guess, number), known)
             while number < segments and not out_of_time():
                 number = min(2 * number, segments)
-                rougher = found.certified
-                found = self._rough(knots_at_stages(found.path, number), known)
-                found = replace(found, certified=_shortest(rougher, found.certified))
+                found = self._rough(knots_at_stages(found.path, number), known, found.certified)
             return self._spread_anew(found, known)
 
     def _spread_anew(self, found: RefinedPath, known: float) -> RefinedPath:
@@ -171,18 +169,24 @@ class Refinement:
             duration = found.path.trajectory.duration
             if out_of_time() or not self.is_promising(found) or duration > (1.0 + BEHIND) * known:
                 break
-            again = self._rough(knots_at_stages(found.path, found.path.trajectory.segments), duration)
+            spread = knots_at_stages(found.path, found.path.trajectory.segments)
+            again = self._rough(spread, duration, found.certified)
             if not self.is_promising(again) or again.path.trajectory.duration >= duration:
                 break
-            found = replace(again, certified=_shortest(found.certified, again.certified))
+            found = again
             if again.path.trajectory.duration > (1.0 - LITTLE_GAIN) * duration:
                 break
         return found
 
-    def _rough(self, guess: WarmStart, known: float) -> RefinedPath:
-        """The fastest path near one with knots at the stages, or one far behind a known duration [s]."""
+    def _rough(
+        self, guess: WarmStart, known: float, certified: Judged[RefinedPath] | None = None
+    ) -> RefinedPath:
+        """The fastest path near one with knots at the stages, or one far behind a known duration [s].
+
+        With it comes the shortest that is certified, of the rounds made here and before.
+        """
         rounds = Rounds(self, guess)
-        before, certified = np.inf, None
+        before = np.inf
         for number in range(ROUGH_ROUNDS):
             solution = rounds.solve()
             certified = _shortest(certified, judge(solution, self.task, self.recorder))

@@ -6,21 +6,17 @@ much slower often take hardly longer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from math import radians
 
-from aerobat.control import named_controller
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
-from aerobat.evaluation import Score
-from aerobat.optimization.deadline import out_of_time, processor, within_time
 from aerobat.planning import Attempt, Plan, Planner
-from aerobat.problem import Problem
-from aerobat.studies.flights import FlightTask, fly_scores
 from aerobat.studies.passing.spread import narrowed
-from aerobat.studies.passing.task import calmed, going_on, passed
+from aerobat.studies.passing.task import PassingTask, Variant, going_on, passed
+from aerobat.studies.share import Trials
 from aerobat.studies.workers import pool
 
 LATE = radians(15.0)  # that a vehicle turns while its rotors lag: from there on some flights come too late
@@ -29,7 +25,7 @@ LONGEST = 1.01  # times the duration of the plan that was found first
 CHOOSING = range(10**6, 10**6 + 200)  # the flights that choose: others judge
 ENOUGH = 0.975  # of these flights: most plans of which so many succeed are proven for 95 %
 WORTH = 0.4  # of these flights: where fewer succeed, turning slower has not helped
-TRYING_TIME = 30.0  # [s] of the processor for these plans and flights, which take 1 to 10: no clock decides
+TRYING_TIME = 30.0  # [s] of the processor for one of these plans, which takes 0.3 to 3: no clock decides
 
 
 @validated
@@ -54,51 +50,48 @@ def steadied(
         controller: The name of what flies them.
         progress: Called with every attempt.
     """
-    vehicle = plan.vehicle
-    reserve = getattr(planner, "reserve", 0.0)
+    vehicle, reserve = plan.vehicle, getattr(planner, "reserve", 0.0)
     if vehicle is None or plan.assessment is None or not (reserve and plan.problem.gates and plan.flies):
         return plan
-    turned = float(vehicle.lags.max()) * (plan.assessment.max_body_rate or 0.0)
-    if turned <= LATE:
+    if float(vehicle.lags.max()) * (plan.assessment.max_body_rate or 0.0) <= LATE:
         return plan
-    dispersion, law = as_dispersion(conditions), named_controller(controller, vehicle.controller)
-    with pool(1, None, 1) as flying, within_time(TRYING_TIME, processor):
-
-        def flown(each: Plan) -> Score:
-            task = FlightTask(each, vehicle, dispersion, seed, law)
-            return fly_scores(flying, (task,), CHOOSING)[0]
-
-        first = flown(plan)
-        share = best = passed(first)
-        if not WORTH <= share.fraction < ENOUGH:
-            return plan
-        found = plan
-        for other, calm in _calmer(plan, planner, narrowed(plan.problem, vehicle, first), progress):
-            succeed = passed(flown(other))
-            if succeed.count > best.count:
-                why = (
-                    f"goes on from {plan.planner}'s {plan.duration:.3f} s, turning at most {100 * calm:g} % "
-                    f"as fast: {succeed.count} of {succeed.of} flights succeed instead of {share.count}"
-                )
-                attempts = (*plan.attempts, *other.attempts)
-                best, found = succeed, replace(other, attempts=attempts, rescue=why)
-            if best.fraction >= ENOUGH:
-                break
-    return found
+    kept = reserve if plan.keeps(reserve) else 0.0
+    with pool(1, None, 1) as flying:
+        task = PassingTask(
+            problem=plan.problem,
+            planner=going_on(planner, plan, kept),
+            vehicle=vehicle,
+            conditions=as_dispersion(conditions),
+            seed=seed,
+            controller=controller,
+            probability=Trials.NEEDED,
+            progress=progress,
+            flying=flying,
+        )
+        return _calmest(task, plan, kept)
 
 
-def _calmer(
-    plan: Plan, planner: Planner, problem: Problem, progress: Callable[[Attempt], None] | None
-) -> Iterator[tuple[Plan, float]]:
-    """Yield plans that are hardly longer, certified and fly, with the part of the body rate that is left."""
-    reserve = getattr(planner, "reserve", 0.0)
-    goes_on = going_on(planner, plan, reserve if plan.keeps(reserve) else 0.0)
-    for calm in CALMS:
-        if out_of_time():
-            return
+def _calmest(task: PassingTask, plan: Plan, reserve: float) -> Plan:
+    """The plan, or of those hardly longer that turn slower the one of which most flights succeed."""
+    scores = task.scores(plan, CHOOSING)
+    first = best = passed(scores)
+    found = plan
+    problem = narrowed(plan.problem, task.vehicle, scores)
+    for calm in CALMS if first.fraction >= WORTH else ():
+        if best.fraction >= ENOUGH:
+            break
         try:
-            found = calmed(plan, calm, goes_on, problem, progress)
+            other = task.tightened(plan, reserve, Variant(calm, True), problem, TRYING_TIME)
         except (Infeasible, SpecError):  # no plan, or gates too narrow for one
             continue
-        if found.duration <= LONGEST * plan.duration and found.certified and found.flies:
-            yield found, calm
+        if other.duration > LONGEST * plan.duration or not (other.certified and other.flies):
+            continue
+        share = passed(task.scores(other, CHOOSING))
+        if share.count > best.count:
+            why = (
+                f"goes on from {plan.planner}'s {plan.duration:.3f} s, turning at most {100 * calm:g} % as "
+                f"fast: {share.count} of {share.of} flights succeed instead of {first.count}"
+            )
+            attempts = (*plan.attempts, *other.attempts)
+            best, found = share, replace(other, attempts=attempts, rescue=why)
+    return found

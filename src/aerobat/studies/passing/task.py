@@ -64,9 +64,13 @@ class PassingTask:
 
         It is found within `limit` [s] of the processor.
         """
+        vehicle = self.vehicle
+        if variant.calm < 1.0 and plain.assessment is not None:
+            vehicle = replace(vehicle, max_body_rate=variant.calm * (plain.assessment.max_body_rate or inf))
         planner = self._from(plain, reserve) if variant.goes_on else self._anew(reserve)
         with within_time(limit, processor):
-            return calmed(plain, variant.calm, planner, problem, self.progress)
+            found = plan(problem, planner, vehicle, self.progress)
+        return replace(found, problem=self.problem, vehicle=self.vehicle)
 
     def _from(self, start: Plan, reserve: float) -> Planner:
         """The planner with a reserve, or for one that takes no start, the refinement from a plan on."""
@@ -111,32 +115,6 @@ def going_on(planner: Any, start: Plan, reserve: float) -> Planner:
     """The refinement from a plan on, with the settings of the planner that found it."""
     kept = {name: getattr(planner, name) for name in KEPT if hasattr(planner, name)}
     return planner_with_reserve(REFINING, reserve, start=start, **kept)
-
-
-def calmed(
-    plain: Plan,
-    calm: float,
-    planner: Planner,
-    problem: Problem,
-    progress: Callable[[Attempt], None] | None = None,
-) -> Plan:
-    """A plan that turns slower than the plain one, as one of its problem for its vehicle.
-
-    Args:
-        plain: The plan whose body rate is taken.
-        calm: The fraction of its largest body rate that is left [-].
-        planner: What plans.
-        problem: What is planned instead, as with narrower gates.
-        progress: Called with every attempt.
-
-    Raises Infeasible where there is none.
-    """
-    assert plain.vehicle is not None, "what flies is planned for a vehicle"
-    vehicle = plain.vehicle
-    if calm < 1.0 and plain.assessment is not None:
-        vehicle = replace(vehicle, max_body_rate=calm * (plain.assessment.max_body_rate or inf))
-    found = plan(problem, planner, vehicle, progress)
-    return replace(found, problem=plain.problem, vehicle=plain.vehicle)
 
 
 def passed(scores: Score) -> Share:
