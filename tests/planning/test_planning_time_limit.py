@@ -74,7 +74,7 @@ def test_a_limit_yields_the_best_so_far_certified_or_says_that_there_is_none(
     first = plans.index(found[0])
     assert None not in plans[first:]  # what less time finds, more time finds,
     durations = np.array([each.duration for each in plans[first:] if each is not None])
-    assert (durations <= 1.02 * np.minimum.accumulate(durations)).all()  # and hardly slower
+    assert (durations <= 1.03 * np.minimum.accumulate(durations)).all()  # and hardly slower
 
 
 def test_a_plan_that_a_limit_ended_says_so() -> None:

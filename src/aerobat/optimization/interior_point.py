@@ -7,18 +7,19 @@ Slacks s = −c(x) > 0 and multipliers z satisfy s z = μ, and μ falls towards 
     (H + Cᵀ Σ C + B + δ I) dx + Eᵀ dy = −r,     E dx = −e,     Σ = z/s.
 
 H holds the second derivatives of the Lagrangian, and B is what the box adds on the diagonal. The damping δ is
-as large as makes the matrix positive definite, and never zero, so that directions in which nothing changes
-are not run along. A filter accepts steps that lower the violation or the barrier function, with a
-second-order correction where the constraints' curvature rejects them. The filter is that of Wächter and
-Biegler, "On the implementation of an interior-point filter line-search algorithm for large-scale nonlinear
-programming", 2006. The matrix of some hundred to a thousand unknowns is factorized as a dense one, in a
+as large as makes the matrix positive definite and a step acceptable, as in a trust region: it grows where
+steps are shortened, falls where they are not, and never vanishes. A step is taken if it lowers the barrier
+function plus the weighted violation; where the constraints' curvature speaks against it, a second-order
+correction is tried. This is the merit function of Byrd, Hribar and Nocedal, "An interior point algorithm for
+large-scale nonlinear programming", 1999. Each slack stops by itself short of zero, and is as large as the
+room that a step leaves. The matrix of some hundred to a thousand unknowns is factorized as a dense one, in a
 millisecond or two: what a step costs is second derivatives.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
@@ -27,24 +28,24 @@ from aerobat.arrays import Array
 from aerobat.optimization.deadline import out_of_time
 
 _BOUND_PUSH = 1e-2  # of the box's width: how far the start is moved from its edges
-_NEARLY = 0.99  # of the way to where a slack or a multiplier vanishes: the longest step
+_NEARLY = 0.99  # of the way to where a multiplier vanishes, or to the edge of the box: the longest step
+_LEAST_SLACK = 0.1  # of a slack: what a step leaves of it at least
 _BARRIER_SOLVED = 10.0  # times μ: an error of the barrier problem that lets μ fall,
 _BARRIER_FALL = 0.2  # to this fraction,
 _BARRIER_POWER = 1.5  # or this power of it
-_GROWTH = 4.0  # of δ, until the matrix is positive definite
-_SHRINK = 3.0  # of δ, from one step to the next
+_GROWTH = 4.0  # of δ, until the matrix is positive definite, and where a step is shortened
+_SHRINK = 3.0  # of δ, where a whole step is taken
+_JUMP = 10.0  # of δ, where no part of a step is taken
+_MOST_DAMPING = 1.0  # that a short step leads to
 _LARGEST_DAMPING = 1e10
-_JAMMED = 1e-4  # of a step: where slacks allow for less, they begin anew
-_BACKTRACKS = 10  # halvings of a step
+_SHORT = 0.2  # of a step: what leaves its box earlier is damped more
+_BACKTRACKS = 10  # parts of a step that are tried, each half the one before
 _CORRECTIONS = 3  # of second order, in a row
 _SLOW_CORRECTION = 0.99  # of the violation: a correction that leaves more ends them
-_SUFFICIENT = (
-    1e-5  # of the violation: the least fall of it, or of the barrier function, that a step is taken for
-)
-_ARMIJO = 1e-4  # of the promised fall of the barrier function
-_SMALL_VIOLATION = 1e-4  # of the first violation: below, the barrier function decides
-_LARGE_VIOLATION = 1e4  # times the first: beyond, no step is taken
-_SWITCH_POWERS = 2.3, 1.1  # of the promised fall and of the violation, as Wächter and Biegler have them
+_ARMIJO = 1e-4  # of the promised fall
+_LEAST_WEIGHT = 1e-3  # of the violation beside the barrier function
+_SHARE = 0.5  # of the fall of the weighted violation, which the barrier function may rise by
+_ROUNDING = 1e-12  # of the merit
 _CORRIDOR = 1e10  # the factor by which s z may differ from μ
 _EQUALITY_WEIGHT = 1e-2  # of the matrix's largest entry, by which equalities are added to it
 _ITERATIONS_FLAT = 3  # over which the cost has to stand still
@@ -155,41 +156,35 @@ class _Step:
     y: Array
 
 
+class _Value(NamedTuple):
+    """What a step has to lower."""
+
+    violation: float
+    barrier: float  # the barrier function
+
+
 @dataclass(eq=False)
-class _Filter:
-    """Pairs of a violation and a barrier function that a step must improve on."""
+class _Merit:
+    """The barrier function plus a weight times the violation."""
 
-    first: float  # violation of the start
-    entries: list[tuple[float, float]] = field(default_factory=list)
+    weight: float = _LEAST_WEIGHT
 
-    def accepts(
-        self, before: tuple[float, float], after: tuple[float, float], promised: float, length: float
-    ) -> bool:
+    def accepts(self, before: _Value, after: _Value, promised: float, length: float) -> bool:
         """True where a step is taken.
 
         Args:
-            before: Violation and barrier function.
-            after: The same at the step's end.
+            before: Where it begins.
+            after: Where it ends.
             promised: Change of the barrier function that a whole step was promised.
             length: Of the step, 1 for a whole one.
         """
-        violation, barrier = before
-        if not after[0] < _LARGE_VIOLATION * self.first:
-            return False
-        if any(after[0] >= known and after[1] >= value for known, value in self.entries):
-            return False
-        if violation < _SMALL_VIOLATION * self.first and _promises(violation, promised, length):
-            return after[1] <= barrier + _ARMIJO * length * promised
-        return after[0] <= (1.0 - _SUFFICIENT) * violation or after[1] <= barrier - _SUFFICIENT * violation
+        if promised > 0.0 and before.violation > 0.0:
+            self.weight = max(self.weight, promised / (_SHARE * before.violation))
+        fall = min(promised - self.weight * before.violation, 0.0)
+        return self._of(after) <= self._of(before) + _ARMIJO * length * fall + _ROUNDING
 
-    def add(self, before: tuple[float, float]) -> None:
-        """Keep what the next steps have to improve on."""
-        self.entries.append(((1.0 - _SUFFICIENT) * before[0], before[1] - _SUFFICIENT * before[0]))
-
-
-def _promises(violation: float, promised: float, length: float) -> bool:
-    by_fall, by_violation = _SWITCH_POWERS
-    return promised < 0.0 and bool((-length * promised) ** by_fall > violation**by_violation)
+    def _of(self, value: _Value) -> float:
+        return value.barrier + self.weight * value.violation
 
 
 def interior_point(
@@ -217,16 +212,14 @@ class _InteriorPoint:
         self._cost = program.cost
         self._lower, self._upper = program.box
         self._barrier = settings.barrier
-        self._damping = 0.0  # of the last step that needed some
-        self._filter = _Filter(1.0)
-        self._is_anew = False  # slacks and multipliers, from the last step on
+        self._damping = settings.damping
+        self._merit = _Merit()
 
     def run(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
         """Descend."""
         iterate, costs = self._begun(start, multipliers), []
         if not np.isfinite(iterate.point.inequalities).all():
             return InteriorPointResult(iterate.x, False, 0, iterate.z)  # no step leads on from there
-        self._filter.first = max(_violation(iterate.point, iterate.slacks), 1.0)
         for iteration in range(self._settings.iterations):
             costs.append(float(self._cost @ iterate.x))
             if self._error(iterate, 0.0) < self._settings.tolerance or self._stands_still(iterate, costs):
@@ -287,118 +280,101 @@ class _InteriorPoint:
         least = self._settings.least_barrier
         while self._barrier > least and self._error(at, self._barrier) < _BARRIER_SOLVED * self._barrier:
             self._barrier = max(least, min(_BARRIER_FALL * self._barrier, self._barrier**_BARRIER_POWER))
-            self._filter.entries.clear()
 
     def _advance(self, at: _Iterate) -> bool:
-        """Take one step; False where no damping makes the matrix positive definite."""
-        system = self._system(at)
-        if system is None:
-            return False
+        """Take one step; False where none is accepted, however damped."""
+        equations = _Equations(at, self)
+        before = self._value(at.x, at.slacks, at.point)
+        while self._damping < _LARGEST_DAMPING:
+            if not equations.factorize(self._damping):
+                self._damping *= _GROWTH
+                continue
+            found = self._accepted(at, equations, before)
+            if found is not None:
+                self._move(at, *found)
+                return True
+            self._damping *= _JUMP
+        return False
+
+    def _accepted(
+        self, at: _Iterate, equations: _Equations, before: _Value
+    ) -> tuple[_Step, float, ConstrainedPoint] | None:
+        """A step, its length and the point at its end, corrected or shortened; None if it is not taken."""
         missed = at.point.inequalities + at.slacks
-        step = system.step(missed, at.point.equalities)
-        before = _violation(at.point, at.slacks), self._barrier_function(at.x, at.slacks)
-        promised = self._promised(at, step)
-        longest = length = self._longest(at, step)
-        if longest < _JAMMED and not self._is_anew:
-            self._begin_anew(at)
-            return True
-        self._is_anew = longest < _JAMMED
+        step = equations.step(missed, at.point.equalities)
+        promised, length = self._promised(at, step), self._longest(at, step)
+        if length < _SHORT and self._damping < _MOST_DAMPING:
+            return None
         for halvings in range(_BACKTRACKS):
             after, trial = self._tried(at, step, length)
-            if self._filter.accepts(before, after, promised, length):
-                break
-            if halvings == 0 and after[0] >= before[0]:
-                corrected = self._corrected(at, system, trial, before, longest, promised)
+            if self._merit.accepts(before, after, promised, length):
+                self._adapt(is_whole=not halvings)
+                return step, length, trial
+            if not halvings and after.violation >= before.violation:
+                corrected = self._corrected(at, equations, trial, before, step, promised)
                 if corrected is not None:
-                    step, length, after, trial = corrected
-                    break
+                    self._adapt(is_whole=True)
+                    return corrected
             length *= 0.5
-        else:
-            self._filter.entries.clear()
-            self._damping = max(100.0 * self._settings.damping, 10.0 * self._damping)
-            return self._damping < _LARGEST_DAMPING
-        falls = promised < 0.0 and after[1] <= before[1] + _ARMIJO * length * promised
-        if not falls:
-            self._filter.add(before)
-        self._move(at, step, length, trial)
-        return True
+        return None
 
-    def _begin_anew(self, at: _Iterate) -> None:
-        """Move slacks away from zero where they stop every step, and choose multipliers that fit."""
-        at.slacks = np.maximum(at.slacks, self._settings.least_slack)
-        at.z, at._residual = self._barrier / at.slacks, None
-        self._filter.entries.clear()
-        self._is_anew = True
+    def _adapt(self, is_whole: bool) -> None:
+        """Damp the next step less after a whole one, more after one that was shortened."""
+        if is_whole:
+            self._damping = max(self._damping / _SHRINK, self._settings.damping)
+        else:
+            self._damping = max(self._damping, min(self._damping * _GROWTH, _MOST_DAMPING))
 
     def _corrected(
         self,
         at: _Iterate,
-        system: _System,
+        equations: _Equations,
         trial: ConstrainedPoint,
-        before: tuple[float, float],
-        longest: float,
+        before: _Value,
+        step: _Step,
         promised: float,
-    ) -> tuple[_Step, float, tuple[float, float], ConstrainedPoint] | None:
+    ) -> tuple[_Step, float, ConstrainedPoint] | None:
         """A step that counts the curvature of the constraints too, if it is accepted.
 
         Args:
             at: Where the step begins.
-            system: Of the step.
+            equations: Of the step.
             trial: The end of the step, which is rejected.
             before: Violation and barrier function.
-            longest: The length of the step.
+            step: That is corrected.
             promised: Change of the barrier function that it was promised.
         """
-        missed = longest * (at.point.inequalities + at.slacks)
-        equal = longest * at.point.equalities
-        slacks, violation = at.slacks + longest * system.last_slacks, np.inf
+        longest = length = self._longest(at, step)
+        missed, equal = at.point.inequalities + at.slacks, at.point.equalities
+        violation = np.inf
         for _ in range(_CORRECTIONS):
             if not np.isfinite(trial.inequalities).all():
                 return None
-            missed, equal = missed + trial.inequalities + slacks, equal + trial.equalities
-            step = system.step(missed, equal)
+            missed = length * missed + trial.inequalities + at.slacks + length * step.slacks
+            equal = length * equal + trial.equalities
+            step = equations.step(missed, equal)
             length = self._longest(at, step)
             after, trial = self._tried(at, step, length)
-            if self._filter.accepts(before, after, promised, longest):
-                return step, length, after, trial
-            if after[0] > _SLOW_CORRECTION * violation:
+            if self._merit.accepts(before, after, promised, longest):
+                return step, length, trial
+            if after.violation > _SLOW_CORRECTION * violation:
                 return None
-            violation, slacks = after[0], at.slacks + length * step.slacks
-            missed, equal = length * missed, length * equal
+            violation = after.violation
         return None
 
-    def _system(self, at: _Iterate) -> _System | None:
-        """The equations of a step, damped until they have a positive definite matrix."""
-        lower, upper = at.x - self._lower, self._upper - at.x
-        matrix = at.point.curvature(at.z, at.y, at.z / at.slacks)
-        matrix[np.diag_indices_from(matrix)] += at.z_lower / lower + at.z_upper / upper
-        equal = at.point.equality_rows
-        weight = max(1.0, np.abs(np.diag(matrix)).max()) * _EQUALITY_WEIGHT if len(equal) else 0.0
-        matrix += weight * (equal.T @ equal)
-        residual = self._cost + equal.T @ at.y - self._barrier * (1.0 / lower - 1.0 / upper)
-        least = damping = self._settings.damping
-        while damping < _LARGEST_DAMPING:
-            try:
-                factor = cho_factor(matrix + damping * np.eye(len(matrix)), check_finite=False)
-            except LinAlgError:
-                grown = _GROWTH * damping
-                damping = max(grown, self._damping / _SHRINK) if damping == least else grown
-                continue
-            self._damping = damping if damping > least else self._damping / _SHRINK
-            return _System(at, self._barrier, factor, weight, residual)
-        return None
-
-    def _tried(
-        self, at: _Iterate, step: _Step, length: float
-    ) -> tuple[tuple[float, float], ConstrainedPoint]:
-        """Violation and barrier function at a step's end, and the constraints there."""
-        x, slacks = at.x + length * step.x, at.slacks + length * step.slacks
+    def _tried(self, at: _Iterate, step: _Step, length: float) -> tuple[_Value, ConstrainedPoint]:
+        """What a step leads to, and the constraints there."""
+        x = at.x + length * step.x
         point = self._program.at(x)
-        return (_violation(point, slacks), self._barrier_function(x, slacks)), point
+        return self._value(x, _shortened(at.slacks, step, length, point), point), point
 
-    def _barrier_function(self, x: Array, slacks: Array) -> float:
-        logarithms = np.log(slacks).sum() + np.log((x - self._lower) * (self._upper - x)).sum()
-        return float(self._cost @ x - self._barrier * logarithms)
+    def _value(self, x: Array, slacks: Array, point: ConstrainedPoint) -> _Value:
+        """Violation and barrier function; the violation is infinite where there is no number."""
+        missed = float(np.abs(point.inequalities + slacks).sum() + np.abs(point.equalities).sum())
+        with np.errstate(divide="ignore"):  # infinite at the edge of the box
+            logarithms = np.log(slacks).sum() + np.log((x - self._lower) * (self._upper - x)).sum()
+        barrier = float(self._cost @ x - self._barrier * logarithms)
+        return _Value(missed if np.isfinite(missed) else np.inf, barrier)
 
     def _promised(self, at: _Iterate, step: _Step) -> float:
         lower, upper = at.x - self._lower, self._upper - at.x
@@ -406,9 +382,8 @@ class _InteriorPoint:
         return float(self._cost @ step.x - self._barrier * along)
 
     def _longest(self, at: _Iterate, step: _Step) -> float:
-        """The longest step that keeps slacks positive and the point in its box."""
-        lower, upper = at.x - self._lower, self._upper - at.x
-        return min(_to_zero(at.slacks, step.slacks), _to_zero(lower, step.x), _to_zero(upper, -step.x))
+        """The longest step that keeps the point in its box."""
+        return min(_to_zero(at.x - self._lower, step.x), _to_zero(self._upper - at.x, -step.x))
 
     def _move(self, at: _Iterate, step: _Step, length: float, trial: ConstrainedPoint) -> None:
         """Change the iterate by a step; multipliers go as far as they stay positive."""
@@ -419,11 +394,10 @@ class _InteriorPoint:
         at.x = at.x + length * step.x
         at.y = at.y + length * step.y
         at.point, at._residual = trial, None
-        at.slacks = at.slacks + length * step.slacks
+        at.slacks = _shortened(at.slacks, step, length, trial)
         at.z = self._near_path(at.z + dual * step.z, at.slacks)
         at.z_lower = self._near_path(at.z_lower + dual * by_lower, at.x - self._lower)
         at.z_upper = self._near_path(at.z_upper + dual * by_upper, self._upper - at.x)
-        at.slacks = np.maximum(at.slacks, -trial.inequalities)  # where there is more room than that
 
     def _near_path(self, multipliers: Array, distances: Array) -> Array:
         """Multipliers whose products with distances are not too far from the barrier parameter."""
@@ -431,23 +405,31 @@ class _InteriorPoint:
         return np.clip(multipliers, fitting / _CORRIDOR, fitting * _CORRIDOR)
 
 
-class _System:
-    """The linear equations of one iterate's steps, factorized."""
+class _Equations:
+    """The linear equations of one iterate's steps."""
 
-    def __init__(
-        self,
-        at: _Iterate,
-        barrier: float,
-        factor: tuple[Array, bool],
-        weight: float,
-        residual: Array,
-    ) -> None:
-        self._at, self._barrier, self._factor = at, barrier, factor
-        self._weight, self._residual = weight, residual
+    def __init__(self, at: _Iterate, method: _InteriorPoint) -> None:
+        lower, upper = at.x - method._lower, method._upper - at.x
+        matrix = at.point.curvature(at.z, at.y, at.z / at.slacks)
+        matrix[np.diag_indices_from(matrix)] += at.z_lower / lower + at.z_upper / upper
         self._equal = at.point.equality_rows
-        self._moved = cho_solve(factor, self._equal.T, check_finite=False)
+        largest = max(1.0, np.abs(np.diag(matrix)).max())
+        self._weight = largest * _EQUALITY_WEIGHT if len(self._equal) else 0.0
+        self._matrix = matrix + self._weight * (self._equal.T @ self._equal)
+        barrier = self._barrier = method._barrier
+        self._residual = method._cost + self._equal.T @ at.y - barrier * (1.0 / lower - 1.0 / upper)
+        self._at = at
+
+    def factorize(self, damping: float) -> bool:
+        """Factorize the damped matrix; False where it is not positive definite."""
+        try:
+            damped = self._matrix + damping * np.eye(len(self._matrix))
+            self._factor = cho_factor(damped, check_finite=False, overwrite_a=True)
+        except LinAlgError:
+            return False
+        self._moved = cho_solve(self._factor, self._equal.T, check_finite=False)
         self._schur = self._equal @ self._moved + 1e-14 * np.eye(len(self._equal))
-        self.last_slacks = np.zeros(0)  # of the first step
+        return True
 
     def step(self, missed: Array, equal: Array) -> _Step:
         """The step that removes what inequalities and their slacks (q,) and equalities (p,) are missed by."""
@@ -459,15 +441,12 @@ class _System:
         y = np.linalg.solve(self._schur, self._equal @ x + equal)
         x = x - self._moved @ y
         slacks = -missed - at.point.rows.times(x)
-        if not self.last_slacks.size:
-            self.last_slacks = slacks
         return _Step(x, slacks, fitting - at.z - sigma * slacks, y)
 
 
-def _violation(point: ConstrainedPoint, slacks: Array) -> float:
-    """The sum of what inequalities with their slacks and equalities are missed by; infinite for no number."""
-    total = float(np.abs(point.inequalities + slacks).sum() + np.abs(point.equalities).sum())
-    return total if np.isfinite(total) else np.inf
+def _shortened(slacks: Array, step: _Step, length: float, point: ConstrainedPoint) -> Array:
+    """Slacks at a step's end: none falls too far, and all have the room that there is."""
+    return np.maximum(np.maximum(slacks + length * step.slacks, _LEAST_SLACK * slacks), -point.inequalities)
 
 
 def _largest(values: Array) -> float:

@@ -40,7 +40,7 @@ from aerobat.trajectory import Trajectory, polynomial
 SEGMENTS = 8  # of a maneuver: within a percent of the fastest; twice as many take three times as long
 LEG_SEGMENTS = 2  # of a course's leg
 MAX_SEGMENTS = 80  # of all: solves take a second each
-FIRST = Settings()
+FIRST = Settings(least_barrier=1e-5, least_slack=0.1, gain=2e-4)
 ROUGH = Settings(barrier=1e-6, least_slack=1e-3)
 FINE = Settings(
     barrier=1e-6, least_slack=1e-3, damping=1e-2, iterations=30, tolerance=1e-5, violation=5e-5, gain=2e-4
@@ -170,7 +170,7 @@ class Refinement:
             if out_of_time() or not self.is_promising(found) or duration > (1.0 + BEHIND) * known:
                 break
             spread = knots_at_stages(found.path, found.path.trajectory.segments)
-            again = self._rough(spread, duration, found.certified)
+            again = self._rough(spread, duration, found.certified, found.multipliers)
             if not self.is_promising(again) or again.path.trajectory.duration >= duration:
                 break
             found = again
@@ -179,13 +179,17 @@ class Refinement:
         return found
 
     def _rough(
-        self, guess: WarmStart, known: float, certified: Judged[RefinedPath] | None = None
+        self,
+        guess: WarmStart,
+        known: float,
+        certified: Judged[RefinedPath] | None = None,
+        multipliers: Array | None = None,
     ) -> RefinedPath:
         """The fastest path near one with knots at the stages, or one far behind a known duration [s].
 
         With it comes the shortest that is certified, of the rounds made here and before.
         """
-        rounds = Rounds(self, guess)
+        rounds = Rounds(self, guess, multipliers=multipliers)
         before = np.inf
         for number in range(ROUGH_ROUNDS):
             solution = rounds.solve()
