@@ -52,6 +52,7 @@ SPREADS = 4  # of a rough path's knots anew, at most: 1.2 % shorter on average o
 ROUGH_SHARE = 0.5  # of the time that is left, so that there is some to certify what is found
 ROUGH_PLACES = 16  # of a segment: as many as a polynomial of degree 9 needs
 FINE_PLACES = 24
+MORE_PLACES = 1.5  # times as many where thrusts jump, as those of rotors without lag
 LITTLE_GAIN = 0.005  # of the duration, from one rough round to the next: the end
 BEHIND = 0.02  # of a known path's duration: one that is so much longer after a round is not gone on with
 RADIUS = 2.0  # of the box in which scaled derivatives move at first,
@@ -303,7 +304,9 @@ class Rounds:
     ) -> None:
         limits = refinement.limits
         self._refinement, self._guess, self._settings = refinement, guess, settings
-        self._fractions, self._radius, self._stretch = chebyshev(places), radius, stretch
+        jumps = not refinement.task.vehicle.lags.any()
+        self._fractions = chebyshev(round(places * (MORE_PLACES if jumps else 1.0)))
+        self._radius, self._stretch = radius, stretch
         trajectory = guess.trajectory
         self._segments = tuple(_segment_that_ends(trajectory, time) for time in guess.times)
         kept = limits.reserve + BACKOFF
