@@ -39,6 +39,7 @@ _JUMP = 10.0  # of δ, where no part of a step is taken
 _MOST_DAMPING = 1.0  # that a short step leads to
 _LARGEST_DAMPING = 1e10
 _SHORT = 0.2  # of a step: what leaves its box earlier is damped more
+_JAMMED = 1e-3  # of a step: where no more is taken, slacks and multipliers begin anew
 _BACKTRACKS = 10  # parts of a step that are tried, each half the one before
 _CORRECTIONS = 3  # of second order, in a row
 _SLOW_CORRECTION = 0.99  # of the violation: a correction that leaves more ends them
@@ -292,9 +293,17 @@ class _InteriorPoint:
             found = self._accepted(at, equations, before)
             if found is not None:
                 self._move(at, *found)
+                if found[1] < _JAMMED:
+                    self._begin_anew(at)
                 return True
             self._damping *= _JUMP
         return False
+
+    def _begin_anew(self, at: _Iterate) -> None:
+        """Move slacks away from zero where steps hardly lead on, and choose multipliers that fit."""
+        at.slacks = np.maximum(at.slacks, self._settings.least_slack)
+        at.z, at._residual = self._barrier / at.slacks, None
+        self._damping = self._settings.damping
 
     def _accepted(
         self, at: _Iterate, equations: _Equations, before: _Value

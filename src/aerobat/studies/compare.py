@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any
 
 from aerobat.declaration import NonNegative, by_value, in_notebooks, short, validated
 from aerobat.errors import BackendMissing, Infeasible, SpecError
@@ -177,12 +176,8 @@ def _named(planner: tuple[str, Planner] | str) -> tuple[str, Planner]:
 
 
 def all_planners() -> tuple[tuple[str, Planner], ...]:
-    """Every registered planner with its defaults, or with each of the settings in its `COMPARED`."""
-    planners: list[tuple[str, Planner]] = []
-    for name, cls in registered_planners().items():
-        compared: Sequence[dict[str, Any]] = getattr(cls, "COMPARED", ({},))
-        planners += [(name, cls(**settings)) for settings in compared]
-    return tuple(planners)
+    """Every registered planner with its defaults."""
+    return tuple((name, cls()) for name, cls in registered_planners().items())
 
 
 def _improved(

@@ -71,7 +71,6 @@ class FreeKnots(Planner):
     )
     clearance: Clearance = option(0.0, CLEARANCE, command_default=FLYING_CLEARANCE)  # [m]
     time_limit: NonNegative | None = option(None, TIME_LIMIT)  # [s]
-    COMPARED: ClassVar[tuple[dict[str, int], ...]] = ({"segments": 4}, {"segments": 8})
 
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None

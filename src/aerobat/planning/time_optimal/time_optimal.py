@@ -121,11 +121,12 @@ class TimeOptimal(Planner):
         raise Infeasible(Reason(sentence, limits_of(last)), attempts)
 
     def _refined(self, own: Plan | None, begun: Starts, race: Race) -> Plan | None:
-        """The planner's own plan, or a faster one of polynomials that is refined from it.
+        """The planner's own plan, or a faster one of polynomials.
 
-        Where it has none, that which is refined from the path that it began from, if there is any.
+        They are refined from its own plan, or from one that it began from, if that is faster.
         """
-        start = min(begun.plans, key=lambda plan: plan.duration, default=None) if own is None else own
+        known = begun.plans if own is None else (own, *begun.plans)
+        start = min(known, key=lambda plan: plan.duration, default=None)
         if start is None:
             return None
         planner = FreeKnots(SEGMENTS, start, reserve=self.reserve)
