@@ -1,4 +1,4 @@
-"""The two suites of tests: the default one of two minutes, and the full one, which `--full` runs."""
+"""The two suites of tests: the default one of four minutes, and the full one, which `--full` runs."""
 
 from __future__ import annotations
 
