@@ -194,7 +194,7 @@ def test_a_plan_that_takes_suspiciously_long_says_so_and_what_to_give(capsys) ->
     assert (assessed["suspicious"], assessed["second_opinion"]) == (True, None)
     code, out, _ = run(capsys, *words, "--explain", "--json")
     assert code == 0
-    assert json.loads(out)["plan"]["assessment"]["second_opinion"]["duration"] < 2.1  # of 3.1 s
+    assert json.loads(out)["plan"]["assessment"]["second_opinion"]["duration"] < 2.3  # of 3.1 s
 
 
 def test_check_judges_a_plan_of_what_cannot_hover_all_the_same(capsys) -> None:

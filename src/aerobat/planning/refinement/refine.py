@@ -40,7 +40,7 @@ from aerobat.trajectory import Trajectory, polynomial
 SEGMENTS = 8  # of a maneuver: within a percent of the fastest; twice as many take three times as long
 LEG_SEGMENTS = 2  # of a course's leg
 MAX_SEGMENTS = 80  # of all: solves take a second each
-FIRST = Settings(least_barrier=1e-5, least_slack=0.1, gain=2e-4)
+FIRST = Settings(least_barrier=1e-5, least_slack=0.1, gain=2e-4)  # from paths far beyond the limits
 ROUGH = Settings(barrier=1e-6, least_slack=1e-3)
 FINE = Settings(
     barrier=1e-6, least_slack=1e-3, damping=1e-2, iterations=30, tolerance=1e-5, violation=5e-5, gain=2e-4
