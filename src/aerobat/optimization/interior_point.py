@@ -164,6 +164,15 @@ class _Value(NamedTuple):
     barrier: float  # the barrier function
 
 
+class _Trial(NamedTuple):
+    """The end of a step."""
+
+    x: Array
+    slacks: Array
+    point: ConstrainedPoint
+    value: _Value
+
+
 @dataclass(eq=False)
 class _Merit:
     """The barrier function plus a weight times the violation."""
@@ -307,19 +316,19 @@ class _InteriorPoint:
 
     def _accepted(
         self, at: _Iterate, equations: _Equations, before: _Value
-    ) -> tuple[_Step, float, ConstrainedPoint] | None:
-        """A step, its length and the point at its end, corrected or shortened; None if it is not taken."""
+    ) -> tuple[_Step, float, _Trial] | None:
+        """A step, its length and its end, corrected or shortened; None if it is not taken."""
         missed = at.point.inequalities + at.slacks
         step = equations.step(missed, at.point.equalities)
         promised, length = self._promised(at, step), self._longest(at, step)
         if length < _SHORT and self._damping < _MOST_DAMPING:
             return None
         for halvings in range(_BACKTRACKS):
-            after, trial = self._tried(at, step, length)
-            if self._merit.accepts(before, after, promised, length):
+            trial = self._tried(at, step, length)
+            if self._merit.accepts(before, trial.value, promised, length):
                 self._adapt(is_whole=not halvings)
                 return step, length, trial
-            if not halvings and after.violation >= before.violation:
+            if not halvings and trial.value.violation >= before.violation:
                 corrected = self._corrected(at, equations, trial, before, step, promised)
                 if corrected is not None:
                     self._adapt(is_whole=True)
@@ -338,11 +347,11 @@ class _InteriorPoint:
         self,
         at: _Iterate,
         equations: _Equations,
-        trial: ConstrainedPoint,
+        trial: _Trial,
         before: _Value,
         step: _Step,
         promised: float,
-    ) -> tuple[_Step, float, ConstrainedPoint] | None:
+    ) -> tuple[_Step, float, _Trial] | None:
         """A step that counts the curvature of the constraints too, if it is accepted.
 
         Args:
@@ -357,25 +366,27 @@ class _InteriorPoint:
         missed, equal = at.point.inequalities + at.slacks, at.point.equalities
         violation = np.inf
         for _ in range(_CORRECTIONS):
-            if not np.isfinite(trial.inequalities).all():
+            if not np.isfinite(trial.point.inequalities).all():
                 return None
-            missed = length * missed + trial.inequalities + at.slacks + length * step.slacks
-            equal = length * equal + trial.equalities
+            missed = length * missed + trial.point.inequalities + at.slacks + length * step.slacks
+            equal = length * equal + trial.point.equalities
             step = equations.step(missed, equal)
             length = self._longest(at, step)
-            after, trial = self._tried(at, step, length)
-            if self._merit.accepts(before, after, promised, longest):
+            trial = self._tried(at, step, length)
+            if self._merit.accepts(before, trial.value, promised, longest):
                 return step, length, trial
-            if after.violation > _SLOW_CORRECTION * violation:
+            if trial.value.violation > _SLOW_CORRECTION * violation:
                 return None
-            violation = after.violation
+            violation = trial.value.violation
         return None
 
-    def _tried(self, at: _Iterate, step: _Step, length: float) -> tuple[_Value, ConstrainedPoint]:
-        """What a step leads to, and the constraints there."""
+    def _tried(self, at: _Iterate, step: _Step, length: float) -> _Trial:
+        """The end of a step: no slack falls too far, and all have the room that there is."""
         x = at.x + length * step.x
         point = self._program.at(x)
-        return self._value(x, _shortened(at.slacks, step, length, point), point), point
+        falling = np.maximum(at.slacks + length * step.slacks, _LEAST_SLACK * at.slacks)
+        slacks = np.maximum(falling, -point.inequalities)
+        return _Trial(x, slacks, point, self._value(x, slacks, point))
 
     def _value(self, x: Array, slacks: Array, point: ConstrainedPoint) -> _Value:
         """Violation and barrier function; the violation is infinite where there is no number."""
@@ -394,16 +405,14 @@ class _InteriorPoint:
         """The longest step that keeps the point in its box."""
         return min(_to_zero(at.x - self._lower, step.x), _to_zero(self._upper - at.x, -step.x))
 
-    def _move(self, at: _Iterate, step: _Step, length: float, trial: ConstrainedPoint) -> None:
+    def _move(self, at: _Iterate, step: _Step, length: float, trial: _Trial) -> None:
         """Change the iterate by a step; multipliers go as far as they stay positive."""
         lower, upper = at.x - self._lower, self._upper - at.x
         by_lower = self._barrier / lower - at.z_lower - at.z_lower / lower * step.x
         by_upper = self._barrier / upper - at.z_upper + at.z_upper / upper * step.x
         dual = min(_to_zero(at.z, step.z), _to_zero(at.z_lower, by_lower), _to_zero(at.z_upper, by_upper))
-        at.x = at.x + length * step.x
-        at.y = at.y + length * step.y
-        at.point, at._residual = trial, None
-        at.slacks = _shortened(at.slacks, step, length, trial)
+        at.x, at.slacks, at.point, _ = trial
+        at.y, at._residual = at.y + length * step.y, None
         at.z = self._near_path(at.z + dual * step.z, at.slacks)
         at.z_lower = self._near_path(at.z_lower + dual * by_lower, at.x - self._lower)
         at.z_upper = self._near_path(at.z_upper + dual * by_upper, self._upper - at.x)
@@ -451,11 +460,6 @@ class _Equations:
         x = x - self._moved @ y
         slacks = -missed - at.point.rows.times(x)
         return _Step(x, slacks, fitting - at.z - sigma * slacks, y)
-
-
-def _shortened(slacks: Array, step: _Step, length: float, point: ConstrainedPoint) -> Array:
-    """Slacks at a step's end: none falls too far, and all have the room that there is."""
-    return np.maximum(np.maximum(slacks + length * step.slacks, _LEAST_SLACK * slacks), -point.inequalities)
 
 
 def _largest(values: Array) -> float:
