@@ -60,7 +60,8 @@ def test_whoever_flies_whatever_any_instants_keep_what_is_announced(
     assert found.possible.all()
     # between the instants of the plan's own, up to 1/200 s away, a recovery takes another turn at times:
     # from one instant in a hundred where thrusts jump, without lag
-    assert np.quantile(found.lowest, 0.02) > announced.lowest.min() - 0.3
+    lags = ab.load_vehicle(vehicle).lags
+    assert np.quantile(found.lowest, 0.0 if lags.any() else 0.02) > announced.lowest.min() - 0.3
 
 
 def test_the_sentence_tells_the_instants_that_were_flown_and_the_time_to_notice(flip: ab.Plan) -> None:
