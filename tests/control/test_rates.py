@@ -16,6 +16,7 @@ from aerobat.environment import Environment
 from aerobat.kernels import motors, rate_loop
 from aerobat.kernels.control import Commands
 from aerobat.kernels.motors import VehicleState
+from aerobat.kernels.quaternions import conjugate, multiply
 from aerobat.kernels.rate_loop import RateLoopModel, RateLoopState, RateSetpoint, rate_gains
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.simulation.autopilot.braking import point_reference
@@ -108,6 +109,20 @@ def test_flights_of_a_lab_pass_by_rates_as_by_the_tracking_controller() -> None:
     }
     assert np.median(by["rates"]) < 1.3 * np.median(by["full"])
     assert by["rates"].max() < 0.2
+
+
+@pytest.mark.parametrize(("vehicle", "largest"), [("agile-quad", 10.0), ("crazyflie", 20.0)])
+def test_a_heading_is_held_by_rotors_that_differ(vehicle: str, largest: float) -> None:
+    """Rotors 3 % apart turn a vehicle by their drag; nine of ten flights hold their heading [deg]."""
+    flights = ab.fly(shared_plan("line", vehicle), conditions="lab", flights=range(40), controller="rates")
+    assert np.quantile([headings_missed(flights[k]).max() for k in range(40)], 0.9) < largest
+
+
+def headings_missed(flight: ab.Flight) -> np.ndarray:
+    """How far a vehicle is turned about its thrust axis from its set-point at every tick [deg]."""
+    w, *_, z = multiply(conjugate(flight.setpoint.q_world_body.T), flight.q_world_body.T)
+    turned = 2.0 * np.arctan2(z, w)
+    return np.degrees(np.abs(np.arctan2(np.sin(turned), np.cos(turned))))
 
 
 def test_rates_stay_within_what_a_gyro_tells() -> None:
