@@ -99,7 +99,7 @@ def test_what_does_not_move_is_left_out():
 
 
 def test_thrust_and_moment_are_drawn_with_what_rotors_within_their_limits_can_give():
-    figure, _, flight = page_of(6)
+    figure, _, flight = page_of(4)
     given, arm = wrench(VEHICLE, flight.thrusts), 0.3
     _, (_, thrust), limits = lines(panels(figure, "thrust [N]")[0], 2)
     np.testing.assert_allclose(thrust, given.thrust)
@@ -135,7 +135,7 @@ def test_every_rotor_is_drawn_with_its_limits(stop_after):
 
 
 def test_saturation_is_shaded_where_it_was():
-    figure, _, flight = page_of(6)
+    figure, _, flight = page_of(4)
     middles = (flight.times[:-1] + flight.times[1:]) / 2
 
     def within(axes):
@@ -159,7 +159,7 @@ def test_nothing_is_shaded_in_a_flight_without_saturation():
 
 
 def test_a_flight_that_ends_early_is_marked_where_it_ended():
-    figure, plan, flight = page_of(6)
+    figure, plan, flight = page_of(4)
     assert flight.times[-1] < plan.duration
     axes = panels(figure, "z [m]")[0]
     cross = next(line for line in axes.get_lines() if line.get_marker() == "x")

@@ -30,7 +30,7 @@ def detuned() -> ab.Vehicle:
 @cache
 def found() -> ab.Tuning:
     """Gains found for a vehicle whose own were halved."""
-    return ab.tune(half_flip(), WEAK, FLIGHTS, vehicle=detuned(), evaluations=48)
+    return ab.tune(half_flip(), WEAK, FLIGHTS, vehicle=detuned(), evaluations=64)
 
 
 @pytest.mark.slow
@@ -38,7 +38,7 @@ def test_gains_that_were_halved_are_brought_back_to_what_the_usual_ones_give() -
     usual = ab.tune(half_flip(), WEAK, FLIGHTS, evaluations=1).fresh[0]
     before, after = found().fresh
     assert before.cost > 1.5 * usual.cost  # else there is nothing to bring back
-    assert after.cost < 1.2 * usual.cost
+    assert after.cost < usual.cost
     assert found().is_better
 
 

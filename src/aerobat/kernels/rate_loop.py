@@ -19,7 +19,10 @@ from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, clip, magnitude
 from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import ZERO, add, add_scaled, clip_components, scale, subtract, transform
 
-_FREQUENCY = 75.0  # [rad/s] of the poles in roll and pitch, which the filters' delays let pass
+_FREQUENCY = 75.0  # [rad/s] of the poles in roll and pitch, which the filters' delays let pass, at most
+# [s/rad] of all the moment of roll or pitch, that an error of its rate asks for at most: more of it saturates
+# weak rotors, and with less slow ones are late (lab book)
+_TILT_SHARE = 0.15
 _DAMPING = 0.8  # [-] ratio of all poles
 # [s/rad] of all the moment of yaw, that an error of yaw rate asks for: with a quarter of it rotors 3 % apart
 # turned vehicles by 30° within a flip, with twice as much they held it no better (lab book)
@@ -44,6 +47,7 @@ class RateGains(NamedTuple):
     proportional: Vector  # [1/s]
     integral: Vector  # [1/s²]
     derivative: Vector  # [-]
+    frequency: Scalar  # [rad/s] of the poles in roll and pitch
 
 
 class RateLoopModel(NamedTuple):
@@ -65,21 +69,23 @@ class RateLoopState(NamedTuple):
 
 
 def rate_gains(ops: Ops, airframe: Airframe) -> RateGains:
-    """Gains that suit the slowest rotor of a vehicle, and its moment of yaw.
+    """Gains that suit the slowest rotor of a vehicle, and its moments.
 
     Roll and pitch have a derivative, and so poles faster than the rotors' lag alone allows. Yaw has none, and
     less gain where its moment is weak: it must leave the rotors to roll and pitch.
     """
     (_, inertia), rotors = airframe.mass_properties[:2], airframe.rotors
     lag = reduce(ops.maximum, (1.0 / rate for rate in rotors.inverse_time_constant), _SHORTEST_LAG)
-    torque = reduce(
-        add_scalars, map(mul, (magnitude(ops, c) for c in rotors.allocation[3]), rotors.max_thrust)
+    roll, pitch, turn = (
+        reduce(add_scalars, map(mul, (magnitude(ops, c) for c in row), rotors.max_thrust)) / inertia[k][k]
+        for k, row in enumerate(rotors.allocation[1:])
     )
-    tilt, yaw = _FREQUENCY * _FREQUENCY * lag, 1.0 / (4.0 * _DAMPING * _DAMPING * lag)
-    yaw = ops.minimum(yaw, _YAW_SHARE * torque / inertia[2][2])
-    damping = ops.maximum(2.0 * _DAMPING * _FREQUENCY * lag - 1.0, 0.0)
+    tilt = ops.minimum(_FREQUENCY * _FREQUENCY * lag, _TILT_SHARE * ops.minimum(roll, pitch))
+    yaw = ops.minimum(1.0 / (4.0 * _DAMPING * _DAMPING * lag), _YAW_SHARE * turn)
+    frequency = ops.sqrt(tilt / lag)
+    damping = ops.maximum(2.0 * _DAMPING * frequency * lag - 1.0, 0.0)
     integral, slow = (gain * ops.minimum(_INTEGRAL, _INTEGRAL_SHARE * gain) for gain in (tilt, yaw))
-    return RateGains((tilt, tilt, yaw), (integral, integral, slow), (damping, damping, 0.0))
+    return RateGains((tilt, tilt, yaw), (integral, integral, slow), (damping, damping, 0.0), frequency)
 
 
 def init(thrusts: PerRotor, gyro: Vector) -> RateLoopState:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import StrEnum
-from math import hypot
+from math import dist, hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -81,6 +81,7 @@ class Commander:
         self._vehicle, self._gravity, self._period, self._say = vehicle, gravity, period, say
         self._way: _Way | None = None
         self._there_by = 0.0  # [s] until when a vehicle has to be up, or down
+        self._leapt = False  # between two states, since that began
 
     @property
     def reason(self) -> str:
@@ -96,8 +97,11 @@ class Commander:
 
     def observe(self, seen: Observed) -> None:
         """Take note of a state."""
-        if self.seen is not None and seen.time <= self.seen.time:
-            return
+        if self.seen is not None:
+            if seen.time <= self.seen.time:
+                return
+            moved = dist(seen.body.position, self.seen.body.position)
+            self._leapt |= moved > _ASTRAY and seen.time - self.seen.time < _RECENT
         self.seen = seen
         if self.mission is not None and self.mission.phase is Phase.MANEUVER:
             self.log.append(seen._replace(time=seen.time - self.mission.maneuver_began))
@@ -110,7 +114,7 @@ class Commander:
         here = np.array(seen.body.position)
         self.ground = float(here[2])
         up = rest_to_rest(here, here + height * so3.UP, _SPEED, _ACCELERATION)
-        self._there_by = now + _SPINNING_UP + up.duration + _PATIENCE
+        self._there_by, self._leapt = now + _SPINNING_UP + up.duration + _PATIENCE, False
         self._go(Doing.CLIMBING, now + _SPINNING_UP, up, yaw_of(seen.body.q_world_body))
 
     def hover(self, now: float) -> None:
@@ -127,7 +131,7 @@ class Commander:
         bottom = np.array([here[0], here[1], self.ground - _BELOW])
         yaw = yaw_of(seen.body.q_world_body) if self._way is None else self._way.yaw
         down = rest_to_rest(here, bottom, _DESCENT, _ACCELERATION)
-        self._there_by = now + down.duration + _PATIENCE
+        self._there_by, self._leapt = now + down.duration + _PATIENCE, False
         self._go(Doing.LANDING, now, down, yaw)
 
     def require_hover(self, now: float) -> Observed:
@@ -232,11 +236,16 @@ class Commander:
         return self.doing is Doing.CLIMBING or self.seen.body.position[2] > self.ground + _ALOFT
 
     def _begin_anew(self, now: float) -> bool:
-        """Lead it on from where it is; false where that has lasted too long, and it is left to itself."""
+        """Lead it on from where it is.
+
+        False where it is left to itself: where that has lasted too long, or it was seen to leap, since goals
+        would leap too.
+        """
         assert self.seen is not None and self._way is not None, "asked on a way only"  # noqa: PT018
-        if now > self._there_by:
+        if self._leapt or now > self._there_by:
             order = "climb" if self.doing is Doing.CLIMBING else "land"
-            self._leave(f"the vehicle does not {order} as it is told")
+            why = ", it is seen to leap" if self._leapt else ""
+            self._leave(f"the vehicle does not {order} as it is told{why}")
             return False
         end, here = self._way.path.evaluate(self._way.path.duration), np.array(self.seen.body.position)
         speed = _SPEED if self.doing is Doing.CLIMBING else _DESCENT

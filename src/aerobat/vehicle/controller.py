@@ -39,10 +39,10 @@ class Controller:
     max_feedback: NonNegative = 15.0  # [m/s²] largest feedback acceleration
     jerk_filter: NonNegative = 0.1  # [s] time constant of the filter on the feedback's derivative
     attitude_frequency: NonNegative = 25.0  # [rad/s] ω_n of the attitude loop
-    attitude_damping: NonNegative = 0.85  # [-] ζ of the attitude loop
+    attitude_damping: NonNegative = 1.1  # [-] ζ of the attitude loop
     attitude_integral_gain: NonNegative = 1000.0  # [1/s³]
     max_attitude_integral: NonNegative = 0.05  # [rad·s]
-    lead_time_constant: NonNegative = 0.01  # [s] time constant that the lead leaves of the rotors' lag
+    lead_time_constant: NonNegative = 0.005  # [s] time constant that the lead leaves of the rotors' lag
     disturbance_filter: NonNegative = 0.02  # [s] time constant of the disturbance observer; 0 for none
     moment_feedforward: bool = True  # the moment that the reference asks, J ω' + ω × Jω
     motor_lag_compensation: bool = True  # commands that lead the rotors' lag

@@ -33,6 +33,7 @@ from aerobat.kernels.vectors import (
 )
 
 _YAW_SHARE = 1.0 / 3.0  # [-] of the inner loop's gain of yaw: a faster outer loop is not damped
+_TILT_SHARE = 0.215  # [-] of the frequency of the inner loop's poles, likewise
 _FULL_THRUST = 9.8  # [m/s²] of less specific thrust, which small errors swing about, less is corrected
 
 
@@ -55,7 +56,7 @@ class Rates(ControlLaw):
 
     GIVES_RATES: ClassVar[bool] = True
 
-    tilt_gain: NonNegative = 16.0  # [1/s] rate per angle of roll and pitch
+    tilt_gain: NonNegative = 16.0  # [1/s] rate per angle of roll and pitch, less where the inner loop is slow
     yaw_gain: NonNegative = 6.0  # [1/s] rate per angle of yaw, at most a third of the inner loop's gain
     max_correction: Positive = 3.0  # [rad/s] of each axis, beside what the reference asks
     max_rate: Positive = 34.0  # [rad/s] of each axis: gyros tell 35, which are 2000°/s
@@ -87,8 +88,9 @@ class Rates(ControlLaw):
         left = subtract(turning, times(gains.integral, state.integral))
         p, q, r = gains.proportional
         lead = left[0] / p, left[1] / q, left[2] / r
+        tilt_gain = ops.minimum(self.tilt_gain, _TILT_SHARE * gains.frequency)
         yaw_gain = ops.minimum(self.yaw_gain, _YAW_SHARE * gains.proportional[2])
-        feedback = times(scale(2.0, error.rotation), (self.tilt_gain, self.tilt_gain, yaw_gain))
+        feedback = times(scale(2.0, error.rotation), (tilt_gain, tilt_gain, yaw_gain))
         asked_rate = to_body(body_axes, reference.omega)
         correction = add(subtract(to_body(body_axes, attitude.omega), asked_rate), feedback)
         correction = clip_components(ops, correction, self.max_correction)
