@@ -95,8 +95,9 @@ def test_what_the_firmware_cannot_fly_is_refused_in_a_sentence() -> None:
     one_wide = (replace(QUAD.rotors[0], position_body=[0.2, 0.106, 0.0]), *QUAD.rotors[1:])
     assert "quadrotors in X" in complaint(lambda: rotor_order(replace(QUAD, rotors=one_wide)))
     assert "lower max_body_rate" in complaint(lambda: stick_rate(40.0))
-    heavy = replace(QUAD, inertia=np.array([0.02, 0.02, 0.03]))
-    assert "too weak for Betaflight's gains" in complaint(lambda: betaflight_settings(heavy, 20.0))
+    rotors = tuple(replace(rotor, lag=0.1) for rotor in QUAD.rotors)
+    slow = replace(QUAD, inertia=np.array([0.02, 0.02, 0.03]), rotors=rotors)
+    assert "too slow for Betaflight's gains" in complaint(lambda: betaflight_settings(slow, 20.0))
 
 
 def test_sticks_reach_beyond_the_reference_and_no_further_than_the_gyro() -> None:

@@ -151,7 +151,7 @@ def _gains(vehicle: Vehicle) -> Iterator[tuple[str, int]]:
             value = max(value, 1 if kind[k] > 0.0 else 0)  # a small gain is no gain at all else
             if value > _MAX_GAIN:
                 raise SpecError(
-                    f"autopilot: the rotors of '{vehicle.name}' are too weak for Betaflight's gains, "
-                    f"{letter}_{axis} would be {value}; take a vehicle of more thrust or less inertia"
+                    f"autopilot: the rotors of '{vehicle.name}' are too slow for Betaflight's gains, "
+                    f"{letter}_{axis} would be {value}; take a vehicle of less lag or less inertia"
                 )
             yield f"{letter}_{axis}", value
