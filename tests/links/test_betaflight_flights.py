@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -20,7 +21,7 @@ import aerobat as ab
 from aerobat.errors import SpecError
 from aerobat.interchange import read_blackbox
 from aerobat.kernels.rate_loop import RateSetpoint
-from aerobat.links.betaflight import autopilot
+from aerobat.links.betaflight import autopilot, process
 from aerobat.links.betaflight.autopilot import Betaflight, BetaflightRun
 from aerobat.links.betaflight.process import Firmware, FirmwareEnded, configured
 from aerobat.links.betaflight.settings import betaflight_settings
@@ -264,3 +265,16 @@ def test_rotors_twice_as_slow_are_found_in_a_flight() -> None:
     slow = replace(QUAD, rotors=tuple(replace(rotor, lag=2.0 * rotor.lag) for rotor in QUAD.rotors))
     flown = ab.fly(plan, slow, nominal=QUAD, controller="rates", autopilot="betaflight", rate=1000.0)
     assert ab.inspect_flight(flown, plan).cause == "lag"
+
+
+def test_a_port_that_another_program_takes_meanwhile_costs_a_second_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    free = process._free_port
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        ports = [taken.getsockname()[1]]
+        monkeypatch.setattr(process, "_free_port", lambda: ports.pop() if ports else free())
+        monkeypatch.setattr(process, "_PATIENCE", 2.0)
+        assert process.configured.__wrapped__(betaflight_settings(QUAD, 20.0, simulated=True))

@@ -128,27 +128,10 @@ class Bench:
             self.motion = self.motion._replace(body=STANDING._replace(position=(x, y, 0.0)))
 
 
-class Counted:
-    """A line whose bytes that came are counted."""
-
-    def __init__(self, line: Any) -> None:
-        self.write, self.close, self._line, self.came = line.write, line.close, line, 0
-
-    def read(self, most: int) -> bytes:
-        data: bytes = self._line.read(most)
-        self.came += len(data)
-        return data
-
-
 class FirmwareLoop:
-    """Betaflight's firmware, whose receiver hears MSP on its first serial line.
-
-    Its thread that reads the line lives by the wall's time: where frames are unanswered, its clock waits.
-    """
+    """Betaflight's firmware, whose receiver hears MSP on its first serial line."""
 
     LINES = ("set serial_update_rate_hz = 2000",)  # its receiver is MSP by default
-    ANSWER = 6  # bytes that it sends for a frame
-    BEHIND = 20  # frames unanswered, 80 ms of them: 200 ms of its clock without one are a loss
 
     def __init__(self, vehicle: ab.Vehicle) -> None:
         lines = betaflight_settings(vehicle, board_rate(vehicle), simulated=True)
@@ -157,18 +140,13 @@ class FirmwareLoop:
         self.firmware.step(1.0)
         self.line = SerialLine(f"socket://127.0.0.1:{self.firmware._port}", 115200)
         self.protocol = MSP
-        self.line._line = self._counted = Counted(self.line._line)
-        self._sent = 0
 
     def send(self, frame: bytes) -> None:
-        """As a line does."""
+        """As a line does; the thread that reads it in the firmware lives by the wall's time."""
         self.line.send(frame)
-        self._sent += 1
         time.sleep(0.001)
 
     def step(self, sensed: Sensed, duration: float) -> PerRotor:
-        if self._sent - self._counted.came // self.ANSWER > self.BEHIND:
-            time.sleep(0.02)
         commands = self.firmware.step(duration, state_packet(sensed)).commands
         low, high = self._vehicle.min_thrusts, self._vehicle.max_thrusts
         by_rotor = dict(zip(self._order, commands, strict=True))

@@ -4,7 +4,7 @@
 // before the C library (LD_PRELOAD), the functions below answer instead. Time is counted, not measured: it
 // advances as the main loop sleeps, and stops at each end of a step until the next step is ordered. Orders and
 // answers go over one inherited socket, so no UDP port is taken, and the firmware ends when the socket does.
-// Its serial lines get free ports of the system's choice; answers tell that of the first line.
+// The port of its first serial line becomes AEROBAT_SERIAL_PORT; other lines get free ports.
 
 #define _GNU_SOURCE
 #include <arpa/inet.h>
@@ -36,7 +36,6 @@ struct answer {
     uint64_t time;    // [ns]
     uint32_t packets;  // of motors in the step
     float motors[4];
-    uint32_t serial_port;  // of its first serial line, 0 until that has one
 };
 
 // A thread of the firmware that waits for packets, run as a coroutine of its main thread.
@@ -144,14 +143,12 @@ int bind(int fd, const struct sockaddr *address, socklen_t size)
         *(port == STATE_PORT ? &state.fd : &rc.fd) = fd;
         return 0;
     }
-    if (port < SERIAL_PORT || port > LAST_SERIAL_PORT) return next(fd, (const struct sockaddr *)&own, sizeof own);
-    own.sin_port = 0;
-    own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t length = sizeof own;
-    int failed = next(fd, (const struct sockaddr *)&own, sizeof own);
-    if (port == SERIAL_PORT && !failed && !getsockname(fd, (struct sockaddr *)&own, &length))
-        answer.serial_port = ntohs(own.sin_port);
-    return failed;
+    if (port >= SERIAL_PORT && port <= LAST_SERIAL_PORT) {
+        const char *serial = getenv("AEROBAT_SERIAL_PORT");
+        own.sin_port = htons(serial && port == SERIAL_PORT ? atoi(serial) : 0);
+        own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    }
+    return next(fd, (const struct sockaddr *)&own, sizeof own);
 }
 
 static struct receiver *receiver_of(int fd)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 from aerobat.errors import BackendMissing, SpecError
 
 _ORDER = struct.Struct("<QII144s40s")
-_ANSWER = struct.Struct("<QI4fI")
+_ANSWER = struct.Struct("<QI4f4x")
 _PATIENCE = 20.0  # [s] of the wall for an answer
 _STEP = 0.01  # [s] of the firmware between looks at its serial line
 _LOOK = 0.002  # [s] of the wall that each look lasts
@@ -81,8 +81,8 @@ class Motors(NamedTuple):
 class Firmware:
     """A running firmware; its clock stands still between steps.
 
-    No UDP port is taken, and its serial line gets a free port from the system, so that several can run. It
-    ends with this process, however that ends.
+    No UDP port is taken, and its serial line has a port of its own, so that several can run. It ends with
+    this process, however that ends.
     """
 
     def __init__(self, saved: bytes | None = None) -> None:
@@ -102,11 +102,12 @@ class Firmware:
         self._orders, theirs = socket.socketpair()
         self._orders.settimeout(_PATIENCE)
         self._serial: socket.socket | None = None
-        self._port = 0  # of its serial line, once it has told
+        self._port = _free_port()
         environment = {
             **os.environ,
             "LD_PRELOAD": str(library),
             "AEROBAT_ORDERS": str(theirs.fileno()),
+            "AEROBAT_SERIAL_PORT": str(self._port),
         }
         try:
             self._process = subprocess.Popen(
@@ -142,7 +143,7 @@ class Firmware:
             raise FirmwareEnded(
                 f"autopilot: Betaflight's process has ended{self._exit_code}; run it again"
             ) from None
-        nanoseconds, _, *commands, self._port = _ANSWER.unpack(answer)
+        nanoseconds, _, *commands = _ANSWER.unpack(answer)
         return Motors(1e-9 * nanoseconds, tuple(min(max(command, 0.0), 1.0) for command in commands))
 
     @property
@@ -181,7 +182,7 @@ class Firmware:
                 continue
             line.settimeout(_LOOK)
             return line
-        raise FirmwareEnded("autopilot: Betaflight does not listen on its serial line; run it again")
+        raise FirmwareEnded(f"autopilot: Betaflight does not listen on port {self._port}; run it again")
 
     def configure(self, lines: tuple[str, ...]) -> bytes:
         """Give it lines of its command line and have it save them, which ends it; return what it saved.
@@ -242,7 +243,12 @@ def _looks() -> Iterator[None]:
 
 @lru_cache(maxsize=32)
 def configured(lines: tuple[str, ...]) -> bytes:
-    """Return the settings that a firmware saves of lines of its command line."""
+    """Return the settings that a firmware saves of lines of its command line.
+
+    Another program may have taken the port that was free: a second firmware gets another one.
+    """
+    with suppress(FirmwareEnded), Firmware() as firmware:
+        return firmware.configure(lines)
     with Firmware() as firmware:
         return firmware.configure(lines)
 
@@ -296,3 +302,10 @@ def _lockstep() -> Path:
 
 
 _kept: list[_Folder] = []  # removed when the interpreter ends
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
