@@ -10,6 +10,7 @@
 #include <arpa/inet.h>
 #include <dlfcn.h>
 #include <pthread.h>
+#include <semaphore.h>
 #include <signal.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -63,6 +64,17 @@ __attribute__((constructor)) static void begin(void)
     orders = fd ? atoi(fd) : -1;
 }
 
+// The serial lines' thread frees any line that is not yet open, so it begins when all are: with the first motors.
+static sem_t lines_are_open;
+static struct { void *(*work)(void *); void *argument; } serial;
+
+static void *serve_serial(void *nothing)
+{
+    (void)nothing;
+    while (sem_wait(&lines_are_open)) {}
+    return serial.work(serial.argument);
+}
+
 static void work_on_state(void) { state.work(state.argument); }
 static void work_on_rc(void) { rc.work(rc.argument); }
 
@@ -72,6 +84,12 @@ int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*
     static int (*next)(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
     if (!next) next = dlsym(RTLD_NEXT, "pthread_create");
     int number = ++threads;
+    if (number == 1) {
+        serial.work = work;
+        serial.argument = argument;
+        sem_init(&lines_are_open, 0, 0);
+        return next(thread, attributes, serve_serial, NULL);
+    }
     if (number != 2 && number != 3) return next(thread, attributes, work, argument);
     struct receiver *receiver = number == 2 ? &state : &rc;
     receiver->work = work;
@@ -187,6 +205,9 @@ ssize_t sendto(int fd, const void *data, size_t size, int flags, const struct so
     if (port == MOTORS_PORT && size == sizeof answer.motors) {
         memcpy(answer.motors, data, size);
         answer.packets++;
+        static int running = 0;
+        if (!running) sem_post(&lines_are_open);
+        running = 1;
     }
     if (port == MOTORS_PORT || port == MOTORS_RAW_PORT) return size;
     return next(fd, data, size, flags, to, length);
