@@ -112,18 +112,18 @@ def test_a_plain_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened():
 
 @pytest.mark.slow
 def test_where_rotors_lag_otherwise_than_known_turning_slower_costs_less_than_any_reserve():
-    """At two fifths more or less than a lag of 72 ms, 840°/s is 24° late; two thirds of that are as fast."""
+    """At half more or less than a lag of 72 ms, 840°/s is 30° late; two thirds of that are as fast."""
     found = ab.plan_to_pass(
         "flip-pitch",
         ab.Miqp(reserve=0.15),
         "crazyflie",
         probability=0.9,
-        conditions=ab.Dispersion(name="lags", lag=0.4),
+        conditions=ab.Dispersion(name="lags", lag=0.5),
         flights=200,
         fresh=300,
         workers=1,
     )
-    assert found.before.fraction < 0.85
+    assert found.before.fraction < 0.8
     assert found.plan.assessment.max_body_rate < 0.7 * found.plain.assessment.max_body_rate
     assert found.price < 0.03 * found.plain.duration
     assert found.plan.vehicle == ab.load_vehicle("crazyflie")

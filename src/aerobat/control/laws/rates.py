@@ -32,8 +32,8 @@ from aerobat.kernels.vectors import (
     transform,
 )
 
-_YAW_SHARE = 1.0 / 3.0  # [-] of the inner loop's gain of yaw: a faster outer loop is not damped
-_TILT_SHARE = 0.215  # [-] of the frequency of the inner loop's poles, likewise
+_YAW_OF_GAIN = 1.0 / 3.0  # [-] of the inner loop's gain of yaw: a faster outer loop is not damped
+_TILT_OF_FREQUENCY = 0.215  # [-] of the frequency of the inner loop's poles, likewise
 _FULL_THRUST = 9.8  # [m/s²] of less specific thrust, which small errors swing about, less is corrected
 
 
@@ -88,8 +88,8 @@ class Rates(ControlLaw):
         left = subtract(turning, times(gains.integral, state.integral))
         p, q, r = gains.proportional
         lead = left[0] / p, left[1] / q, left[2] / r
-        tilt_gain = ops.minimum(self.tilt_gain, _TILT_SHARE * gains.frequency)
-        yaw_gain = ops.minimum(self.yaw_gain, _YAW_SHARE * gains.proportional[2])
+        tilt_gain = ops.minimum(self.tilt_gain, _TILT_OF_FREQUENCY * gains.frequency)
+        yaw_gain = ops.minimum(self.yaw_gain, _YAW_OF_GAIN * gains.proportional[2])
         feedback = times(scale(2.0, error.rotation), (tilt_gain, tilt_gain, yaw_gain))
         asked_rate = to_body(body_axes, reference.omega)
         correction = add(subtract(to_body(body_axes, attitude.omega), asked_rate), feedback)
