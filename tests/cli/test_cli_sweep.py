@@ -56,20 +56,24 @@ def test_a_sweep_writes_a_row_a_flight_and_counts_what_became_of_them(capsys) ->
     assert low < facts["went_well"]["fraction"] <= facts["went_well"]["high"]
 
 
+PARQUET = "out/half-flip-sweep-spread-seed-7-parquet"
+
+
 def test_a_repeated_sweep_comes_to_the_same_bits(capsys) -> None:
     assert swept("--table", "parquet") == 0
     shown = capsys.readouterr().out
     assert "went well" in shown
-    assert shown.endswith("written to out/half-flip-sweep-spread-seed-7-parquet/\n")
+    assert shown.endswith(f"written to {PARQUET}/\n")
     Path("spread.toml").unlink()  # the folder holds its contents
-    assert code("repeat", "out/half-flip-sweep-spread-seed-7-parquet") == 0
-    assert "the same as in out/half-flip-sweep-spread-seed-7-parquet/, bit for bit" in capsys.readouterr().err
-    plan = "out/half-flip-sweep-spread-seed-7-parquet"  # whose plan is swept again as it is
-    Path("spread.toml").write_text(SPREAD)
-    assert (
-        code("sweep", plan, "--runs", "3", "--conditions", "spread.toml", "--seed", "7", "--out", "few") == 0
-    )
-    few, many = (read_table(path) for path in ("few/flights.csv", f"{plan}/flights.parquet"))
+    assert code("repeat", PARQUET) == 0
+    assert f"the same as in {PARQUET}/, bit for bit" in capsys.readouterr().err
+
+
+def test_a_sweeps_plan_is_swept_again_as_it_is() -> None:
+    assert swept("--table", "parquet") == 0
+    again = ("--runs", "3", "--conditions", "spread.toml", "--seed", "7", "--out", "few")
+    assert code("sweep", PARQUET, *again) == 0
+    few, many = (read_table(path) for path in ("few/flights.csv", f"{PARQUET}/flights.parquet"))
     for name, column in few.items():
         np.testing.assert_array_equal(column, many[name][:3])
 
