@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from aerobat.certification import Finding, Side, Verdict
-from aerobat.planning import FreeKnots, MinSnap, Plan
+from aerobat.planning import FreeKnots, MinSnap, Plan, plan
 from aerobat.planning.flyability import own_flight
 from aerobat.planning.gate_clearance import more_direct
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.task import Task
 from aerobat.problem import Course, PassGate, Problem, at_rest, load_problem, tilted_gate
 from aerobat.vehicle import Vehicle, load_vehicle
+from random_courses import random_course
 from random_flights import with_lags
 
 QUAD = load_vehicle("agile-quad")
@@ -99,3 +100,13 @@ def test_a_path_is_made_more_direct_by_less_where_the_body_only_touches_the_fram
         return again.bending / body.bending
 
     assert 1.0 < raised_by(-0.001) < raised_by(-0.1)
+
+
+@pytest.mark.slow
+def test_a_course_whose_fast_starts_lead_nowhere_is_planned_from_a_slower_one():
+    """Ten gates of any attitude: closed forms near the vehicle's limits missed the first one."""
+    course = random_course(0, 24)
+    found = plan(course)
+    assert found.certified
+    assert found.flies
+    assert [placed.gate for placed in found.stages] == [gate.name for gate in course.gates]

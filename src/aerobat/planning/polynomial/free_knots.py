@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import product
+from math import inf
 from typing import Annotated, ClassVar, NamedTuple
 
 from pydantic import Field
@@ -31,27 +33,29 @@ from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
 from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
+from aerobat.planning.task import Task
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.warm_start import CLEARANCE, Clearance, Reserve, WarmStart, flown_task
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
-START_ORDERS = (4, 3)  # of closed forms that courses begin at: minimum snap, minimum jerk
+START_ORDERS = (4, 3)  # of closed forms that courses begin at: minimum snap, minimum jerk,
+SLOWER_PACES = (1.3, 1.7)  # times their durations, where those lead nowhere or touch a frame
 
 
 @planner("free-knots")
 class FreeKnots(Planner):
     """Such polynomials at the rotors' limits, derivatives and times at knots free.
 
-    They begin from `start`, a plan of the same problem, certified or not; without one from the closed form
-    through waypoints, and from the MIQP's plan where that is slow or leads nowhere. A course of many stages
-    begins at the closed form through them, stretched. A knot is at every stage. Rotors that lag are held to
-    their limits by their commands, their thrusts continuous. At the ends the body does not turn, but its
-    thrust may be changing, so that there is jerk along it, unless `still_ends` asks for none. A `reserve`, a
-    fraction of the range of rotors and body rate, is kept from either end for the controller, proven of
-    rotors. Around obstacles they begin from routes on several sides, and keep a `clearance` from them. A
-    closed course ends in the state in which it begins, of position, velocity, attitude, body rates and
-    thrusts, all of which are chosen.
+    They begin from `start`, a plan of the same problem, certified or not; without one from the closed
+    form through waypoints, and from the MIQP's plan where that is slow or leads nowhere. A course of many
+    stages begins at the closed form through them, stretched, more so where that leads nowhere. A knot is
+    at every stage. Rotors that lag are held to their limits by their commands, their thrusts continuous.
+    At the ends the body does not turn, but its thrust may be changing, so that there is jerk along it,
+    unless `still_ends` asks for none. A `reserve`, a fraction of the range of rotors and body rate, is
+    kept from either end for the controller, proven of rotors. Around obstacles they begin from routes on
+    several sides, and keep a `clearance` from them. A closed course ends in the state in which it begins,
+    of position, velocity, attitude, body rates and thrusts, all of which are chosen.
     """
 
     PLANS_CLOSED_COURSES: ClassVar[bool] = True
@@ -104,11 +108,23 @@ class FreeKnots(Planner):
 
         A plan is poor whose body touches a gate's frame, or that is slow beside what is possible.
         """
-        slow = SUSPICIOUS * least_duration(refinement.task.problem, refinement.task.vehicle)
-        best: _Found | None = self._around(refinement)
+        task = refinement.task
+        best = self._around(refinement)
         if best is not None:
             return best.plan
-        for plan, start in self._starts(refinement):
+        slow = SUSPICIOUS * least_duration(task.problem, task.vehicle)
+        best = self._first(refinement, self._starts(refinement), slow)
+        if (best is None or best.touches) and is_course(task.stages) and not out_of_time():
+            again = self._first(refinement, self._slower_starts(task), inf)
+            best = min(filter(None, (best, again)), key=lambda found: found[:2], default=None)
+        return None if best is None else replace(best.plan, attempts=tuple(refinement.recorder.attempts))
+
+    def _first(
+        self, refinement: Refinement, starts: Iterator[tuple[Plan | None, WarmStart]], slow: float
+    ) -> _Found | None:
+        """The best of starts, up to the first clear of frames that takes no longer than `slow` [s]."""
+        best: _Found | None = None
+        for plan, start in starts:
             own = None if plan is None else self._as_it_is(plan, refinement)
             refined = self._refined(refinement, start)
             best = min(filter(None, (best, own, refined)), key=lambda found: found[:2], default=None)
@@ -116,7 +132,7 @@ class FreeKnots(Planner):
                 break
             if best is not None and not best.touches and best.duration <= slow:
                 break
-        return None if best is None else replace(best.plan, attempts=tuple(refinement.recorder.attempts))
+        return best
 
     def _around(self, refinement: Refinement) -> _Found | None:
         """The plan around obstacles; None where there are none, or no route leads to one."""
@@ -163,6 +179,12 @@ class FreeKnots(Planner):
             yield plan, WarmStart.of(plan, task.stages)
         if not (on_course or out_of_time()):
             yield None, WarmStart.of(Miqp().plan(problem), task.stages)
+
+    def _slower_starts(self, task: Task) -> Iterator[tuple[Plan | None, WarmStart]]:
+        """Closed forms through a course that are far within the vehicle's limits."""
+        begun = flying_lap if task.stages.closed else start_along_normals
+        for pace, order in product(SLOWER_PACES, START_ORDERS):
+            yield None, begun(task, order).time_scaled(pace)
 
 
 class _Found(NamedTuple):
