@@ -6,7 +6,7 @@ by a cost that knows nothing of them: that is where the closed form loses most o
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from math import inf
@@ -115,19 +115,18 @@ class FreeKnots(Planner):
         slow = SUSPICIOUS * least_duration(task.problem, task.vehicle)
         best = self._first(refinement, self._starts(refinement), slow)
         if (best is None or best.touches) and is_course(task.stages) and not out_of_time():
-            again = self._first(refinement, self._slower_starts(task), inf)
-            best = min(filter(None, (best, again)), key=lambda found: found[:2], default=None)
+            best = _best(best, self._first(refinement, _closed_forms(task, SLOWER_PACES), inf))
         return None if best is None else replace(best.plan, attempts=tuple(refinement.recorder.attempts))
 
     def _first(
-        self, refinement: Refinement, starts: Iterator[tuple[Plan | None, WarmStart]], slow: float
+        self, refinement: Refinement, starts: Iterable[tuple[Plan | None, WarmStart]], slow: float
     ) -> _Found | None:
         """The best of starts, up to the first clear of frames that takes no longer than `slow` [s]."""
         best: _Found | None = None
         for plan, start in starts:
             own = None if plan is None else self._as_it_is(plan, refinement)
             refined = self._refined(refinement, start)
-            best = min(filter(None, (best, own, refined)), key=lambda found: found[:2], default=None)
+            best = _best(best, own, refined)
             if out_of_time() or (refined is not None and plan is not None and plan is self.start):
                 break
             if best is not None and not best.touches and best.duration <= slow:
@@ -168,9 +167,8 @@ class FreeKnots(Planner):
         on_course = is_course(task.stages)
         if self.start is not None:
             yield self.start, WarmStart.of(self.start, task.stages)
-        begun = flying_lap if task.stages.closed else start_along_normals
-        for order in START_ORDERS if on_course else ():
-            yield None, begun(task, order)
+        if on_course:
+            yield from _closed_forms(task)
         if task.stages.closed:
             return
         closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points and not on_course else []
@@ -180,11 +178,12 @@ class FreeKnots(Planner):
         if not (on_course or out_of_time()):
             yield None, WarmStart.of(Miqp().plan(problem), task.stages)
 
-    def _slower_starts(self, task: Task) -> Iterator[tuple[Plan | None, WarmStart]]:
-        """Closed forms through a course that are far within the vehicle's limits."""
-        begun = flying_lap if task.stages.closed else start_along_normals
-        for pace, order in product(SLOWER_PACES, START_ORDERS):
-            yield None, begun(task, order).time_scaled(pace)
+
+def _closed_forms(task: Task, paces: Sequence[float] = (1.0,)) -> Iterator[tuple[None, WarmStart]]:
+    """Yield closed forms through a course at some paces, times their durations; no plan is one of them."""
+    begun = flying_lap if task.stages.closed else start_along_normals
+    for pace, order in product(paces, START_ORDERS):
+        yield None, begun(task, order).time_scaled(pace)
 
 
 class _Found(NamedTuple):
@@ -193,6 +192,11 @@ class _Found(NamedTuple):
     touches: bool  # whether its body is not clear of a gate's frame
     duration: float  # [s]
     plan: Plan
+
+
+def _best(*found: _Found | None) -> _Found | None:
+    """The best of what was found; None where nothing was."""
+    return min(filter(None, found), key=lambda each: each[:2], default=None)
 
 
 def _found(refinement: Refinement, judged: Judged[RefinedPath]) -> _Found:
