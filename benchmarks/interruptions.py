@@ -137,9 +137,8 @@ def interrupt(count: int) -> None:
 
 
 if __name__ == "__main__":
-    for module in ("casadi", "gurobipy"):
-        with suppress(ImportError):
-            __import__(module)
+    with suppress(ImportError):
+        __import__("gurobipy")
     with tempfile.TemporaryDirectory() as scratch:
         os.chdir(scratch)
         with suppress(SystemExit):

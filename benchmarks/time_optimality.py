@@ -2,9 +2,9 @@
 
     uv run python benchmarks/time_optimality.py [--runs N] [--starts N] [--sets ABDE]
 
-Durations over those of the time-optimal planner, found in the same run, in the plane for the sets, and over
-anchors by multiple shooting with RK4 in the plane; planning times are medians. Random starts are closed forms
-with knots at random times.
+Durations over those of the collocated rigid body in the plane for the sets, of the time-optimal planner for
+flips, and over anchors by multiple shooting with RK4 in the plane; planning times are medians. Random starts
+are closed forms with knots at random times.
 """
 
 import argparse
@@ -18,11 +18,11 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # one thread for everyone, before NumP
 import numpy as np
 
 from aerobat.errors import Infeasible
-from aerobat.planning import MinSnap, Miqp, Plan, Planner, TimeScaling, plan
+from aerobat.planning import MinSnap, Miqp, Plan, Planner, TimeOptimal, TimeScaling, plan
 from aerobat.planning.polynomial.free_knots import FreeKnots
-from aerobat.planning.time_optimal.time_optimal import TimeOptimal
 from aerobat.problem import Waypoint, Waypoints, load_problem
 from aerobat.vehicle import Vehicle, load_vehicle
+from collocation.planner import Collocation
 
 # rotors up to [N], inertia [kg·m²], anchor [s]
 SETS = {
@@ -56,7 +56,7 @@ def main() -> None:
 
 def compare_section_v(name: str, runs: int) -> None:
     vehicle, anchor = section_v_vehicle(name), SETS[name][2]
-    optimal = attempted(TimeOptimal(planar=True), vehicle)  # as the anchors, which know the plane alone
+    optimal = attempted(Collocation(planar=True), vehicle)  # as the anchors, which know the plane alone
     for segments in (2, 8):
         seconds = []
         for _ in range(runs):

@@ -102,18 +102,16 @@ def test_an_interrupt_of_a_command_within_another_program_leaves_nothing_but_a_w
 
 @pytest.mark.process
 @pytest.mark.parametrize(("nth", "planner"), [(3, "time-optimal")])
-def test_an_interrupt_of_a_nonlinear_solve_is_no_result(nth: int, planner: str, tmp_path: Path) -> None:
-    pytest.importorskip("casadi")
+def test_an_interrupt_of_a_refinement_is_no_result(nth: int, planner: str, tmp_path: Path) -> None:
     command = ("plan", "half-flip", "--planner", *planner.split())
-    ended = interrupted("solve_nonlinear", nth, *command, folder=tmp_path)
+    ended = interrupted("interior_point", nth, *command, folder=tmp_path)
     assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "aerobat: interrupted\n")
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.process
 def test_a_comparison_that_is_interrupted_has_no_rows(tmp_path: Path) -> None:
-    pytest.importorskip("casadi")
-    ended = interrupted("solve_nonlinear", 2, "compare", "line", folder=tmp_path)
+    ended = interrupted("interior_point", 2, "compare", "line", folder=tmp_path)
     assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "aerobat: interrupted\n")
     assert not list(tmp_path.iterdir())
 

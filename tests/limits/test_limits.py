@@ -19,12 +19,12 @@ from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.refinement.limit_values import Frames, LimitValues
 from aerobat.planning.refinement.refine import knots_at_stages
 from aerobat.planning.task import Task
-from aerobat.planning.time_optimal.optimal_control.bounds import LOOKS, Bounds
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem import Condition, Limits, Problem, load_problem
 from aerobat.problem.condition import Quantity
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
+from collocation.optimal_control.bounds import LOOKS, Bounds
 from shared_plans import shared_plan
 from suites import examples
 

@@ -88,7 +88,6 @@ def test_a_half_flip_on_the_papers_vehicle_is_proven_near_the_best() -> None:
 
 @pytest.mark.slow
 def test_a_double_flip_that_is_poor_says_so_and_names_what_does_better() -> None:
-    pytest.importorskip("casadi")
     vehicle = nimble((0.3, 0.3, 0.15))
     found = with_second_opinion(begun_later(ab.plan(double_flip(), "free-knots", vehicle), 2.0))
     assessment = found.assessment
@@ -102,7 +101,6 @@ def test_a_double_flip_that_is_poor_says_so_and_names_what_does_better() -> None
 
 
 def test_a_line_that_takes_twice_the_time_it_need_says_so_and_names_what_does_better() -> None:
-    pytest.importorskip("casadi")
     found = with_second_opinion(along([(0.0, 0.0, 1.0), (2.0, 0.0, 1.0), (4.0, 0.0, 1.0)]))
     assert found.assessment is not None
     assert found.assessment.opinion is not None

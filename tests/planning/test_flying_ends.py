@@ -28,7 +28,7 @@ COURSE = ab.Problem(
 
 
 PLANNERS = {
-    "time-optimal": ab.TimeOptimal(intervals=8, starts=1),
+    "time-optimal": ab.TimeOptimal(segments=8, starts=1),
     "free-knots": ab.FreeKnots(segments=2),
     "miqp": ab.Miqp(order=5),
     "min-snap": ab.MinSnap(),

@@ -32,7 +32,7 @@ PLANNERS: dict[str, Planner] = {
     "miqp": Miqp(intervals=12),
     "min-snap": MinSnap(),
     "free-knots": FreeKnots(segments=2),
-    "time-optimal": TimeOptimal(intervals=8, starts=1),
+    "time-optimal": TimeOptimal(segments=8, starts=1),
 }
 STEP = Problem(
     "step",
@@ -52,8 +52,6 @@ seen: dict[tuple[str, str], list[object]] = {}  # of the progress of every plan
 
 @cache
 def planned(name: str, world: str) -> Plan:
-    if name in ("free-knots", "time-optimal"):
-        pytest.importorskip("casadi")
     told = seen.setdefault((name, world), [])
     return plan(WORLDS[world], PLANNERS[name], QUAD, told.append)
 
@@ -153,8 +151,6 @@ def test_a_trajectory_knows_the_heading_it_was_planned_for(name: str) -> None:
 )
 def test_a_plan_in_wind_asks_other_thrusts_than_in_calm_air(name: str) -> None:
     draggy = replace(QUAD, drag_body=np.array([0.1, 0.1, 0.05]))
-    if name in ("free-knots", "time-optimal"):
-        pytest.importorskip("casadi")
     found = plan(WINDY, PLANNERS[name], draggy)
     assert found.certified
     envelope = ab.Envelope(limits=WINDY.path_limits, **WINDY.ends)
@@ -266,7 +262,7 @@ def test_the_command_lines_options_follow_from_the_fields() -> None:
         ],
         "min-snap": ["--order", "--stop-after", "--time-limit"],
         "free-knots": ["--segments", "--reserve", "--clearance", "--time-limit"],
-        "time-optimal": ["--reserve", "--starts", "--planar", "--time-limit"],
+        "time-optimal": ["--segments", "--reserve", "--clearance", "--starts", "--time-limit"],
     }
 
 
@@ -280,13 +276,10 @@ def test_the_command_lines_options_follow_from_the_fields() -> None:
 )
 def test_a_gate_that_a_stage_names_is_crossed_in_its_direction(name: str) -> None:
     """Also where the way on leads back, and standing still in it would be shortest."""
-    if name in ("free-knots", "time-optimal"):
-        pytest.importorskip("casadi")
     gate = ab.tilted_gate((2.0, 0.0, 1.0), width=3.0, height=3.0, name="far")
     maneuver = ab.CustomManeuver((ab.Stage("turn", gate="far"),))
     problem = Problem("there and back", at_rest((0, 0, 1)), at_rest((0, 0, 1.5)), maneuver, (gate,))
-    # from the MIQP's plan, kept in its plane, time-optimal does not converge; out of it it does
-    others = {"free-knots": FreeKnots(), "time-optimal": TimeOptimal(intervals=8, starts=2)}
+    others = {"free-knots": FreeKnots()}
     found = plan(problem, others.get(name, PLANNERS[name]), QUAD)
     assert found.certified
     (stage,) = found.stages

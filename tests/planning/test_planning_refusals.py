@@ -11,8 +11,6 @@ import pytest
 from aerobat.errors import Infeasible
 from aerobat.planning import FreeKnots, MinSnap, Miqp, Planner, TimeOptimal, plan
 from aerobat.planning.miqp import rescue
-from aerobat.planning.task import Task
-from aerobat.planning.time_optimal.starts import starts
 from aerobat.problem import GatePassage, Limits, Line, load_problem, tilted_gate
 from aerobat.studies.feasibility import min_requirements
 from aerobat.vehicle import Vehicle, load_vehicle
@@ -120,13 +118,6 @@ def test_what_is_needed_is_what_any_planner_needs() -> None:
     (found,) = min_requirements("half-flip", "agile-quad", ["thrust-to-weight"], tolerance=0.05, workers=1)
     assert found.value is not None
     assert found.value <= 1.10
-
-
-def test_where_no_program_has_a_path_time_optimal_begins_at_closed_forms() -> None:
-    """It ended in an IndexError."""
-    problem = replace(LINE, maneuver=NEXT_TO_THE_END)
-    begun = starts(Task.of(problem, QUAD), Miqp(), planar=False, count=2, first=None)
-    assert [start.origin for start in begun.motions] == ["minimum jerk, in a plane", "minimum jerk"]
 
 
 def test_the_limit_that_a_path_exceeds_is_named() -> None:

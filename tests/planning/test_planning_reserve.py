@@ -39,7 +39,9 @@ def kept(certificate: Certificate | None) -> float:
         pytest.param(Miqp(reserve=0.3), 0.3, "flip-roll", marks=pytest.mark.slow),
         (FreeKnots(segments=2, reserve=0.03), 0.03, "line"),
         pytest.param(FreeKnots(reserve=0.03), 0.03, "flip-roll", marks=pytest.mark.slow),
-        pytest.param(TimeOptimal(8, 0.1, starts=1), 0.1, "half-flip", marks=pytest.mark.slow),
+        pytest.param(
+            TimeOptimal(segments=8, reserve=0.1, starts=1), 0.1, "half-flip", marks=pytest.mark.slow
+        ),
     ],
     ids=str,
 )

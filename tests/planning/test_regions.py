@@ -77,7 +77,7 @@ ONE_BALL = replace(COURSE, maneuver=Waypoints(COURSE.maneuver.waypoints[:1]))
 
 @cache
 def narrow() -> Plan:
-    return TimeOptimal(20, starts=1).plan(COURSE, QUAD)
+    return TimeOptimal(segments=8, starts=1).plan(COURSE, QUAD)
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_the_true_ball_is_used_in_full_by_time_optimal_and_costs_nothing_to_wide
     )
     distances = [f.value for f in narrow().certificate.findings if f.waypoint is not None]
     assert distances == pytest.approx([0.3] * 3, abs=1e-4)
-    assert TimeOptimal(20, starts=1).plan(wide, QUAD).duration < narrow().duration
+    assert TimeOptimal(segments=8, starts=1).plan(wide, QUAD).duration < narrow().duration
 
 
 def test_a_plan_that_misses_a_ball_is_not_certified():
@@ -127,12 +127,12 @@ def test_a_gate_with_a_free_crossing_point_is_cut_at_its_edge_less_body_and_marg
     passage = GatePassage(perpendicular=False, crossing_point="free", margin=0.1)
     problem = Problem("corner", at_rest((0, 0, 1)), at_rest((6, 0, 1)), Line(passage), (gate,))
     centred = replace(problem, maneuver=Line(GatePassage(perpendicular=False)))
-    free = TimeOptimal(8, starts=1).plan(problem, QUAD)
+    free = TimeOptimal(segments=8, starts=1).plan(problem, QUAD)
     (placed,) = free.stages
     offset = free.trajectory.evaluate(placed.time) - gate.position
     assert offset @ gate.lateral == pytest.approx(-(1.0 - 0.1 - QUAD.body_radius), abs=1e-5)
     assert free.certified
-    assert free.duration < TimeOptimal(8, starts=1).plan(centred, QUAD).duration
+    assert free.duration < TimeOptimal(segments=8, starts=1).plan(centred, QUAD).duration
 
 
 @pytest.mark.parametrize(

@@ -259,10 +259,10 @@ def through(*openings: str) -> ab.Problem:
 @pytest.mark.parametrize(
     ("planner", "openings"),
     [
-        pytest.param(ab.TimeOptimal(8, starts=1), ("round",), marks=pytest.mark.slow),
+        pytest.param(ab.TimeOptimal(segments=8, starts=1), ("round",), marks=pytest.mark.slow),
         pytest.param(ab.FreeKnots(segments=2), ("triangle",), marks=pytest.mark.slow),
         (ab.Miqp(order=4), ("round", "triangle")),
-        pytest.param(ab.TimeOptimal(8, starts=1), ("round", "triangle"), marks=pytest.mark.slow),
+        pytest.param(ab.TimeOptimal(segments=8, starts=1), ("round", "triangle"), marks=pytest.mark.slow),
         pytest.param(ab.FreeKnots(segments=2), ("round", "triangle"), marks=pytest.mark.slow),
     ],
 )

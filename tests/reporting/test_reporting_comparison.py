@@ -20,7 +20,7 @@ KEYS = [
     "planner", "segments", "duration_s", "ratio",
     "certified", "min_margin_n", "max_position_error_m", "planning_s", "note",
 ]  # fmt: skip
-REASON = "the planner free-knots needs CasADi, which is not installed; pip install 'aerobat[casadi]'"
+REASON = "the planner hops needs HopLib, which is not installed; pip install 'hoplib[fast]'"
 NOTE = "begun again from free-knots's 3.000 s; 3.200 s alone"
 NONE = Entry("free-knots", None, None, None, 0.25, REASON)
 

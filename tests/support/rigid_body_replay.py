@@ -11,7 +11,7 @@ from aerobat.flatness import reference
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-DEGREE = 16  # of the wrench's interpolation on each segment
+DEGREE = 64  # of the interpolated wrench on each segment, which bends much where the thrust is small
 NODES = chebyshev.chebpts1(DEGREE + 1)
 
 
@@ -40,7 +40,7 @@ def replayed_at_knots(trajectory: Trajectory, vehicle: Vehicle, environment: Env
 
 
 def _wrenches(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> list[Array]:
-    """Thrust and moment of the rotors' thrusts as Chebyshev series on each segment, (17, 4) each."""
+    """Thrust and moment of the rotors' thrusts as Chebyshev series on each segment, (65, 4) each."""
     times = trajectory.knots[:-1, None] + trajectory.durations[:, None] * (1 + NODES) / 2
     thrusts = reference(trajectory, vehicle, times.ravel(), environment=environment).rotor_thrusts
     values = (thrusts @ vehicle.allocation.T).reshape(*times.shape, 4)

@@ -13,7 +13,7 @@ The latter keeps the body from turning back. The body is an ellipsoid with its s
 and the attitude R, so that s = |D Rᵀ e| along e. Where only the thrust axis is known, the ellipsoid of
 revolution about that axis is taken, which encloses the body however it is turned.
 
-The values are written in components once, for whoever evaluates them: floats, complex steps, CasADi's
+The values are written in components once, for whoever evaluates them: floats, complex steps,
 symbols.
 """
 

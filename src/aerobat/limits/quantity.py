@@ -1,7 +1,7 @@
 """A quantity along a path: what every limit is about, linear in what is measured at one instant.
 
 An instant has two kinds of numbers: the derivatives of position, which are polynomials in time, and what
-flatness makes of them, the measures below. Whoever evaluates the measures, in floats, complex steps, CasADi's
+flatness makes of them, the measures below. Whoever evaluates the measures, in floats, complex steps,
 symbols or Chebyshev series with proven errors, evaluates every limit.
 """
 

@@ -12,7 +12,7 @@ from math import inf
 from aerobat.limits.limit import Asked, Limit
 from aerobat.limits.quantity import SPECIFIC_THRUST, PathQuantity
 
-FRACTION = 0.02  # of the largest specific thrust: with less, fast flips lose their way in collocation
+FRACTION = 0.02  # of the largest specific thrust: with less, fast flips lost their way in programs
 
 
 def limits(asked: Asked) -> Iterator[Limit]:

@@ -227,7 +227,7 @@ class _InteriorPoint:
 
     def run(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
         """Descend."""
-        iterate, costs = self._begun(start, multipliers), []
+        iterate, costs, jammed = self._begun(start, multipliers), [], False
         if not np.isfinite(iterate.point.inequalities).all():
             return InteriorPointResult(iterate.x, False, 0, iterate.z)  # no step leads on from there
         for iteration in range(self._settings.iterations):
@@ -237,8 +237,13 @@ class _InteriorPoint:
             if out_of_time():
                 return InteriorPointResult(iterate.x, False, iteration, iterate.z)
             self._lower_barrier(iterate)
-            if not self._advance(iterate):
+            if self._advance(iterate):
+                jammed = False
+            elif jammed:
                 return InteriorPointResult(iterate.x, False, iteration, iterate.z)
+            else:
+                jammed = True
+                self._begin_anew(iterate)
         return InteriorPointResult(iterate.x, False, self._settings.iterations, iterate.z)
 
     def _begun(self, start: Array, multipliers: Array | None) -> _Iterate:

@@ -26,7 +26,7 @@ from .result import Plan, load_plan
 from .rotor_margin import RotorMargin
 from .search import BisectionSearch, GridSearch
 from .second_opinion import with_explanation, with_recoveries, with_second_opinion
-from .time_optimal.time_optimal import TimeOptimal
+from .time_optimal import TimeOptimal
 from .tube import Tube
 
 __all__ = [

@@ -58,7 +58,7 @@ PLANNERS: Registry[Planner] = Registry(
         "miqp": "aerobat.planning.miqp.miqp",
         "min-snap": "aerobat.planning.polynomial.min_snap",
         "free-knots": "aerobat.planning.polynomial.free_knots",
-        "time-optimal": "aerobat.planning.time_optimal.time_optimal",
+        "time-optimal": "aerobat.planning.time_optimal",
     },
 )
 

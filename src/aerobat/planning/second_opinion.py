@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from aerobat.declaration import validated
-from aerobat.errors import BackendMissing, Infeasible, SpecError
+from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.assessment.assessment import SecondOpinion
 from aerobat.planning.planners import planner_class
@@ -80,8 +80,6 @@ def _free_knots(plan: Plan, segments: int, progress: Progress | None) -> SecondO
     planner = free_knots(segments=segments, start=plan, reserve=OPINION_RESERVE)
     try:
         found = planner.plan(plan.problem, plan.vehicle, progress)
-    except BackendMissing as missing:
-        return SecondOpinion(options, None, str(missing))
     except (Infeasible, SpecError):
         return SecondOpinion(options, None)
     shorter = found.certified and found.duration < plan.duration and found.flies

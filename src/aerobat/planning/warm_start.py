@@ -1,4 +1,4 @@
-"""Warm starts of nonlinear programs: a plan of another planner, with its phases, its path and its plane."""
+"""Warm starts of nonlinear programs: a plan of another planner, with its phases and its path."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from pydantic import Field
 
 from aerobat.arrays import Array
@@ -18,7 +19,7 @@ from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-PLANARITY_TOLERANCE = 1e-6  # of its extent: how far a path may leave a plane and still be in it
+NEAR_PLANE = 0.05  # of its extent, by which a path may leave a plane and still be bent out of it
 # of a limit's range, kept from either of its ends for the controller
 Reserve = Annotated[float, Field(ge=0, lt=0.5)]
 Clearance = Annotated[float, Field(ge=0)]  # [m] kept from obstacles for the controller
@@ -26,7 +27,6 @@ CLEARANCE = (
     "The distance in metres that the body keeps from obstacles for the controller, less where a passage is "
     "narrow, and that paths keep inside the radius of waypoints, a tenth of it at most."
 )
-MIN_INTERVALS = 4  # of a phase of a motion that is collocated
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,18 +63,40 @@ class WarmStart:
         trajectory = replace(self.trajectory, durations=factor * self.trajectory.durations)
         return replace(self, trajectory=trajectory, times=tuple(factor * t for t in self.times))
 
-    def allocate_intervals(self, intervals: int, minimum: int) -> tuple[int, ...]:
-        """About so many intervals, allocated to phases by their durations, to each at least the minimum."""
-        counts = np.rint(intervals * self.phases / self.trajectory.duration).astype(int)
-        return tuple(np.maximum(counts, minimum).tolist())
+    @property
+    def extent(self) -> float:
+        """The longest side of the box around the ends of the path's segments [m]."""
+        return float(np.ptp(self.trajectory.on_segments([0.0, 1.0]), axis=(0, 1)).max())
 
     def plane(self) -> Array | None:
-        """The normal of the vertical plane that it stays in, (3,); None when it stays in none."""
-        across = self.trajectory.coefficients[..., :2].reshape(-1, 2) - self.trajectory.coefficients[0, 0, :2]
-        _, extents, directions = np.linalg.svd(across)
-        if extents[1] > PLANARITY_TOLERANCE * max(extents[0], PLANARITY_TOLERANCE):
+        """The unit normal of the vertical plane that the path nearly stays in, (3,); None of others."""
+        points = self.trajectory.on_segments([0.0, 0.5, 1.0]).reshape(-1, 3)[:, :2]
+        _, extents, directions = np.linalg.svd(points - points[0])
+        if extents[1] > NEAR_PLANE * max(extents[0], self.extent):
             return None
         return np.array([*directions[1], 0.0])
+
+    def bent(self, aside: Array) -> WarmStart:
+        """The same path moved aside halfway, less before and after, by a vector [m], (3,)."""
+        trajectory = self.trajectory
+        bump = Polynomial([0.0, 0.0, 16.0, -32.0, 16.0])  # 16 s² (1 − s)², one halfway
+        begins = trajectory.knots[:-1] / trajectory.duration
+        lengths = trajectory.durations / trajectory.duration
+        pieces = [bump(Polynomial([s, h])).coef for s, h in zip(begins, lengths, strict=True)]
+        moved = np.asarray(pieces, dtype=float)[..., None] * aside
+        powers = max(trajectory.coefficients.shape[1], moved.shape[1])
+        coefficients = np.zeros((trajectory.segments, powers, 3))
+        for part in (trajectory.coefficients, moved):
+            coefficients[:, : part.shape[1]] += part
+        return replace(self, trajectory=replace(trajectory, coefficients=coefficients))
+
+    def at_other_pace(self, factors: Array) -> WarmStart:
+        """The same path with each phase longer by a factor; its derivatives jump where phases meet."""
+        trajectory = self.trajectory
+        middles = (trajectory.knots[:-1] + trajectory.knots[1:]) / 2.0
+        durations = trajectory.durations * factors[np.searchsorted(self.times, middles)]
+        times = np.cumsum(self.phases * factors)[:-1]
+        return replace(self, trajectory=replace(trajectory, durations=durations), times=tuple(times.tolist()))
 
 
 def flown_task(

@@ -34,7 +34,6 @@ LIBRARIES = (
     "numpy",
     "scipy",
     "daqp",
-    "casadi",
     "gurobipy",
     "pyscipopt",
     "llvmlite",

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any, cast
 
-from aerobat.errors import BackendMissing, Infeasible, SpecError
+from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
 from aerobat.planning.miqp.attempts import default_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES, MAX_INTERVALS
@@ -25,10 +25,10 @@ A_STAGE = 2  # intervals at least: fewer leave the path of a course no choice
 MANY_INTERVALS = 40  # where that is more still: a narrow window at an end needs intervals on either side
 # [s] of the processor for all other ways together, so that refusals take 5 s (benchmarks/audit.py)
 RESCUE_TIME = 4.0
-# [s] of the processor more, where time-optimal has found a motion on a coarse mesh: there most likely is one
+# [s] of the processor more, where time-optimal has found a path that nearly holds: there most likely is one
 PROMISING_TIME = 15.0
 ONE_WAY = 0.75  # of the time that is left, for one way, so that the next has some
-MOTION = "time-optimal"  # the planner of rigid bodies' motions, which others come near at best
+MOTION = "time-optimal"  # the planner that begins at the most paths
 MOTIONS = 2  # that time-optimal starts from: further ones make motions faster, but seldom find the first
 
 
@@ -42,10 +42,7 @@ class Rescue:
     recorder: Recorder  # whose attempts come first; those that follow are passed on to its `progress`
     failed: list[str] = field(default_factory=list)  # ways that find none
     unanswered: list[str] = field(default_factory=list)  # ways for which there was too little time
-    missing: list[str] = field(default_factory=list)  # ways whose solver is not installed
-    is_promising: bool = (
-        False  # whether a motion was found on a coarse mesh, and no time was left for a fine one
-    )
+    is_promising: bool = False  # whether a path was found that nearly holds, and no time was left for more
 
     def plan(self) -> Plan | None:
         """The first certified plan that another way finds, which says so; None where all fail."""
@@ -73,8 +70,6 @@ class Rescue:
             said.append(f"but none was found {', '.join(self.failed)}")
         if self.unanswered:
             said.append(f"{RESCUE_TIME:g} s were too few to plan {', '.join(self.unanswered)}")
-        if self.missing:
-            said.append(f"and the extra casadi is not installed to plan {', '.join(self.missing)}")
         return ", ".join(said)
 
     def _first(
@@ -108,8 +103,6 @@ class Rescue:
             return None
         try:
             return planner.plan(self.problem, self.vehicle, self.recorder.progress)
-        except BackendMissing:
-            self.missing.append(how)
         except Infeasible as refusal:
             (self.unanswered if out_of_time() else self.failed).append(how)
             is_motion = isinstance(planner, planner_class(MOTION))

@@ -6,9 +6,8 @@ by a cost that knows nothing of them: that is where the closed form loses most o
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import product
 from math import inf
 from typing import Annotated, ClassVar, NamedTuple
 
@@ -26,21 +25,15 @@ from aerobat.planning.courses import is_course
 from aerobat.planning.gate_clearance import is_clear
 from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner, option, planner
-from aerobat.planning.polynomial.flying_lap import flying_lap
-from aerobat.planning.polynomial.knots import start_along_normals
-from aerobat.planning.polynomial.min_snap import MinSnap
+from aerobat.planning.polynomial.starts import SLOWER_PACES, closed_forms, starts
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
 from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
-from aerobat.planning.task import Task
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.warm_start import CLEARANCE, Clearance, Reserve, WarmStart, flown_task
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
-
-START_ORDERS = (4, 3)  # of closed forms that courses begin at: minimum snap, minimum jerk,
-SLOWER_PACES = (1.3, 1.7)  # times their durations, where those lead nowhere or touch a frame
 
 
 @planner("free-knots")
@@ -115,15 +108,15 @@ class FreeKnots(Planner):
         slow = SUSPICIOUS * least_duration(task.problem, task.vehicle)
         best = self._first(refinement, self._starts(refinement), slow)
         if (best is None or best.touches) and is_course(task.stages) and not out_of_time():
-            best = _best(best, self._first(refinement, _closed_forms(task, SLOWER_PACES), inf))
+            best = _best(best, self._first(refinement, closed_forms(task, SLOWER_PACES), inf))
         return None if best is None else replace(best.plan, attempts=tuple(refinement.recorder.attempts))
 
     def _first(
-        self, refinement: Refinement, starts: Iterable[tuple[Plan | None, WarmStart]], slow: float
+        self, refinement: Refinement, begun: Iterable[tuple[Plan | None, WarmStart]], slow: float
     ) -> _Found | None:
-        """The best of starts, up to the first clear of frames that takes no longer than `slow` [s]."""
+        """The best of what is begun, up to the first clear of frames that takes no longer than `slow` [s]."""
         best: _Found | None = None
-        for plan, start in starts:
+        for plan, start in begun:
             own = None if plan is None else self._as_it_is(plan, refinement)
             refined = self._refined(refinement, start)
             best = _best(best, own, refined)
@@ -163,27 +156,9 @@ class FreeKnots(Planner):
 
     def _starts(self, refinement: Refinement) -> Iterator[tuple[Plan | None, WarmStart]]:
         """Where to begin, at a plan or at a closed form."""
-        task, problem = refinement.task, refinement.task.problem
-        on_course = is_course(task.stages)
         if self.start is not None:
-            yield self.start, WarmStart.of(self.start, task.stages)
-        if on_course:
-            yield from _closed_forms(task)
-        if task.stages.closed:
-            return
-        closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points and not on_course else []
-        others = [*closed_form, Miqp(reserve=self.reserve, rescue=False, flies=False)]
-        for plan in _plans_to_begin_from(others, problem, task.vehicle):
-            yield plan, WarmStart.of(plan, task.stages)
-        if not (on_course or out_of_time()):
-            yield None, WarmStart.of(Miqp().plan(problem), task.stages)
-
-
-def _closed_forms(task: Task, paces: Sequence[float] = (1.0,)) -> Iterator[tuple[None, WarmStart]]:
-    """Yield closed forms through a course at some paces, times their durations; no plan is one of them."""
-    begun = flying_lap if task.stages.closed else start_along_normals
-    for pace, order in product(paces, START_ORDERS):
-        yield None, begun(task, order).time_scaled(pace)
+            yield self.start, WarmStart.of(self.start, refinement.task.stages)
+        yield from starts(refinement.task, Miqp(reserve=self.reserve, rescue=False, flies=False))
 
 
 class _Found(NamedTuple):
@@ -216,16 +191,3 @@ def _plan(judged: Judged[RefinedPath], recorder: Recorder) -> Plan:
         backend="builtin",
         stages=judged.solution.source.placed,
     )
-
-
-def _plans_to_begin_from(planners: Iterable[Planner], problem: Problem, vehicle: Vehicle) -> Iterator[Plan]:
-    """The plans of other planners that find one.
-
-    Raises Infeasible where a stage asks more thrust than the vehicle has.
-    """
-    for each in planners:
-        try:
-            yield each.plan(problem, vehicle)
-        except Infeasible as infeasible:
-            if not infeasible.attempts:  # no attempt: refused at once, and whatever the planner
-                raise

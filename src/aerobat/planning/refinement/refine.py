@@ -45,8 +45,23 @@ ROUGH = Settings(barrier=1e-6, least_slack=1e-3)
 FINE = Settings(
     barrier=1e-6, least_slack=1e-3, damping=1e-2, iterations=30, tolerance=1e-5, violation=5e-5, gain=2e-4
 )
+# A barrier costs its parameter times the number of limits at places: of ten thousand of a course a hundredth
+# of the duration; fine rounds that begin with a larger one than rough rounds end with leave limits again.
+CLOSE_ROUGH = Settings(
+    barrier=1e-6, least_barrier=1e-7, least_slack=1e-3, iterations=100, tolerance=1e-6, gain=1e-4
+)
+CLOSE_FINE = Settings(
+    barrier=1e-8,
+    least_barrier=1e-8,
+    least_slack=1e-3,
+    damping=1e-3,
+    iterations=60,
+    tolerance=1e-6,
+    violation=5e-5,
+    gain=1e-4,
+)
 ROUGH_ROUNDS = 8  # at most
-FINE_ROUNDS = 10
+FINE_ROUNDS = 16
 MORE_ROUNDS = 1  # of such fine rounds, from a path that is certified on
 SPREADS = 4  # of a rough path's knots anew, at most: 1.2 % shorter on average of 60 random problems
 ROUGH_SHARE = 0.5  # of the time that is left, so that there is some to certify what is found
@@ -54,6 +69,7 @@ ROUGH_PLACES = 16  # of a segment: as many as a polynomial of degree 9 needs
 FINE_PLACES = 24
 MORE_PLACES = 1.5  # times as many where thrusts jump, as those of rotors without lag
 LITTLE_GAIN = 0.005  # of the duration, from one rough round to the next: the end
+SETTLED = 0.1  # of a limit's size: rough rounds go on where more is exceeded
 BEHIND = 0.02  # of a known path's duration: one that is so much longer after a round is not gone on with
 RADIUS = 2.0  # of the box in which scaled derivatives move at first,
 SHRINK = 1.5  # the factor by which it is smaller from one rough round to the next,
@@ -97,6 +113,7 @@ class Refinement:
     recorder: Recorder
     in_gates: tuple[BodyInGate, ...] = ()  # that the stages cross
     still_ends: bool = False  # without jerk
+    close: bool = False  # whether paths come within a thousandth of what they come near otherwise
     _known: dict[tuple[Stage, ...], StageValues] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -109,6 +126,11 @@ class Refinement:
             still_ends: Whether ends are without jerk.
         """
         return cls(task, recorder, bodies_in_gates(task), still_ends)
+
+    @property
+    def settings(self) -> tuple[Settings, Settings]:
+        """Of rough rounds that go on, and of fine ones."""
+        return (CLOSE_ROUGH, CLOSE_FINE) if self.close else (ROUGH, FINE)
 
     @cached_property
     def limits(self) -> LimitValues:
@@ -158,11 +180,21 @@ class Refinement:
         """
         number = min(segments, max(SEGMENTS, len(guess.phases)))
         with within_share(ROUGH_SHARE):
-            found = self._rough(knots_at_stages(guess, number), known)
-            while number < segments and not out_of_time():
-                number = min(2 * number, segments)
-                found = self._rough(knots_at_stages(found.path, number), known, found.certified)
-            return self._spread_anew(found, known)
+            return self.finer(self._rough(knots_at_stages(guess, number), known), segments, known)
+
+    def finer(self, found: RefinedPath, segments: int, known: float = np.inf) -> RefinedPath:
+        """A rough path with more segments, twice as many at a time, its knots where it wants them.
+
+        Args:
+            found: A rough path.
+            segments: Of the path that is sought, at least its own.
+            known: The duration [s] of a path that is known: one that stays far behind it is left early.
+        """
+        number = found.path.trajectory.segments
+        while number < segments and not out_of_time():
+            number = min(2 * number, segments)
+            found = self._rough(knots_at_stages(found.path, number), known, found.certified)
+        return self._spread_anew(found, known)
 
     def _spread_anew(self, found: RefinedPath, known: float) -> RefinedPath:
         """A rough path whose knots are spread evenly between stages again, as long as it gains by that."""
@@ -196,7 +228,8 @@ class Refinement:
             solution = rounds.solve()
             certified = _shortest(certified, judge(solution, self.task, self.recorder))
             duration = solution.duration
-            gains_little = number and duration > (1.0 - LITTLE_GAIN) * before
+            is_settled = number and solution.source.excess.largest < SETTLED
+            gains_little = is_settled and duration > (1.0 - LITTLE_GAIN) * before
             is_over = gains_little or duration > (1.0 + BEHIND) * known
             if is_over or out_of_time() or not self.is_promising(solution.source):
                 break
@@ -223,7 +256,8 @@ class Refinement:
 
     def _finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
         """The certified path near one, or the last one that was tried."""
-        rounds = Rounds(self, rough.path, FINE, FINE_PLACES, LEAST_RADIUS, rough.multipliers)
+        _, fine = self.settings
+        rounds = Rounds(self, rough.path, fine, FINE_PLACES, LEAST_RADIUS, rough.multipliers)
         rounds.back_off(rough.excess)
         return certified_solve(rounds, self.task, self.recorder, FINE_ROUNDS)
 
@@ -258,7 +292,7 @@ class Refinement:
             status=status,
             nodes=iterations,
             solve_time=time,
-            cost=trajectory.duration,
+            cost=trajectory.duration if self.is_promising(path) else None,
             failure=failure,
         )
 
@@ -345,7 +379,7 @@ class Rounds:
 
     def go_on(self, path: RefinedPath) -> None:
         """Go on from a path in a smaller region, with more room where it exceeds limits."""
-        self._guess, self._settings = path.path, ROUGH
+        self._guess, (self._settings, _) = path.path, self._refinement.settings
         self._radius = max(self._radius / SHRINK, LEAST_RADIUS)
         self.back_off(path.excess)
 

@@ -25,8 +25,9 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array, Indices
 from aerobat.flatness import has_unequal_drag, reference
-from aerobat.optimization.nonlinear import import_casadi
-from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
+from aerobat.trajectory import Trajectory, polynomial
+from collocation.nonlinear import import_casadi
+from collocation.optimal_control.zero_yaw_rate_body import (
     INPUTS,
     POSITION,
     RATES,
@@ -34,7 +35,6 @@ from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     VELOCITY,
     ZeroYawRateBody,
 )
-from aerobat.trajectory import Trajectory, polynomial
 
 STATE_SCALE = np.repeat([1.0, 5.0, 1.0, 5.0], [3, 3, 4, 2])  # what is large in SI units
 QUINTIC = polynomial.hermite(np.eye(6)[:3], np.eye(6)[3:])  # powers of y (rows) from y, y', y'' at both ends

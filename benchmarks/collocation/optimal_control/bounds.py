@@ -14,8 +14,8 @@ from aerobat.flatness import reference
 from aerobat.limits import MEASURES, Limit
 from aerobat.limits.quantity import BODY_RATE, SPECIFIC_THRUST, UPRIGHT, WRENCH, WRENCH_RATE
 from aerobat.planning.task import Task
-from aerobat.planning.time_optimal.optimal_control.collocation import BOUNDED_DERIVATIVES
 from aerobat.trajectory import Trajectory
+from collocation.optimal_control.collocation import BOUNDED_DERIVATIVES
 
 # of each interval: where it is looked at, evenly spaced angles of Chebyshev's, at either end just within it
 ANGLES = np.linspace(1e-4, np.pi - 1e-4, 24)

@@ -10,18 +10,18 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, CollocationMesh
-from aerobat.planning.time_optimal.optimal_control.elements import Elements
-from aerobat.planning.time_optimal.optimal_control.rows import Rows
-from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
+from aerobat.problem.end_state import EndState
+from aerobat.so3 import UP
+from collocation.optimal_control.collocation import CollocatedMotion, CollocationMesh
+from collocation.optimal_control.elements import Elements
+from collocation.optimal_control.rows import Rows
+from collocation.optimal_control.zero_yaw_rate_body import (
     ATTITUDE,
     INPUTS,
     POSITION,
     RATES,
     VELOCITY,
 )
-from aerobat.problem.end_state import EndState
-from aerobat.so3 import UP
 
 END_SHARE = 0.5  # of the thrust that either end asks: a floor of thrust may be no higher
 ALONG_Z = (0.0, 0.0, 0.0), (0.0, 0.0, inf)  # bounds on a thrust direction in body axes

@@ -15,16 +15,16 @@ from aerobat.kernels.quaternions import axes
 from aerobat.limits.body_in_gate import OpeningAhead, extent_of_attitude
 from aerobat.limits.limit import Limit
 from aerobat.limits.path_condition import limit_of
-from aerobat.optimization.nonlinear import SymbolicOps, components, import_casadi
-from aerobat.optimization.separable import ElementFunction
 from aerobat.planning.task import Task
-from aerobat.planning.time_optimal.optimal_control.bounds import Bounds
-from aerobat.planning.time_optimal.optimal_control.collocation import (
+from aerobat.problem.condition import Condition, Quantity
+from collocation.nonlinear import SymbolicOps, components, import_casadi
+from collocation.optimal_control.bounds import Bounds
+from collocation.optimal_control.collocation import (
     STATE_SCALE,
     CollocationMesh,
     IntervalSide,
 )
-from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
+from collocation.optimal_control.zero_yaw_rate_body import (
     ATTITUDE,
     INPUTS,
     POSITION,
@@ -33,7 +33,7 @@ from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import (
     VELOCITY,
     ZeroYawRateBody,
 )
-from aerobat.problem.condition import Condition, Quantity
+from collocation.separable import ElementFunction
 
 BETWEEN = (0.25, 0.5, 0.75)  # of an interval: where bounds on the path are held too, beside its nodes
 RATE_SCALE = 10.0  # [rad/s] of body rates that have no bound

@@ -10,26 +10,26 @@ from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, Indices
 from aerobat.limits.body_in_gate import BodyInGate
-from aerobat.optimization.nonlinear import NonlinearProgram
-from aerobat.optimization.separable import (
-    Element,
-    ElementFunction,
-    SeparableFunction,
-    separable_program,
-)
-from aerobat.planning.time_optimal.optimal_control.boundary import FixedEnds
-from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
-from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, CollocationMesh
-from aerobat.planning.time_optimal.optimal_control.elements import (
+from aerobat.problem.condition import Condition
+from aerobat.problem.stage import Stage
+from collocation.nonlinear import NonlinearProgram
+from collocation.optimal_control.boundary import FixedEnds
+from collocation.optimal_control.bounds import Backoff
+from collocation.optimal_control.collocation import CollocatedMotion, CollocationMesh
+from collocation.optimal_control.elements import (
     BETWEEN,
     Elements,
     is_of_direction,
     weighted_sum,
 )
-from aerobat.planning.time_optimal.optimal_control.rows import Rows, repeated
-from aerobat.planning.time_optimal.optimal_control.zero_yaw_rate_body import INPUTS, POSITION, STATES
-from aerobat.problem.condition import Condition
-from aerobat.problem.stage import Stage
+from collocation.optimal_control.rows import Rows, repeated
+from collocation.optimal_control.zero_yaw_rate_body import INPUTS, POSITION, STATES
+from collocation.separable import (
+    Element,
+    ElementFunction,
+    SeparableFunction,
+    separable_program,
+)
 
 SHORTEST_PHASE = 1e-3  # [s]
 # [s] for one change of an input by half its range in each interval: far below what is reported, it settles

@@ -9,21 +9,21 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification import Certificate
 from aerobat.optimization.deadline import out_of_time
-from aerobat.optimization.nonlinear import NonlinearResult, solve_nonlinear
 from aerobat.planning.certified_solve import Solution
 from aerobat.planning.passages import PlacedStage, place_stages
-from aerobat.planning.time_optimal.optimal_control.boundary import FixedEnds
-from aerobat.planning.time_optimal.optimal_control.bounds import Backoff
-from aerobat.planning.time_optimal.optimal_control.collocation import (
+from aerobat.planning.warm_start import WarmStart
+from aerobat.trajectory import Trajectory
+from collocation.nonlinear import NonlinearResult, solve_nonlinear
+from collocation.optimal_control.boundary import FixedEnds
+from collocation.optimal_control.bounds import Backoff
+from collocation.optimal_control.collocation import (
     CollocatedMotion,
     CollocationMesh,
     trajectory_of,
 )
-from aerobat.planning.time_optimal.optimal_control.elements import Elements
-from aerobat.planning.time_optimal.optimal_control.program import OptimalControl
-from aerobat.planning.time_optimal.start import Start, initial_motion
-from aerobat.planning.warm_start import WarmStart
-from aerobat.trajectory import Trajectory
+from collocation.optimal_control.elements import Elements
+from collocation.optimal_control.program import OptimalControl
+from collocation.start import Start, initial_motion
 
 # times the reserve, of the largest collective thrust, at least: feedback turns a small thrust by a lot
 THRUST_RESERVE = 3.0

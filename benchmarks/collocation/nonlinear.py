@@ -1,7 +1,4 @@
-"""Smooth nonlinear programs, stated in CasADi's symbols and solved by IPOPT's interior-point method.
-
-CasADi is optional: whatever needs it calls `import_casadi()`, which says how to install it.
-"""
+"""Smooth nonlinear programs, stated in CasADi's symbols and solved by IPOPT's interior-point method."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
-from importlib.util import find_spec
 from math import inf
 from time import perf_counter
 from types import MappingProxyType
@@ -19,9 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, frozen, frozen_bounds
-from aerobat.errors import BackendMissing, SpecError
+from aerobat.errors import SpecError
 from aerobat.optimization.deadline import processor, shorter, time_left, wall
-from aerobat.optimization.interrupts import interrupts_kept
 
 _WARM = {
     "ipopt.warm_start_init_point": "yes",
@@ -55,15 +50,8 @@ _MEANING = {
 }
 
 
-def has_casadi() -> bool:
-    """True if CasADi is installed."""
-    return find_spec("casadi") is not None
-
-
 def import_casadi() -> Any:
-    """The casadi module. Raises BackendMissing, with the command that installs it, where it is not there."""
-    if not has_casadi():
-        raise BackendMissing('nonlinear programs need CasADi; install it with pip install "aerobat[casadi]"')
+    """The casadi module, which is imported when it is needed."""
     return import_module("casadi")
 
 
@@ -168,8 +156,6 @@ def solve_nonlinear(
 
     Raises:
         SpecError: `start` has the wrong size.
-        BackendMissing: CasADi is not installed.
-        KeyboardInterrupt: it came while IPOPT ran, which has no say in it.
     """
     began = perf_counter()
     x0 = frozen(start, "start", (int(program.variables.numel()),))
@@ -190,9 +176,8 @@ def solve_nonlinear(
         known = dict(zip(("lam_x0", "lam_g0"), multipliers, strict=True))
     symbols = {"x": program.variables, "f": program.objective, "g": program.constraints}
     bounds = {"lbg": program.lower, "ubg": program.upper, "lbx": program.x_min, "ubx": program.x_max}
-    with interrupts_kept():
-        solver = import_casadi().nlpsol("program", "ipopt", symbols, settings)
-        answer = solver(x0=x0, **known, **bounds)
+    solver = import_casadi().nlpsol("program", "ipopt", symbols, settings)
+    answer = solver(x0=x0, **known, **bounds)
     x, *found = (np.asarray(answer[name], dtype=float).reshape(-1) for name in ("x", "lam_x", "lam_g"))
     for array in (x, *found):
         array.flags.writeable = False

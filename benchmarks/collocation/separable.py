@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array, Indices
-from aerobat.optimization.nonlinear import NonlinearProgram, import_casadi
+from collocation.nonlinear import NonlinearProgram, import_casadi
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,11 +14,10 @@ from aerobat.planning.flyability import OwnFlight, own_flight
 from aerobat.planning.gate_clearance import cleared, more_direct
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.task import Task
-from aerobat.planning.time_optimal.collocated_program import CollocatedProgram, SolvedMotion
-from aerobat.planning.time_optimal.optimal_control.elements import Elements
-from aerobat.planning.time_optimal.start import Start
-from aerobat.planning.warm_start import MIN_INTERVALS
 from aerobat.vehicle import Vehicle
+from collocation.collocated_program import CollocatedProgram, SolvedMotion
+from collocation.optimal_control.elements import Elements
+from collocation.start import MIN_INTERVALS, Start, allocate_intervals
 
 COARSE_INTERVALS = 24  # in all, of first solves, whose durations come a few percent too long
 COARSE_MIN_INTERVALS = 2  # of a phase
@@ -132,8 +131,8 @@ class Race:
     def _coarse_intervals(self, start: Start) -> tuple[int, ...]:
         if self.on_course:
             legs = len(start.guess.phases)
-            return start.guess.allocate_intervals(COURSE_COARSE_INTERVALS * legs, MIN_INTERVALS)
-        return start.guess.allocate_intervals(min(COARSE_INTERVALS, self.intervals), COARSE_MIN_INTERVALS)
+            return allocate_intervals(start.guess, COURSE_COARSE_INTERVALS * legs, MIN_INTERVALS)
+        return allocate_intervals(start.guess, min(COARSE_INTERVALS, self.intervals), COARSE_MIN_INTERVALS)
 
     def _fine(
         self,
@@ -145,7 +144,7 @@ class Race:
         """The program on the fine mesh from a motion, with the same room in gates or another."""
         start = solved.start if in_gates is None else replace(solved.start, in_gates=in_gates)
         if not self.on_course:
-            mesh = elements.mesh(start.guess.allocate_intervals(self.intervals, MIN_INTERVALS))
+            mesh = elements.mesh(allocate_intervals(start.guess, self.intervals, MIN_INTERVALS))
             return CollocatedProgram(elements, start, reserve, mesh, self.iterations)
         intervals = max(self.intervals, COURSE_INTERVALS * len(solved.motion.phases))
         mesh = solved.program.mesh.refined(solved.motion, intervals, MIN_INTERVALS)

@@ -18,12 +18,12 @@ from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
-from aerobat.planning.time_optimal.start import Start
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.trajectory.minimum_effort import ORDERS
 from aerobat.vehicle import Vehicle
+from collocation.start import Start
 
 SLOWER = 1.5  # times the duration of a plan that knows no rotors
 PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, where paces are drawn

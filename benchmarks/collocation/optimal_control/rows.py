@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, Indices
-from aerobat.optimization.separable import Element, ElementFunction
+from collocation.separable import Element, ElementFunction
 
 
 @dataclass

@@ -10,8 +10,10 @@ from aerobat.arrays import Array
 from aerobat.flatness import reference
 from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.planning.task import Task
-from aerobat.planning.time_optimal.optimal_control.collocation import CollocatedMotion, CollocationMesh
 from aerobat.planning.warm_start import WarmStart
+from collocation.optimal_control.collocation import CollocatedMotion, CollocationMesh
+
+MIN_INTERVALS = 4  # of a phase
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,3 +50,9 @@ def initial_motion(start: Start, mesh: CollocationMesh, task: Task) -> Collocate
     bound = 2.0 * mesh.input_scale[:, None]
     inputs = np.clip(inputs, -bound, bound)
     return CollocatedMotion(guess.phases, states, inputs[:, :-1], inputs[:, 1:])
+
+
+def allocate_intervals(guess: WarmStart, intervals: int, minimum: int) -> tuple[int, ...]:
+    """About so many intervals, allocated to phases by their durations, to each at least the minimum."""
+    counts = np.rint(intervals * guess.phases / guess.trajectory.duration).astype(int)
+    return tuple(np.maximum(counts, minimum).tolist())

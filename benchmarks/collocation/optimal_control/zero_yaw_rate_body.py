@@ -22,8 +22,8 @@ from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag
 from aerobat.kernels.flatness import collective, moment
 from aerobat.kernels.quaternions import axes, quaternion_rate
 from aerobat.kernels.vectors import dot
-from aerobat.optimization.nonlinear import components, import_casadi
 from aerobat.vehicle import Vehicle
+from collocation.nonlinear import components, import_casadi
 
 STATES = 12
 INPUTS = 3

@@ -1,0 +1,1 @@
+"""The paper's reference [1] approach: the rigid body itself, collocated: a yardstick for refined plans."""

@@ -1,1 +1,0 @@
-"""The paper's reference [1] approach: the rigid body itself, collocated, at its rotors' limits."""
