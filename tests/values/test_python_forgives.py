@@ -87,8 +87,8 @@ MEANT: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "a planner's option for plan()": (
         lambda: ab.plan("line", intervals=30),  # type: ignore[call-arg]
-        "plan: got an unexpected keyword argument 'intervals'; intervals is an option of planners (miqp, "
-        "time-optimal), say planner=ab.Miqp(intervals=...)",
+        "plan: got an unexpected keyword argument 'intervals'; intervals is an option of planners (miqp), "
+        "say planner=ab.Miqp(intervals=...)",
     ),
     "a misspelt argument": (
         lambda: ab.plan("line", vehicel="agile-quad"),  # type: ignore[call-arg]
