@@ -112,15 +112,15 @@ def _variations(sources: list[tuple[WarmStart, str]], planar: bool) -> Iterator[
     paced, rng = sources, np.random.default_rng(SEED)
     while sources:
         for guess, origin in paced:
-            near = plane is not None and _distance(guess, plane) <= NEAR_PLANE * _extent(guess)
+            near = plane is not None and _distance(guess, plane) <= NEAR_PLANE * guess.extent
             if plane is not None and (near or planar):
                 yield Start(guess, plane, np.zeros(3), f"{origin}, in a plane")
             if plane is None or not planar:
-                aside = ASIDE * _extent(guess) * plane if plane is not None and near else np.zeros(3)
+                aside = ASIDE * guess.extent * plane if plane is not None and near else np.zeros(3)
                 yield Start(guess, None, aside, origin)
         paced = [
             (
-                _at_other_pace(guess, np.exp(rng.normal(0.0, PACE_SPREAD, len(guess.phases)))),
+                guess.at_other_pace(np.exp(rng.normal(0.0, PACE_SPREAD, len(guess.phases)))),
                 f"{origin}, at another pace",
             )
             for guess, origin in sources
@@ -131,17 +131,3 @@ def _distance(start: WarmStart, normal: Array) -> float:
     """How far a path's segments lead from a plane through its start [m]."""
     points = start.trajectory.on_segments([0.0, 0.5, 1.0])
     return float(np.abs((points - points[0, 0]) @ normal).max())
-
-
-def _extent(start: WarmStart) -> float:
-    """The longest side of the box around the ends of a path's segments [m]."""
-    return float(np.ptp(start.trajectory.on_segments([0.0, 1.0]), axis=(0, 1)).max())
-
-
-def _at_other_pace(start: WarmStart, factors: Array) -> WarmStart:
-    """The same path with each phase longer by a factor; its derivatives jump where phases meet."""
-    trajectory = start.trajectory
-    middles = (trajectory.knots[:-1] + trajectory.knots[1:]) / 2.0
-    durations = trajectory.durations * factors[np.searchsorted(start.times, middles)]
-    times = np.cumsum(start.phases * factors)[:-1]
-    return replace(start, trajectory=replace(trajectory, durations=durations), times=tuple(times.tolist()))

@@ -31,6 +31,11 @@ class Recorder:
     progress: Progress | None = None
     attempts: list[Attempt] = field(default_factory=list)
 
+    @property
+    def last_outcome(self) -> str:
+        """The sentence on the last attempt, or that there was none."""
+        return self.attempts[-1].outcome if self.attempts else "no path to begin from was found"
+
     def record(self, attempt: Attempt) -> None:
         """Keep an attempt and pass it on."""
         self.attempts.append(attempt)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import inf
 
 from aerobat.errors import Infeasible
-from aerobat.optimization.deadline import out_of_time
-from aerobat.planning.recorder import Attempt
+from aerobat.optimization.deadline import out_of_time, within_time
+from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import Plan
 from aerobat.problem.problem import Problem
 
@@ -18,6 +18,29 @@ TIME_LIMIT = "Seconds for planning; the best plan found by then is taken, and sa
 def stopped(plan: Plan) -> Plan:
     """The plan; where no time is left, as the best that was found by then."""
     return replace(plan, status="time_limit") if out_of_time() else plan
+
+
+def best_in_time(
+    problem: Problem, limit: float | None, recorder: Recorder, search: Callable[[], Plan | None]
+) -> Plan | None:
+    """The plan that a search finds within a limit, the best by then; None where there is none at all.
+
+    Args:
+        problem: What is planned.
+        limit: The planner's own [s]; None adds none.
+        recorder: Keeps the search's attempts.
+        search: Finds a plan.
+
+    Raises:
+        Infeasible: The time was over before anything was found.
+    """
+    with within_time(limit):
+        found = search()
+        if found is not None:
+            return stopped(found)
+        if out_of_time():
+            raise too_short(problem, limit, recorder.attempts)
+    return None
 
 
 def best_by_limit(plan: Plan) -> str:

@@ -18,7 +18,7 @@ from pydantic import Field
 
 from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.errors import Infeasible, Reason, limits_of
-from aerobat.optimization.deadline import out_of_time, within_share, within_time
+from aerobat.optimization.deadline import out_of_time, within_share
 from aerobat.planning.around.fastest import fastest_around
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.courses import is_course
@@ -30,7 +30,7 @@ from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
 from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
-from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
+from aerobat.planning.time_limit import TIME_LIMIT, best_in_time
 from aerobat.planning.warm_start import CLEARANCE, Clearance, Reserve, WarmStart, flown_task
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -90,13 +90,10 @@ class TimeOptimal(Planner):
         task = flown_task("time-optimal", problem, vehicle, self.reserve, self.clearance)
         recorder = Recorder(progress)
         refinement = replace(Refinement.of(task, recorder), close=is_course(task.stages))
-        with within_time(self.time_limit):
-            found = self._fastest(refinement)
-            if found is not None:
-                return stopped(found)
-            if out_of_time():
-                raise too_short(problem, self.time_limit, recorder.attempts)
-        last = recorder.attempts[-1].outcome if recorder.attempts else "no path to begin from was found"
+        found = best_in_time(problem, self.time_limit, recorder, lambda: self._fastest(refinement))
+        if found is not None:
+            return found
+        last = recorder.last_outcome
         sentence = (
             f"no path of '{problem.name}' was found that {task.vehicle.name} can fly: at the last attempt "
             f"{last}; ask less of its stages and limits, or give more starts"
