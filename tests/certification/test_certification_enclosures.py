@@ -50,6 +50,7 @@ def test_the_greatest_value_of_series_is_enclosed_tightly_and_found(seed, degree
         assert taken == pytest.approx(found.min[g], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_path_with_one_number_far_too_large_takes_no_more_intervals_than_others(monkeypatch):
     """As of a file of rows that somebody mistyped: it took minutes and gigabytes."""
     path = closed_form().trajectory

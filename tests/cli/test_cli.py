@@ -197,6 +197,7 @@ def test_a_plan_that_takes_suspiciously_long_says_so_and_what_to_give(capsys) ->
     assert json.loads(out)["plan"]["assessment"]["second_opinion"]["duration"] < 2.3  # of 3.1 s
 
 
+@pytest.mark.slow
 def test_check_judges_a_plan_of_what_cannot_hover_all_the_same(capsys) -> None:
     """The exit code is the proof's; of the way back it is told that there is none."""
     run(capsys, "plan", "line")
@@ -239,6 +240,7 @@ def test_the_full_law_flies_the_papers_half_flip_as_it_was_planned(capsys) -> No
     assert json.loads(out)["flight"]["max_position_error_m"] < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unpictured")
 def test_the_gates_tilt_is_what_angle_says(capsys) -> None:
     _, out, _ = run(capsys, "fly", "half-flip", "--angle", "40", "--json")

@@ -78,6 +78,7 @@ def test_check_proves_a_plan_from_its_file_its_folder_and_its_csv(capsys) -> Non
         assert (code, "certified" in out) == (0, True)
 
 
+@pytest.mark.slow
 def test_check_refuses_by_limit_time_and_size(capsys) -> None:
     shared_plan("flip-roll").save("flip-roll.plan")
     code, out, _ = run(capsys, "check", "flip-roll.plan", "--vehicle", "crazyflie")

@@ -59,6 +59,7 @@ def test_a_sweep_writes_a_row_a_flight_and_counts_what_became_of_them(capsys) ->
 PARQUET = "out/half-flip-sweep-spread-seed-7-parquet"
 
 
+@pytest.mark.slow
 def test_a_repeated_sweep_comes_to_the_same_bits(capsys) -> None:
     assert swept("--table", "parquet") == 0
     shown = capsys.readouterr().out
@@ -69,6 +70,7 @@ def test_a_repeated_sweep_comes_to_the_same_bits(capsys) -> None:
     assert f"the same as in {PARQUET}/, bit for bit" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_sweeps_plan_is_swept_again_as_it_is() -> None:
     assert swept("--table", "parquet") == 0
     again = ("--runs", "3", "--conditions", "spread.toml", "--seed", "7", "--out", "few")
@@ -93,6 +95,7 @@ main(sys.argv[1:])
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ended_by", "code", "word"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")]
 )

@@ -35,7 +35,7 @@ def test_every_key_that_the_page_on_files_names_is_drawn_and_no_other() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("begin", "end", "flown"),
-    [(8, 11, 1), (5, 8, 2)],  # earlier ones take minutes to refuse
+    [(11, 14, 2), (15, 21, 3)],  # earlier ones take minutes to refuse
 )
 def test_own_vehicles_and_maneuvers_are_flown_or_refused_in_one_sentence(
     begin: int, end: int, flown: int, tmp_path: Path

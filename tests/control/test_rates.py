@@ -111,14 +111,16 @@ def test_flights_of_a_lab_pass_by_rates_as_by_the_tracking_controller() -> None:
     assert by["rates"].max() < 0.2
 
 
-@pytest.mark.parametrize(("vehicle", "largest"), [("agile-quad", 10.0), ("crazyflie", 20.0)])
+@pytest.mark.parametrize(
+    ("vehicle", "largest"), [("agile-quad", 10.0), pytest.param("crazyflie", 20.0, marks=pytest.mark.slow)]
+)
 def test_a_heading_is_held_by_rotors_that_differ(vehicle: str, largest: float) -> None:
     """Rotors 3 % apart turn a vehicle by their drag; nine of ten flights hold their heading [deg]."""
     flights = ab.fly(shared_plan("line", vehicle), conditions="lab", flights=range(40), controller="rates")
     assert np.quantile([headings_missed(flights[k]).max() for k in range(40)], 0.9) < largest
 
 
-@pytest.mark.parametrize("vehicle", ["crazyflie", "x500"])
+@pytest.mark.parametrize("vehicle", ["x500", pytest.param("crazyflie", marks=pytest.mark.slow)])
 def test_weak_rotors_are_asked_for_no_more_than_they_turn(vehicle: str) -> None:
     """Nine of ten flights of a lab come no more than 20 cm off their line."""
     by_rates = {"conditions": "lab", "flights": 40, "controller": "rates"}

@@ -122,6 +122,7 @@ def holds_form(value: object, depth: int = 0) -> bool:
     return any(holds_form(each, depth + 1) for each in parts)
 
 
+@pytest.mark.slow
 def test_the_way_of_a_gate_is_as_the_page_says(tmp_path: Path) -> None:
     file = tmp_path / "window.toml"
     file.write_text(WINDOW)

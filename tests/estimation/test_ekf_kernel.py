@@ -381,6 +381,7 @@ def test_the_series_of_the_quaternion_is_exact_for_small_rotations_and_near_for_
     np.testing.assert_allclose(exp_of_small(triple(phi)), so3.exp(phi), rtol=0, atol=near)
 
 
+@pytest.mark.slow
 def test_engines_agree_on_poses_outliers_and_a_jump() -> None:
     parameters, inputs = measured_hover()
     init, step = filter_loop(2)

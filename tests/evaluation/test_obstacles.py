@@ -85,7 +85,7 @@ def scattered(count: int, seed: int) -> Pieces:
 def test_the_nearest_is_the_least_over_all_rows_and_pieces_until_the_first_contact(
     seed: int, count: int
 ) -> None:
-    flown, pieces = wandering(12, 90, seed), scattered(count, seed)
+    flown, pieces = wandering(6, 60, seed), scattered(count, seed)
     found = nearest_obstacles(pieces, flown)
     for k, last in enumerate(flown.rows.tolist()):
         gaps = np.array([_gaps(pieces, flown, k, piece)[:last] for piece in range(count)])

@@ -90,7 +90,7 @@ def tick_by_tick(
 @pytest.mark.parametrize(
     "opening",
     [
-        pytest.param(OPENINGS[0], id="rectangle"),
+        pytest.param(OPENINGS[0], id="rectangle", marks=pytest.mark.slow),
         pytest.param({"width": 0.1, "height": 0.2}, id="slot"),  # which most flights are far beside of
         pytest.param(OPENINGS[1], id="circle", marks=pytest.mark.slow),
         pytest.param(OPENINGS[2], id="pentagon", marks=pytest.mark.slow),

@@ -132,6 +132,7 @@ def test_a_piece_has_the_bytes_that_cflib_packs() -> None:
     assert piece.tobytes() == bytes.fromhex(PACKED)
 
 
+@pytest.mark.slow
 @examples(4)
 @given(seed=st.integers(0, 2**32 - 1), segments=st.integers(32, 48), degree=st.sampled_from([4, 5, 9]))
 def test_a_refit_has_few_pieces_that_join_as_smoothly_as_the_path(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from aerobat import so3
 from aerobat.certification import Side, certify
 from aerobat.environment import Environment
-from aerobat.flatness import reference
+from aerobat.flatness import Reference, reference
 from aerobat.limits import Limit, limits_along
 from aerobat.limits.limit import size_of
 from aerobat.planning.miqp.miqp import formulate
@@ -29,6 +30,7 @@ from shared_plans import shared_plan
 from suites import examples
 
 CONDITION = Condition(Quantity.SPECIFIC_THRUST, [0.3, -0.5, 1.0], lower=-40.0, upper=90.0)
+NEAR = 1e-6  # [s]
 WIND = Environment(wind=[1.0, -2.0, 0.5], ground=-5.0)
 BOX = Limits(
     lower=[-11.0] * 3, upper=[11.0] * 3, velocity=30.0, acceleration=120.0, jerk=900.0, snap=2e4, max_tilt=3.1
@@ -60,6 +62,12 @@ def sampled(flown: Trajectory, craft: Vehicle, times: np.ndarray) -> tuple[Limit
     return rows, derivatives, rows.frames(times, derivatives)
 
 
+@lru_cache(maxsize=2)  # of many limits
+def references(flown: Trajectory, craft: Vehicle, times: tuple[float, ...]) -> list[Reference]:
+    """References at some times, and a moment after and before each."""
+    return [reference(flown, craft, np.array(times) + h, environment=WIND) for h in (0.0, NEAR, -NEAR)]
+
+
 def by_flatness(
     flown: Trajectory, craft: Vehicle, times: np.ndarray, limit: Limit, along_b3: bool = False
 ) -> np.ndarray:
@@ -67,12 +75,12 @@ def by_flatness(
 
     Of the specific thrust it is that of the mean drag, or what of it is along b3.
     """
-    here, ahead, behind = (reference(flown, craft, times + h, environment=WIND) for h in (0.0, 1e-6, -1e-6))
+    here, ahead, behind = references(flown, craft, tuple(times))
     if limit.rotor is not None:
         thrust = here.rotor_thrusts[:, limit.rotor]
         if limit.name == "thrust":
             return thrust
-        rate = (ahead.rotor_thrusts - behind.rotor_thrusts)[:, limit.rotor] / 2e-6
+        rate = (ahead.rotor_thrusts - behind.rotor_thrusts)[:, limit.rotor] / (2 * NEAR)
         return np.asarray(thrust + craft.rotors[limit.rotor].lag * rate)
     if limit.name == "body rate":
         return np.linalg.norm(here.setpoint.omega_body, axis=-1)

@@ -161,6 +161,7 @@ def test_a_flip_on_demand_is_flown_by_betaflights_firmware_over_tcp() -> None:
     assert not any(motors)
 
 
+@pytest.mark.slow
 def test_a_board_whose_vehicle_is_lost_from_sight_gets_no_more_channels() -> None:
     """So that its own failsafe does what it is set to; on the ground it is disarmed."""
     wire = Wire(MSP)

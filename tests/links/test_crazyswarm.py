@@ -48,6 +48,7 @@ def test_a_maneuver_is_flown_by_the_orders_of_crazyswarm2_and_lands(maneuver: st
     assert asked == [*(STARTED if in_pieces else []), "notify_setpoints_stop", "go_to", "land"]
 
 
+@pytest.mark.slow
 def test_a_node_that_dies_in_an_uploaded_maneuver_leaves_it_flown_and_a_hover_at_its_end() -> None:
     sky = crazyflie_aloft(True)
     asked = asked_of(sky)
@@ -62,6 +63,7 @@ def test_a_node_that_dies_in_an_uploaded_maneuver_leaves_it_flown_and_a_hover_at
     np.testing.assert_allclose(sky.position, end, atol=0.02)
 
 
+@pytest.mark.slow
 def test_a_stream_that_is_given_up_in_the_air_ends_in_the_order_to_stay() -> None:
     sky = crazyflie_aloft(False)
     assert sky.call("line").success

@@ -26,14 +26,14 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(6))
 def test_whatever_comes_the_end_is_a_good_flight_or_a_sentence(seed: int, plan: Path) -> None:
     flight = flown(seed, plan)
     assert not flight.wrong, str(flight)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [*range(10), 163])
+@pytest.mark.parametrize("seed", [*range(4), 163])
 def test_whatever_odometry_says_a_maneuver_is_flown_well_or_given_up_in_a_sentence(seed: int) -> None:
     verdict, told = ros_man_in_the_middle.flown(seed)
     assert not verdict.startswith("wrong"), told

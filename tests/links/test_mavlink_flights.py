@@ -28,11 +28,9 @@ def test_the_phases_follow_each_other_and_are_told() -> None:
     assert sky.said[1:5] == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DIALECTS)
-@pytest.mark.parametrize(
-    ("loss", "delay", "bound"),
-    [(0.01, 0.02, 0.04), pytest.param(0.05, 0.03, 0.12, marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize(("loss", "delay", "bound"), [(0.01, 0.02, 0.04), (0.05, 0.03, 0.12)])
 def test_a_flip_goes_through_its_gate_over_a_link_that_loses_and_delays(
     loss: float, delay: float, bound: float, name: str
 ) -> None:

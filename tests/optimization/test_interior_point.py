@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -136,6 +137,7 @@ def test_a_program_that_is_not_convex_ends_at_a_point_that_no_direction_improves
     assert step.fun > -1e-2 * near * np.abs(program.cost).sum()
 
 
+@pytest.mark.slow
 def test_most_programs_that_are_not_convex_are_solved() -> None:
     ends = [
         interior_point(program, np.zeros(len(program.cost)), ACCURATE)

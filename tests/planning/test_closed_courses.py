@@ -75,6 +75,7 @@ def test_a_closed_lap_ends_in_the_state_in_which_it_begins(lagging: bool, course
     assert np.linalg.norm(flat.setpoint.flat.velocity[0]) > 3.0
 
 
+@pytest.mark.slow
 def test_the_turn_once_around_follows_from_its_slopes() -> None:
     """Central differences of the body's turn about its thrust axis, along random changes of a lap."""
     task = Task.of(SHORT, QUAD)

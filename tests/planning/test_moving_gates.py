@@ -26,6 +26,7 @@ def moving(kind: str, **fields: object) -> ab.Gate:
     return replace(ab.tilted_gate((3.0, -0.4, 1.5)), **MOTIONS[kind], **fields)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", MOTIONS)
 def test_a_gate_that_moves_is_planned_and_passed_where_it_is_then(kind: str, tmp_path: Path) -> None:
     gate = moving(kind)

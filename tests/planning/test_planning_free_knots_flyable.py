@@ -87,6 +87,7 @@ def test_a_vehicle_with_lag_flies_its_certified_plan(lagging: Plan) -> None:
     assert flown.error < 0.05
 
 
+@pytest.mark.slow
 def test_body_rates_stay_within_the_vehicles() -> None:
     slow = replace(load_vehicle("agile-quad"), max_body_rate=4.0)
     plan = FreeKnots(segments=2).plan(LINE, slow)
@@ -141,6 +142,7 @@ def test_min_snap_never_flies_a_half_flip_upside_down() -> None:
     assert thrust_axes(plan, np.linspace(0.0, plan.duration, 10 * SAMPLES))[:, 2].min() > -1e-6
 
 
+@pytest.mark.slow
 def test_min_snap_says_what_bound_before_the_stages_did() -> None:
     little = HALF_FLIP.maneuver.with_stage_thrust(HALF_FLIP.gates, 7.0)
     with pytest.raises(Infeasible, match=r"falls to -.*; at the last"):

@@ -144,9 +144,8 @@ def test_a_trajectory_knows_the_heading_it_was_planned_for(name: str) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "miqp",
         "min-snap",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("free-knots", "time-optimal")),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("miqp", "free-knots", "time-optimal")),
     ],
 )
 def test_a_plan_in_wind_asks_other_thrusts_than_in_calm_air(name: str) -> None:
@@ -169,6 +168,7 @@ def test_no_certified_path_goes_below_the_ground(name: str) -> None:
     assert bound.verdict is Verdict.HOLDS
 
 
+@pytest.mark.slow
 def test_the_certificate_returned_is_that_of_the_last_round_of_tightening() -> None:
     """Both ends run towards the floor: each round of bounds leaves a smaller excess between nodes."""
     start = EndState((0.0, 0.0, 1.0), (0.0, 0.0, -4.0))

@@ -80,6 +80,7 @@ def test_no_program_is_made_a_step_of_the_scan_shorter_than_any_motion(name: str
     assert min(a.duration for a in found.attempts) >= found.assessment.least_duration / COARSE_GROWTH
 
 
+@pytest.mark.slow
 def test_what_too_few_intervals_miss_is_rescued_and_said(quad: Vehicle) -> None:
     problem = load_problem("flip-roll")
     with pytest.raises(Infeasible):

@@ -86,7 +86,7 @@ def narrow() -> Plan:
         lambda: MinSnap().plan(COURSE, QUAD),
         lambda: FreeKnots(segments=2).plan(ONE_BALL, QUAD),
         lambda: Miqp().plan(COURSE, QUAD),
-        narrow,
+        pytest.param(narrow, marks=pytest.mark.slow),
     ],
     ids=["min-snap", "free-knots", "miqp", "time-optimal"],
 )

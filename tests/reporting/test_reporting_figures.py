@@ -302,7 +302,8 @@ def test_stages_are_numbered_where_their_names_have_no_room(monkeypatch):
     require_legible(figure, monkeypatch)
 
 
-@pytest.mark.parametrize("count", [12, *(pytest.param(n, marks=pytest.mark.slow) for n in (19, 40))])
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [12, 19, 40])
 def test_a_course_of_many_stages_is_legible(count, monkeypatch):
     """Of very many some are drawn and numbered, all are marked."""
     plan = shared_plan("flip-roll-translation")

@@ -97,6 +97,7 @@ def test_a_video_that_does_not_fit_on_the_disk_is_refused_and_leaves_nothing(
     assert {path.name for path in tmp_path.iterdir()} == {"line.plan", f"video.{suffix}"}
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_video_and_a_page_where_both_are_named(tmp_path: Path, capsys) -> None:
     shared_plan("line").save(tmp_path / "line.plan")
     video, page = tmp_path / "line.gif", tmp_path / "page.html"

@@ -61,14 +61,14 @@ def test_no_text_of_section_v_lies_over_another_or_beyond_the_page(stop_after, m
     require_legible(page_of(stop_after)[0], monkeypatch)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("problem", "vehicle"),
     [
         ("flip-roll", "agile-quad"),
-        *(
-            pytest.param(*case, marks=pytest.mark.slow)
-            for case in (("half-flip", "agile-quad"), ("line", "agile-quad"), ("flip-roll", "hexarotor"))
-        ),
+        ("half-flip", "agile-quad"),
+        ("line", "agile-quad"),
+        ("flip-roll", "hexarotor"),
     ],
 )
 def test_no_text_lies_over_another_or_beyond_the_page(problem, vehicle, monkeypatch):

@@ -44,7 +44,8 @@ def test_what_is_proven_was_learned_from_other_flights_and_holds_when_flown_agai
     assert (found.price == 0.0) == (probability == 0.25)  # which is met already
 
 
-@pytest.mark.parametrize("most", [0.25, pytest.param(0.9, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("most", [0.25, 0.9])
 def test_more_probability_never_gives_a_shorter_plan(most: float):
     durations = [passing(probability).plan.duration for probability in sorted({0.01, 0.25, most})]
     assert durations == sorted(durations)

@@ -58,6 +58,7 @@ def test_a_seed_gives_the_same_gains_to_the_last_bit() -> None:
     assert first.training[0] != other.training[0]
 
 
+@pytest.mark.slow
 def test_gains_are_judged_on_flights_that_the_search_has_not_flown() -> None:
     tuning = found()
     for trial, controller in zip(tuning.fresh, (HALVED, tuning.controller), strict=True):
@@ -99,6 +100,7 @@ def test_a_lost_flight_weighs_more_than_any_error() -> None:
     assert one_lost.cost - few.cost == pytest.approx(0.05)
 
 
+@pytest.mark.slow
 def test_several_plans_count_alike() -> None:
     line = shared_plan("line", "agile-quad", ab.Miqp(order=4, reserve=0.1))
     both, *each = (

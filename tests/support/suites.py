@@ -1,4 +1,4 @@
-"""The two suites of tests: the default one of four minutes, and the full one, which `--full` runs."""
+"""The two suites of tests: the default one of three minutes, and the full one, which `--full` runs."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from aerobat.errors import BackendMissing
 from aerobat.links.betaflight.process import require_firmware
 
 FAST, FULL = "fast", "full"
-SHARE = 4  # the default suite draws one in so many of the examples that the full one draws
-FEWEST = 5  # examples of a law in the default suite
+SHARE = 8  # the default suite draws one in so many of the examples that the full one draws
+FEWEST = 3  # examples of a law in the default suite
 
 # each group of tests that the default suite leaves out, and what its tests are
 GROUPS = {
-    "slow": "takes more than two seconds of the processor",
+    "slow": "takes more than a second of the processor",
     "process": "starts processes of its own, sends them signals, or fills their terminals",
     "browser": "opens pages in a browser; needs Chromium, Chrome or Edge",
     "peer": "compares with programs that others wrote, at length",

@@ -47,7 +47,7 @@ def plan_file(tmp_path_factory) -> Path:
     return path
 
 
-@parts(24, 120)
+@parts(12, 60)
 @pytest.mark.parametrize("name", READERS)
 def test_whatever_a_file_holds_its_reader_ends_in_what_it_says_or_in_one_sentence(
     name, begin, end, tmp_path
@@ -69,7 +69,7 @@ def test_what_the_reader_to_copy_reads_has_setpoints(plan_file, tmp_path) -> Non
     assert read
 
 
-@parts(10, 40)
+@parts(5, 20)
 def test_commands_that_read_damaged_files_end_in_a_sentence_or_a_judgement(
     begin, end, tmp_path, monkeypatch
 ) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import factorial
 from typing import NamedTuple
 
 import numpy as np
@@ -73,11 +72,10 @@ class PathReference(NamedTuple):
             for goal in (begin, end)
         )
         turning = omega_body, omega_dot_body, (final - omega_dot_body) / duration
-        rotation, *_ = _carried_on(age, (np.zeros(3), *turning))
+        rotation, *now = _carried_on(age, (np.zeros(3), *turning))
         q = so3.multiply(begin.q_world_body, so3.exp(rotation))
-        (omega, omega_dot, _), (ahead, ahead_dot, _) = (
-            [components(so3.rotate(q, rate)) for rate in _carried_on(at, turning)]
-            for at in (age, age + period)
+        omega, omega_dot, ahead, ahead_dot = (
+            components(so3.rotate(q, rate)) for rate in (*now[:2], *_carried_on(age + period, turning)[:2])
         )
         thrust = acceleration + gravity * so3.UP
         coming = np.linalg.norm(thrust + period * (jerk + 0.5 * period * snap), axis=-1)
@@ -95,11 +93,12 @@ class PathReference(NamedTuple):
 
 def _carried_on(age: Array, derivatives: Sequence[Array]) -> list[Array]:
     """What has those derivatives at first, and its derivatives, at ages [s] (T, 1); the last one stays."""
-    parts = [np.broadcast_to(derivatives[-1], (len(age), 3))]
-    for lower in range(len(derivatives) - 2, -1, -1):
-        terms = (d * age**k / factorial(k) for k, d in enumerate(derivatives[lower:]))
-        parts.append(np.sum(list(terms), axis=0))
-    return parts[::-1]
+    last = len(derivatives) - 1
+    parts = [np.broadcast_to(derivatives[last], (len(age), 3))] * (last + 1)
+    for lower in range(last):
+        for upper in range(last - 1, lower - 1, -1):  # by Horner's rule
+            parts[lower] = derivatives[upper] + age / (upper - lower + 1) * parts[lower]
+    return parts
 
 
 class AttitudeReference(NamedTuple):
