@@ -13,7 +13,8 @@ from aerobat.errors import BackendMissing
 from aerobat.links.betaflight.process import require_firmware
 
 FAST, FULL = "fast", "full"
-SHARE = 8  # the default suite draws one in so many of the examples that the full one draws
+FEW, MANY = 12, 50  # examples of a law that names no number, in either suite: the same ones on every run
+SHARE = 8  # the default suite draws one in so many of the examples that the full one draws, of laws that do
 FEWEST = 3  # examples of a law in the default suite
 
 # each group of tests that the default suite leaves out, and what its tests are
@@ -44,8 +45,8 @@ def register_profiles() -> None:
         "deadline": None,
         "suppress_health_check": [HealthCheck.too_slow],
     }
-    settings.register_profile(FAST, max_examples=100 // SHARE, **common)
-    settings.register_profile(FULL, max_examples=100, **common)
+    settings.register_profile(FAST, max_examples=FEW, **common)
+    settings.register_profile(FULL, max_examples=MANY, **common)
 
 
 def examples(count: int) -> Callable[[Any], Any]:
