@@ -71,7 +71,9 @@ class Miqp(Planner):
         True, "Give up where nothing is found, and try no other intervals, order or planner.", off="no-rescue"
     )
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = SEGMENTS  # of a refined path, but of a course's
-    flies: bool = True  # what it finds, and mends what its own flight lacks
+    # whether it flies what it finds, mends what that flight lacks, and looks for what is faster with more
+    # segments; not where others begin from there
+    flies: bool = True
 
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
@@ -85,7 +87,7 @@ class Miqp(Planner):
         with within_time(self.time_limit):
             try:
                 plan = stopped(self._planned(problem, vehicle, recorder))
-                if vehicle is None or not self.rescue or self.search is not None or plan.bound is None:
+                if vehicle is None or not self.rescue or self.search is not None:
                     return plan
                 return Rescue(self, problem, vehicle, recorder).shortened(plan)
             except Infeasible as infeasible:
@@ -138,7 +140,7 @@ class Miqp(Planner):
         segments = segments_for(task.stages, self.segments)
         found: Judged[RefinedPath] | Judged[Placement] | None = None
         for refinement in whole.with_and_without_rooms:
-            found = shortest(attempts, refinement, segments, scanned, least) or found
+            found = shortest(attempts, refinement, segments, scanned, least, self.flies) or found
             if found is not None and isinstance(found.solution.source, RefinedPath):
                 break
         if found is None:

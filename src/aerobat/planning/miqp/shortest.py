@@ -37,7 +37,12 @@ _Slots = tuple[int, ...] | None
 
 
 def shortest(
-    attempts: Attempts, refinement: Refinement, segments: int, scanned: tuple[float, float], least: float
+    attempts: Attempts,
+    refinement: Refinement,
+    segments: int,
+    scanned: tuple[float, float],
+    least: float,
+    more_segments: bool,
 ) -> Judged[RefinedPath] | Judged[Placement] | None:
     """The shortest certified path found, or the first of a program that is flown as it is, or None.
 
@@ -47,8 +52,9 @@ def shortest(
         segments: Of a refined path.
         scanned: The scan's smallest and largest dt [s].
         least: The duration [s] that no motion falls short of: shorter programs are left out.
+        more_segments: Whether paths may have twice as many where they are much slower otherwise.
     """
-    scan, rough = _Scan(attempts, refinement, scanned, least), list[RefinedPath]()
+    scan, rough = _Scan(attempts, refinement, scanned, least, more_segments), list[RefinedPath]()
     for begun, (slots, guess) in enumerate(scan.starts(), 1):
         path = refinement.rough(guess, segments, min(map(_duration, rough), default=inf))
         if refinement.is_promising(path):
@@ -58,7 +64,7 @@ def shortest(
             break
     found: Judged[RefinedPath] | None = None
     for path in sorted(rough, key=_duration):
-        judged = refinement.finished(path)
+        judged = refinement.finished(path, more_segments)
         if judged.feasible:
             found = _shortened(judged, scan, segments)
             break
@@ -77,7 +83,7 @@ def _from_closed_form(
         start = WarmStart.of(MinSnap().plan(task.problem, task.vehicle), task.stages)
     except Infeasible:
         return known
-    return _shorter(scan.refinement, start, segments, known) or known
+    return _shorter(scan, start, segments, known) or known
 
 
 def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judged[RefinedPath]:
@@ -93,19 +99,19 @@ def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judge
         start = scan.start(fraction * duration / scan.attempts.formulation.chain.intervals)
         if start is None:
             continue
-        best = _shorter(scan.refinement, start, segments, best) or best
+        best = _shorter(scan, start, segments, best) or best
     return best
 
 
 def _shorter(
-    refinement: Refinement, start: WarmStart, segments: int, known: Judged[RefinedPath] | None
+    scan: _Scan, start: WarmStart, segments: int, known: Judged[RefinedPath] | None
 ) -> Judged[RefinedPath] | None:
     """The certified path near a start, where it is shorter than a known one; else None."""
-    longest = inf if known is None else known.solution.duration
+    refinement, longest = scan.refinement, inf if known is None else known.solution.duration
     path = refinement.rough(start, segments, longest)
     if not refinement.is_promising(path) or _duration(path) >= longest:
         return None
-    found = refinement.finished(path)
+    found = refinement.finished(path, scan.more_segments)
     return found if found.feasible and found.solution.duration < longest else None
 
 
@@ -121,6 +127,7 @@ class _Scan:
     refinement: Refinement
     scanned: tuple[float, float]  # the smallest and the largest dt [s]
     least: float  # [s] of all intervals together
+    more_segments: bool  # whether paths may have twice as many
     known: list[_Slots] = field(default_factory=list)  # that lead to a path
     flown: Placement | None = None  # the answer that the vehicle can fly as it is
 

@@ -23,7 +23,7 @@ from aerobat.optimization.deadline import out_of_time, within_share
 from aerobat.optimization.interior_point import InteriorPointResult, Settings, interior_point
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, judge
 from aerobat.planning.courses import is_course
-from aerobat.planning.gate_clearance import bodies_in_gates
+from aerobat.planning.gate_clearance import bodies_in_gates, is_clear
 from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.excess import JUST_INSIDE, Excess, chebyshev
@@ -68,6 +68,7 @@ ROUGH_SHARE = 0.5  # of the time that is left, so that there is some to certify 
 ROUGH_PLACES = 16  # of a segment: as many as a polynomial of degree 9 needs
 FINE_PLACES = 24
 MORE_PLACES = 1.5  # times as many where thrusts jump, as those of rotors without lag
+LOSS = 0.02  # of a rough path's duration, that makes one certified: more segments have less
 LITTLE_GAIN = 0.005  # of the duration, from one rough round to the next: the end
 SETTLED = 0.1  # of a limit's size: rough rounds go on where more is exceeded
 BEHIND = 0.02  # of a known path's duration: one that is so much longer after a round is not gone on with
@@ -237,10 +238,14 @@ class Refinement:
             rounds.go_on(solution.source)
         return replace(solution.source, certified=certified)
 
-    def finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
+    def finished(self, rough: RefinedPath, more_segments: bool = False) -> Judged[RefinedPath]:
         """The shortest certified path near a rough one, or the last one that was tried.
 
         Where the duration still falls, it goes on from the path that is certified.
+
+        Args:
+            rough: As fast as it gets.
+            more_segments: Whether it may have twice as many where it is much slower otherwise.
         """
         judged = self._finished(rough)
         judged = _shortest(judged, rough.certified) or judged
@@ -252,7 +257,24 @@ class Refinement:
             if not again.feasible or again.solution.duration >= solution.duration:
                 break
             judged = again
-        return judged
+        return self._with_more_segments(rough, judged) if more_segments else judged
+
+    def _with_more_segments(self, rough: RefinedPath, found: Judged[RefinedPath]) -> Judged[RefinedPath]:
+        """The certified path that was found near a rough one, or a shorter one with twice as many segments.
+
+        They are given where it is much longer than the rough one. A path whose body touches gates' frames is
+        left as it is: it is refined again, with more room there.
+        """
+        path, duration = rough.path.trajectory, found.solution.duration
+        loses_little = not found.feasible or duration <= (1.0 + LOSS) * path.duration
+        segments = 2 * path.segments
+        if loses_little or segments > MAX_SEGMENTS or not is_clear(found.frames) or out_of_time():
+            return found
+        finer = self.finer(rough, segments, duration)
+        if not self.is_promising(finer) or finer.path.trajectory.duration >= duration:
+            return found
+        judged = self.finished(finer)
+        return (_shortest(found, judged) or found) if is_clear(judged.frames) else found
 
     def _finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
         """The certified path near one, or the last one that was tried."""
