@@ -12,7 +12,6 @@ from typing import Any, cast
 
 from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
-from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.miqp.attempts import default_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES, MAX_INTERVALS
 from aerobat.planning.planners import Planner, planner_class, planner_with_reserve
@@ -26,11 +25,12 @@ A_STAGE = 2  # intervals at least: fewer leave the path of a course no choice
 MANY_INTERVALS = 40  # where that is more still: a narrow window at an end needs intervals on either side
 # [s] of the processor for all other ways together, so that refusals take 5 s (benchmarks/audit.py)
 RESCUE_TIME = 4.0
-# [s] of the processor where there most likely is a plan: time-optimal's path nearly holds, or miqp's is poor
+# [s] of the processor where there most likely is a plan, for a path was found that nearly holds
 PROMISING_TIME = 15.0
 ONE_WAY = 0.75  # of the time that is left, for one way, so that the next has some
-# times what no motion falls short of: of 99 random problems one plan took more, 3.6 times the best known
-POOR = 3.0
+POOR = (
+    2.0  # times the duration of a path that nearly held: one plan of 99 random problems, 3.6 times the best
+)
 MOTION = "time-optimal"  # the planner that begins at the most paths
 MOTIONS = 2  # that time-optimal starts from: further ones make motions faster, but seldom find the first
 
@@ -63,17 +63,17 @@ class Rescue:
     def shortened(self, plan: Plan) -> Plan:
         """The plan, or where it is poor a shorter one on more intervals, which says so.
 
-        It is poor where it is a program's own answer, or takes many times what no motion falls short of.
+        It is poor where it is a program's own answer, or paths that nearly held are far faster.
         """
         with_these = f"miqp with {self.asked.intervals} intervals"
         ways = with_more_intervals(self.asked, self.problem, self.vehicle)
         if plan.bound is not None:
             return self._first(ways, f"no path of {with_these} settled", plan.duration, share=1.0) or plan
-        if plan.duration <= POOR * least_duration(self.problem, self.vehicle):
+        paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
+        if plan.duration <= POOR * min((path.duration for path in paths), default=inf):
             return plan
         with within_time(PROMISING_TIME, processor):
-            failed = f"the path of {with_these} took {plan.duration:.3g} s"
-            return self._first(ways, failed, plan.duration) or plan
+            return self._first(ways, f"no fast path of {with_these} settled", plan.duration) or plan
 
     def __str__(self) -> str:
         """The ways that were tried in vain, in a part of a sentence."""
