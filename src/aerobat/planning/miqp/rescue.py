@@ -28,9 +28,8 @@ RESCUE_TIME = 4.0
 # [s] of the processor where there most likely is a plan, for a path was found that nearly holds
 PROMISING_TIME = 15.0
 ONE_WAY = 0.75  # of the time that is left, for one way, so that the next has some
-POOR = (
-    2.0  # times the duration of a path that nearly held: one plan of 99 random problems, 3.6 times the best
-)
+# times the duration of a path that nearly held: one plan of 99 random problems, 3.6 times the best known
+POOR = 2.0
 MOTION = "time-optimal"  # the planner that begins at the most paths
 MOTIONS = 2  # that time-optimal starts from: further ones make motions faster, but seldom find the first
 
