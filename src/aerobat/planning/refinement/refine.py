@@ -262,15 +262,14 @@ class Refinement:
     def _with_more_segments(self, rough: RefinedPath, found: Judged[RefinedPath]) -> Judged[RefinedPath]:
         """The certified path that was found near a rough one, or a shorter one with twice as many segments.
 
-        They are given where it is much longer than the rough one. A path whose body touches gates' frames is
-        left as it is: it is refined again, with more room there.
+        They are given where it is much longer than the rough one. A course has many as it is. A path whose
+        body touches gates' frames is left as it is: it is refined again, with more room there.
         """
         path, duration = rough.path.trajectory, found.solution.duration
         loses_little = not found.feasible or duration <= (1.0 + LOSS) * path.duration
-        segments = 2 * path.segments
-        if loses_little or segments > MAX_SEGMENTS or not is_clear(found.frames) or out_of_time():
+        if loses_little or is_course(self.task.stages) or not is_clear(found.frames) or out_of_time():
             return found
-        finer = self.finer(rough, segments, duration)
+        finer = self.finer(rough, min(2 * path.segments, MAX_SEGMENTS), duration)
         if not self.is_promising(finer) or finer.path.trajectory.duration >= duration:
             return found
         judged = self.finished(finer)
