@@ -14,8 +14,8 @@ from aerobat.links.betaflight.process import require_firmware
 
 FAST, FULL = "fast", "full"
 FEW, MANY = 12, 50  # examples of a law that names no number, in either suite: the same ones on every run
-SHARE = 8  # the default suite draws one in so many of the examples that the full one draws, of laws that do
-FEWEST = 3  # examples of a law in the default suite
+SHARE = 8  # of the examples that a law names, the default suite draws one in so many,
+FEWEST = 3  # and no fewer than these, where it names as many
 
 # each group of tests that the default suite leaves out, and what its tests are
 GROUPS = {

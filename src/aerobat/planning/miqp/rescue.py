@@ -68,6 +68,7 @@ class Rescue:
         ways = with_more_intervals(self.asked, self.problem, self.vehicle)
         if plan.bound is not None:
             return self._first(ways, f"no path of {with_these} settled", plan.duration, share=1.0) or plan
+        # programs have a dt; of paths those that nearly hold have a cost
         paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
         if plan.duration <= POOR * min((path.duration for path in paths), default=inf):
             return plan

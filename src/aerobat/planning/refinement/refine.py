@@ -273,7 +273,8 @@ class Refinement:
         if not self.is_promising(finer) or finer.path.trajectory.duration >= duration:
             return found
         judged = self.finished(finer)
-        return (_shortest(found, judged) or found) if is_clear(judged.frames) else found
+        is_better = judged.feasible and judged.solution.duration < duration and is_clear(judged.frames)
+        return judged if is_better else found
 
     def _finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
         """The certified path near one, or the last one that was tried."""
