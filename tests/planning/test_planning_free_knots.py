@@ -66,12 +66,13 @@ each_set = pytest.mark.parametrize(
 
 
 @each_set
-def test_eight_segments_are_certified_and_within_an_eighth_of_the_least_time(name: str) -> None:
+def test_plans_are_certified_and_as_fast_as_the_least_time_in_the_plane(name: str) -> None:
+    """In space there are faster ways than in the plane."""
     plan = planned(name)
     assert Evidence(Task.of(SECTION_V, vehicle(name)), plan.trajectory).certificate.certified
     assert certified(plan)
-    assert plan.trajectory.coefficients.shape == (8, 10, 3)
-    assert plan.duration / SETS[name][2] < 1.12
+    assert plan.trajectory.coefficients.shape[1:] == (10, 3)
+    assert plan.duration / SETS[name][2] < 1.005
 
 
 @each_set
@@ -92,7 +93,7 @@ def test_waypoint_is_passed(name: str) -> None:
 
 
 def test_still_ends_have_no_jerk() -> None:
-    trajectory = FreeKnots(still_ends=True).plan(SECTION_V, vehicle("B")).trajectory
+    trajectory = FreeKnots(segments=8, still_ends=True).plan(SECTION_V, vehicle("B")).trajectory
     for time in (0.0, trajectory.duration):
         np.testing.assert_allclose(trajectory.evaluate(time, 3), 0.0, atol=1e-7)
 
@@ -106,9 +107,11 @@ def test_reserve_leaves_the_rotors_more_at_the_cost_of_time() -> None:
 
 @pytest.mark.slow
 def test_more_segments_are_faster() -> None:
-    plan = FreeKnots(segments=16, start=planned("E")).plan(SECTION_V, vehicle("E"))
-    assert certified(plan)
-    assert plan.duration < planned("E").duration
+    few = FreeKnots(segments=4).plan(SECTION_V, vehicle("E"))
+    more = FreeKnots(start=few).plan(SECTION_V, vehicle("E"))
+    assert few.trajectory.segments == 4
+    assert certified(more)
+    assert more.duration < few.duration
 
 
 @pytest.mark.slow
@@ -172,7 +175,7 @@ def test_a_poor_start_is_no_excuse_for_a_plan_slower_than_the_miqp_s() -> None:
         load_problem(str(CASES / "poor-start.toml")),
         load_vehicle(str(CASES / "random-hexa.toml")),
     )
-    found = FreeKnots(segments=2, reserve=0.03).plan(problem, vehicle)
+    found = FreeKnots(reserve=0.03).plan(problem, vehicle)
     assert found.certified
     assert found.duration <= Miqp(reserve=0.03).plan(problem, vehicle).duration
 
@@ -187,7 +190,7 @@ def test_a_start_that_leads_to_no_optimum_gives_way_to_another() -> None:
 
 def test_progress_sees_every_attempt() -> None:
     seen: list[object] = []
-    plan = FreeKnots().plan(SECTION_V, vehicle("B"), seen.append)
+    plan = FreeKnots(segments=4).plan(SECTION_V, vehicle("B"), seen.append)
     assert tuple(seen) == plan.attempts
 
 

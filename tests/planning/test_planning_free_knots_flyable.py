@@ -106,7 +106,8 @@ def test_the_thrust_is_along_the_gates_upright_drag_counted() -> None:
     assert thrust_axes(plan, np.linspace(0.0, plan.duration, SAMPLES))[:, 2].min() > -1e-6
 
 
-@pytest.mark.parametrize(("at", "segments"), [(0.4, 2), pytest.param((0.55, 0.7), 4, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("at", "segments"), [(0.4, 2), ((0.55, 0.7), 4)])
 def test_a_gate_is_passed_when_its_stage_asks(at: CrossingTime, segments: int) -> None:
     gate = tilted_gate((2.5, 0.0, 0.0))
     problem = replace(LINE, gates=(gate,), maneuver=Line(GatePassage(at=at)))

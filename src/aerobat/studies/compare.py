@@ -194,8 +194,7 @@ def _improved(
         return entry
     if out_of_time():
         return entry
-    from_best = replace(planner, start=best, starts=2)
-    again = _entry(entry.planner, from_best, best.problem, best.vehicle, progress)
+    again = _entry(entry.planner, replace(planner, start=best), best.problem, best.vehicle, progress)
     found = "no plan" if alone is None else f"{alone:.3f} s"
     note = f"begun again from the plan of {best.duration:.3f} s by {best.planner}; {found} alone"
     if again.plan is None or (alone is not None and again.plan.duration >= alone):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from math import sqrt
 from typing import Annotated, Literal
@@ -136,11 +137,11 @@ class Miqp(Planner):
             least: The duration [s] that no motion falls short of.
         """
         task, recorder = attempts.task, attempts.recorder
-        whole = Refinement.of(task, recorder)
+        whole = replace(Refinement.of(task, recorder), grows=self.flies)
         segments = segments_for(task.stages, self.segments)
         found: Judged[RefinedPath] | Judged[Placement] | None = None
         for refinement in whole.with_and_without_rooms:
-            found = shortest(attempts, refinement, segments, scanned, least, self.flies) or found
+            found = shortest(attempts, refinement, segments, scanned, least) or found
             if found is not None and isinstance(found.solution.source, RefinedPath):
                 break
         if found is None:

@@ -42,7 +42,6 @@ def shortest(
     segments: int,
     scanned: tuple[float, float],
     least: float,
-    more_segments: bool,
 ) -> Judged[RefinedPath] | Judged[Placement] | None:
     """The shortest certified path found, or the first of a program that is flown as it is, or None.
 
@@ -52,9 +51,8 @@ def shortest(
         segments: Of a refined path.
         scanned: The scan's smallest and largest dt [s].
         least: The duration [s] that no motion falls short of: shorter programs are left out.
-        more_segments: Whether paths may have twice as many where they are much slower otherwise.
     """
-    scan, rough = _Scan(attempts, refinement, scanned, least, more_segments), list[RefinedPath]()
+    scan, rough = _Scan(attempts, refinement, scanned, least), list[RefinedPath]()
     for begun, (slots, guess) in enumerate(scan.starts(), 1):
         path = refinement.rough(guess, segments, min(map(_duration, rough), default=inf))
         if refinement.is_promising(path):
@@ -64,7 +62,7 @@ def shortest(
             break
     found: Judged[RefinedPath] | None = None
     for path in sorted(rough, key=_duration):
-        judged = refinement.finished(path, more_segments)
+        judged = refinement.finished(path)
         if judged.feasible:
             found = _shortened(judged, scan, segments)
             break
@@ -111,7 +109,7 @@ def _shorter(
     path = refinement.rough(start, segments, longest)
     if not refinement.is_promising(path) or _duration(path) >= longest:
         return None
-    found = refinement.finished(path, scan.more_segments)
+    found = refinement.finished(path)
     return found if found.feasible and found.solution.duration < longest else None
 
 
@@ -127,7 +125,6 @@ class _Scan:
     refinement: Refinement
     scanned: tuple[float, float]  # the smallest and the largest dt [s]
     least: float  # [s] of all intervals together
-    more_segments: bool  # whether paths may have twice as many
     known: list[_Slots] = field(default_factory=list)  # that lead to a path
     flown: Placement | None = None  # the answer that the vehicle can fly as it is
 

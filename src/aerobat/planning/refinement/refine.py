@@ -115,6 +115,7 @@ class Refinement:
     in_gates: tuple[BodyInGate, ...] = ()  # that the stages cross
     still_ends: bool = False  # without jerk
     close: bool = False  # whether paths come within a thousandth of what they come near otherwise
+    grows: bool = False  # whether paths get twice as many segments where they are much slower otherwise
     _known: dict[tuple[Stage, ...], StageValues] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -238,14 +239,10 @@ class Refinement:
             rounds.go_on(solution.source)
         return replace(solution.source, certified=certified)
 
-    def finished(self, rough: RefinedPath, more_segments: bool = False) -> Judged[RefinedPath]:
-        """The shortest certified path near a rough one, or the last one that was tried.
+    def finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
+        """The shortest certified path near one that is as fast as it gets, or the last one that was tried.
 
         Where the duration still falls, it goes on from the path that is certified.
-
-        Args:
-            rough: As fast as it gets.
-            more_segments: Whether it may have twice as many where it is much slower otherwise.
         """
         judged = self._finished(rough)
         judged = _shortest(judged, rough.certified) or judged
@@ -257,7 +254,7 @@ class Refinement:
             if not again.feasible or again.solution.duration >= solution.duration:
                 break
             judged = again
-        return self._with_more_segments(rough, judged) if more_segments else judged
+        return self._with_more_segments(rough, judged) if self.grows else judged
 
     def _with_more_segments(self, rough: RefinedPath, found: Judged[RefinedPath]) -> Judged[RefinedPath]:
         """The certified path that was found near a rough one, or a shorter one with twice as many segments.
@@ -272,7 +269,7 @@ class Refinement:
         finer = self.finer(rough, min(2 * path.segments, MAX_SEGMENTS), duration)
         if not self.is_promising(finer) or finer.path.trajectory.duration >= duration:
             return found
-        judged = self.finished(finer)
+        judged = replace(self, grows=False).finished(finer)
         is_better = judged.feasible and judged.solution.duration < duration and is_clear(judged.frames)
         return judged if is_better else found
 

@@ -1,0 +1,270 @@
+"""A race of paths: all starts are refined roughly, the fastest of them with more segments, the best is kept.
+
+Paths have many local optima. Where a start is does more for a plan's duration than how finely it is refined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, islice
+from math import inf
+
+import numpy as np
+
+from aerobat.errors import Infeasible, Reason, limits_of
+from aerobat.optimization.deadline import out_of_time, within_share
+from aerobat.planning.around.fastest import fastest_around
+from aerobat.planning.around.guesses import guesses
+from aerobat.planning.courses import is_course
+from aerobat.planning.miqp.miqp import Miqp
+from aerobat.planning.polynomial.starts import SLOWER_PACES, closed_forms, starts
+from aerobat.planning.refinement.flown import FlownPath
+from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
+from aerobat.planning.result import Plan
+from aerobat.planning.task import Task
+from aerobat.planning.time_limit import best_in_time
+from aerobat.planning.warm_start import WarmStart
+
+FINALISTS = (3, 1)  # of the fastest paths, that are given twice as many segments, then four times as many
+WORTHWHILE = 0.01  # of the duration: four times as many where twice as many gain more
+SAME = 1e-3  # of the duration: starts that come to nearly the same have come to the same path
+SLOWER = 1.5  # times the duration of a plan that knows no rotors
+PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, where paces are drawn
+SEED = 0
+ASIDE = 0.1  # of a path's extent, by which it is bent out of its plane: symmetry is an optimum of its own
+WINNERS = 3  # certified paths, the best of which is kept, where the first touches frames or loses much
+ROUGH_TIME = 0.5  # of the time that is left, where there is a limit, for rough rounds
+
+_Start = tuple[Plan | None, WarmStart]  # a path, and the plan that it is of, if it is one's
+
+
+def quick_guess() -> Miqp:
+    """The mixed-integer planner whose plan is a start: of few segments, not flown."""
+    return Miqp(segments=4, flies=False, rescue=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Race:
+    """The search of a planner for the fastest certified path, from a number of starts."""
+
+    planner: str
+    refinement: Refinement
+    starts: int  # paths in a race; a course's race alone, one after another, up to one clear of frames
+    segments: int  # of a path, at most, but one a phase between stages at least
+    leg_segments: int  # of a course's leg, at most
+    start: Plan | None  # whose path races alone, before these
+    guess: Miqp  # whose plan is one of the starts
+
+    def plan(self, time_limit: float | None) -> Plan:
+        """The fastest certified plan found; where none is faster, one that it began from.
+
+        Args:
+            time_limit: For planning [s]; None for as long as it takes.
+
+        Raises:
+            Infeasible: Nothing is certified.
+        """
+        task, recorder = self._task, self.refinement.recorder
+        found = best_in_time(task.problem, time_limit, recorder, self._fastest)
+        if found is not None:
+            return found
+        last = recorder.last_outcome
+        is_closed = len(task.environment.pieces) and next(guesses(task), None) is None
+        where = "between obstacles no way was found, and " if is_closed else ""
+        sentence = (
+            f"no path of '{task.problem.name}' is certified for {task.vehicle.name}: {where}at the last "
+            f"attempt {last}, which does not prove that there is none; widen what binds there, or give "
+            "other --segments"
+        )
+        raise Infeasible(Reason(sentence, limits_of(last)), recorder.attempts)
+
+    @property
+    def _task(self) -> Task:
+        return self.refinement.task
+
+    @property
+    def _least_segments(self) -> int:
+        """The number of segments of rough paths."""
+        return segments_for(self._task.stages, min(self.segments, SEGMENTS))
+
+    @property
+    def _most_segments(self) -> int:
+        """The number of segments that the fastest paths may have."""
+        stages, most = self._task.stages, self.segments
+        if is_course(stages):
+            most = max(most, self.leg_segments * (len(stages.stages) + 1))
+        return min(max(most, self._least_segments), MAX_SEGMENTS)
+
+    def _fastest(self) -> Plan | None:
+        """The fastest plan of all starts, or one that a start was, if that is faster."""
+        best, known = self._around(), list[Plan]()
+        for begun in self._races() if best is None else ():
+            known += [plan for plan, _ in begun if plan is not None]
+            found = self._with_or_without_rooms([path for _, path in begun])
+            best = min(filter(None, (best, found)), key=_Winner.rank, default=None)
+            if out_of_time() or (best is not None and best.path.is_clear):
+                break
+        return self._or_begun_from(None if best is None else self._plan(best), known)
+
+    def _or_begun_from(self, found: Plan | None, begun: Sequence[Plan]) -> Plan | None:
+        """What was found, or a better one of the plans that it began from, certified and with the reserve."""
+        task = self._task
+        plans = (plan if plan.vehicle == task.vehicle else plan.for_vehicle(task.vehicle) for plan in begun)
+        kept = [plan for plan in plans if plan.certified and plan.keeps(task.reserve)]
+        known = min(kept, key=lambda plan: plan.duration, default=None)
+        if known is None or (found is not None and found.certified and found.duration <= known.duration):
+            return found
+        said = f"{self.planner} found none better than the path that it began from, {known.planner}'s"
+        attempts = tuple(self.refinement.recorder.attempts)
+        return replace(known, planner=self.planner, attempts=attempts, rescue=said)
+
+    def _around(self) -> _Winner | None:
+        """The fastest path around obstacles; None where there are none, or no route leads to one."""
+        if self.start is not None or not len(self._task.environment.pieces):
+            return None
+        around = fastest_around(self.refinement, self._least_segments)
+        if around is None:
+            return None
+        found = _Winner(FlownPath.of(around.refinement, around.judged).through_gates())
+        return self._finished(around.refinement, [around.judged.solution.source], found)
+
+    def _races(self) -> Iterator[list[_Start]]:
+        """Yield the starts of races, the next one for where those before find no plan clear of frames."""
+        task = self._task
+        if self.start is not None:
+            yield [(self.start, WarmStart.of(self.start, task.stages))]
+        guess = replace(self.guess, reserve=task.reserve)
+        if is_course(task.stages):
+            for each in chain(starts(task, guess), closed_forms(task, SLOWER_PACES)):
+                yield [each]
+            return
+        with within_share(ROUGH_TIME):
+            others = list(starts(task, guess))
+            if not any(plan for plan, _ in others):
+                others = list(starts(task, replace(guess, segments=SEGMENTS)))
+        yield list(islice(_varied(sorted(others, key=_likeliest)), self.starts))
+
+    def _with_or_without_rooms(self, paths: Sequence[WarmStart]) -> _Winner | None:
+        """The fastest path near some, without rooms in gates where there is none with them."""
+        for refinement in self.refinement.with_and_without_rooms:
+            found = self._finished(refinement, self._rough(refinement, paths))
+            if found is not None or out_of_time():
+                return found
+        return None
+
+    def _finished(
+        self, refinement: Refinement, rough: Sequence[RefinedPath], best: _Winner | None = None
+    ) -> _Winner | None:
+        """The best of the certified paths near rough ones, the fastest of them first, and of a known one."""
+        starts, winners = tuple(map(_duration, rough)), [] if best is None else [best]
+        with within_share(ROUGH_TIME):
+            paths = self._with_more_segments(refinement, rough)
+        for path in paths:
+            if len(winners) >= WINNERS or (best is not None and (best.is_ahead_of(path) or out_of_time())):
+                break
+            judged = refinement.finished(path)
+            if judged.feasible:
+                winners.append(_Winner(FlownPath.of(refinement, judged).through_gates(), starts))
+                best = min(winners, key=_Winner.rank)
+        return best
+
+    def _rough(self, refinement: Refinement, begun: Sequence[WarmStart]) -> list[RefinedPath]:
+        """The rough paths near starts, without those that lose their way, the fastest first."""
+        found: list[RefinedPath] = []
+        for path in begun:
+            known = min(map(_duration, found), default=inf)
+            rough = refinement.rough(path, self._least_segments, known)
+            if refinement.is_promising(rough):
+                found.append(rough)
+            if found and out_of_time():
+                break
+        return sorted(found, key=_duration)
+
+    def _with_more_segments(
+        self, refinement: Refinement, paths: Sequence[RefinedPath]
+    ) -> Sequence[RefinedPath]:
+        """Sorted paths, the fastest with twice as many segments, and fewer of them again while that gains."""
+        for doubling, count in enumerate(FINALISTS, 1):
+            segments = min(2**doubling * self._least_segments, self._most_segments)
+            paths, known = _distinct(paths), inf
+            found = list(paths)
+            for path in paths[:count]:
+                if path.path.trajectory.segments < segments and not out_of_time():
+                    finer = refinement.finer(path, segments, known)
+                    if refinement.is_promising(finer):
+                        found.append(finer)
+                        known = min(known, _duration(finer))
+            found.sort(key=_duration)
+            if not found or _duration(found[0]) > (1.0 - WORTHWHILE) * _duration(paths[0]):
+                return found
+            paths = found
+        return paths
+
+    def _plan(self, winner: _Winner) -> Plan:
+        """The plan of what was found, with more reserve if its flight wants it."""
+        flown = winner.path.with_reserves() if self._task.reserve > 0.0 else winner.path
+        return flown.judged.plan(
+            self.refinement.recorder,
+            planner=self.planner,
+            order=5,
+            status=flown.judged.solution.status,
+            backend="builtin",
+            stages=flown.judged.solution.source.placed,
+            starts=winner.starts,
+        )
+
+
+@dataclass(frozen=True)
+class _Winner:
+    """A certified path, and what all starts of its race came to."""
+
+    path: FlownPath
+    starts: tuple[float, ...] = ()  # [s] roughly, rising
+
+    def rank(self) -> tuple[bool, float]:
+        """The key that sorts by what is best: clear of frames first, the shortest foremost."""
+        return not self.path.is_clear, self.path.duration
+
+    def is_ahead_of(self, rough: RefinedPath) -> bool:
+        """True if a rough path is not worth finishing."""
+        return self.path.is_clear and self.path.duration <= _duration(rough)
+
+
+def _likeliest(begun: _Start) -> tuple[bool, float]:
+    """The key that sorts starts: certified plans first, the shortest of them foremost."""
+    plan, path = begun
+    return plan is None or not plan.certified, path.trajectory.duration
+
+
+def _varied(begun: Sequence[_Start]) -> Iterator[_Start]:
+    """Yield starts, those that know no rotors also slower, then all at paces that are drawn, without end.
+
+    After each that nearly lies in a vertical plane comes the same bent out of it.
+    """
+    sources: list[_Start] = []
+    for plan, path in begun:
+        sources.append((plan, path))
+        if plan is None or plan.vehicle is None:
+            sources.append((None, path.time_scaled(SLOWER)))
+    paced, rng = sources, np.random.default_rng(SEED)
+    while sources:
+        for plan, path in paced:
+            yield plan, path
+            plane = path.plane()
+            if plane is not None:
+                yield None, path.bent(ASIDE * path.extent * plane)
+        paced = [
+            (None, path.at_other_pace(np.exp(rng.normal(0.0, PACE_SPREAD, len(path.phases)))))
+            for _, path in sources
+        ]
+
+
+def _distinct(paths: Sequence[RefinedPath]) -> list[RefinedPath]:
+    """Sorted paths without those that take nearly as long as the one before."""
+    before = [0.0, *map(_duration, paths)]
+    return [each for each, last in zip(paths, before, strict=False) if _duration(each) > (1.0 + SAME) * last]
+
+
+def _duration(path: RefinedPath) -> float:
+    return path.path.trajectory.duration
