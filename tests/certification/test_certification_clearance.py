@@ -139,7 +139,7 @@ def sphere_points(count: int) -> np.ndarray:
     return np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
 
 
-@examples(12)
+@examples(12, few=7)
 @given(seed=st.integers(0, 200), kind=st.sampled_from(KINDS), away=st.floats(0.0, 3.0))
 def test_the_bound_is_below_the_gap_of_every_instant_and_reached(seed, kind, away):
     """By our own planes, whose exactness has tests of its own."""
@@ -164,7 +164,7 @@ def test_the_bound_is_below_the_gap_of_every_instant_and_reached(seed, kind, awa
         assert found.bound <= found.value <= found.bound + 4e-4
 
 
-@examples(12)
+@examples(12, few=12)
 @given(gap=st.floats(-0.05, 0.5), tilt=st.floats(-1.0, 1.0))
 def test_a_hovering_body_is_as_near_to_a_wall_as_its_attitude_says(gap, tilt):
     """In closed form: it reaches √(wide² sin² + high² cos²) and what its centre is shifted."""

@@ -51,7 +51,7 @@ def bent(seed: int) -> tuple[Trajectory, Gate]:
 
 
 @given(st.integers(0, 2**32 - 1))
-@examples(60)
+@examples(60, few=15)
 def test_the_certificate_says_of_a_frame_what_the_flights_judge_says(seed: int) -> None:
     path, gate = bent(seed)
     passage = PlannedPassage(gate, 1.0, gate.up)

@@ -31,7 +31,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 @given(seeds)
-@examples(30)
+@examples(30, few=12)
 def test_a_sphere_leaves_what_its_path_leaves_but_its_shadow(seed: int) -> None:
     """On a straight path it sweeps its shadow along the velocity, r √(1 + (v_l/v_n)²) to the sides."""
     drawn = motion(seed)
@@ -47,7 +47,7 @@ def test_a_sphere_leaves_what_its_path_leaves_but_its_shadow(seed: int) -> None:
 
 
 @given(seeds)
-@examples(30)
+@examples(30, few=12)
 def test_moving_gate_and_flight_together_changes_nothing(seed: int) -> None:
     one = motion(seed)
     rng = np.random.default_rng([seed, 1])
@@ -66,7 +66,7 @@ def test_moving_gate_and_flight_together_changes_nothing(seed: int) -> None:
 
 
 @given(seeds, st.floats(0.001, 0.2))
-@examples(30)
+@examples(30, few=12)
 def test_an_edge_that_comes_nearer_takes_as_much_of_the_clearance(seed: int, nearer: float) -> None:
     one = motion(seed)
     before = one.passage()
@@ -84,7 +84,7 @@ def test_an_edge_that_comes_nearer_takes_as_much_of_the_clearance(seed: int, nea
 
 
 @given(seeds, st.floats(0.0, 0.5), st.floats(0.0, 0.5))
-@examples(30)
+@examples(30, few=12)
 def test_a_larger_opening_leaves_no_less_and_the_needed_one_just_nothing(
     seed: int, wider: float, higher: float
 ) -> None:
@@ -98,7 +98,7 @@ def test_a_larger_opening_leaves_no_less_and_the_needed_one_just_nothing(
 
 
 @given(seeds)
-@examples(12)
+@examples(12, few=4)
 def test_the_body_sweeps_of_the_plane_what_a_cloud_of_its_points_does(seed: int) -> None:
     """Points of its surface, each where it goes through the plane, at ten times the rate."""
     one = motion(seed)
@@ -165,7 +165,7 @@ def _turns(gate: ab.Gate) -> tuple[Array, Array]:
 
 
 @given(seeds)
-@examples(40)
+@examples(40, few=16)
 def test_a_path_that_bends_no_more_than_its_way_through_a_gate_clears_the_frame_and_does_not_turn_back(
     seed: int,
 ) -> None:
@@ -197,7 +197,7 @@ def test_a_path_that_bends_no_more_than_its_way_through_a_gate_clears_the_frame_
 
 
 @given(seeds)
-@examples(30)
+@examples(30, few=12)
 def test_a_body_turned_about_its_thrust_reaches_as_far_as_it_does_in_some_attitude_and_no_farther(
     seed: int,
 ) -> None:
@@ -293,7 +293,7 @@ def test_in_a_batch_each_vehicle_has_its_own_body(engine: str) -> None:
 
 
 @given(seeds)
-@examples(30)
+@examples(30, few=12)
 def test_a_coarse_log_finds_what_a_fine_one_finds(seed: int) -> None:
     """Within a millimetre, turning by up to 14 rad/s at up to 10 m/s."""
     one = motion(seed)

@@ -14,7 +14,7 @@ from aerobat.links.betaflight.process import require_firmware
 
 FAST, FULL = "fast", "full"
 FEW, MANY = 12, 50  # examples of a law that names no number, in either suite: the same ones on every run
-SHARE = 8  # of the examples that a law names, the default suite draws one in so many,
+SHARE = 4  # of the examples that a law names, the default suite draws one in so many,
 FEWEST = 3  # and no fewer than these, where it names as many
 
 # each group of tests that the default suite leaves out, and what its tests are
@@ -49,10 +49,16 @@ def register_profiles() -> None:
     settings.register_profile(FULL, max_examples=MANY, **common)
 
 
-def examples(count: int) -> Callable[[Any], Any]:
-    """Return the settings of a law that draws `count` examples in the full suite."""
-    is_full = settings.get_current_profile_name() == FULL
-    return settings(max_examples=count if is_full else min(count, max(FEWEST, count // SHARE)))
+def examples(count: int, few: int | None = None) -> Callable[[Any], Any]:
+    """Return the settings of a law.
+
+    Args:
+        count: Of the examples that it draws in the full suite.
+        few: Likewise in the default suite, where a share of these would let mutants live.
+    """
+    if settings.get_current_profile_name() == FULL:
+        return settings(max_examples=count)
+    return settings(max_examples=few or min(count, max(FEWEST, count // SHARE)))
 
 
 def browser() -> str | None:
