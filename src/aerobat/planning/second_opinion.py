@@ -14,7 +14,7 @@ from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
 from aerobat.simulation.autopilot import UndeterminedAttitude, recoveries
 
-OPINION_SEGMENTS = (2, 4)  # of free knots: two are quick and enough for a flip's five stages; else four
+OPINION = "free-knots"
 OPINION_RESERVE = 0.03  # of every limit's range, that a shorter plan keeps: it flies, if little disturbs it
 OPINION_TIME = 20.0  # [s] at most: a poor plan of a long course would keep free knots busy for an hour
 
@@ -66,24 +66,16 @@ def with_explanation(plan: Plan, progress: Progress | None = None) -> Plan:
 
 
 def _second_opinion(plan: Plan, progress: Progress | None) -> SecondOpinion:
-    for segments in OPINION_SEGMENTS:
-        opinion = _free_knots(plan, segments, progress)
-        if opinion.duration is not None:
-            return opinion
-    return replace(opinion, missing="the time was over") if out_of_time() else opinion
-
-
-def _free_knots(plan: Plan, segments: int, progress: Progress | None) -> SecondOpinion:
     """A shorter plan by free knots that is certified and flies, if there is one."""
-    options = f"--planner free-knots --segments {segments}"
-    free_knots: Any = planner_class("free-knots")
-    planner = free_knots(segments=segments, start=plan, reserve=OPINION_RESERVE)
+    free_knots: Any = planner_class(OPINION)
+    planner = free_knots(start=plan, reserve=OPINION_RESERVE)
+    opinion = SecondOpinion(f"--planner {OPINION}", None)
     try:
         found = planner.plan(plan.problem, plan.vehicle, progress)
     except (Infeasible, SpecError):
-        return SecondOpinion(options, None)
+        return replace(opinion, missing="the time was over") if out_of_time() else opinion
     shorter = found.certified and found.duration < plan.duration and found.flies
-    return SecondOpinion(options, found.duration if shorter else None)
+    return replace(opinion, duration=found.duration) if shorter else opinion
 
 
 def _require_vehicle(plan: Plan) -> None:

@@ -10,8 +10,8 @@ from pydantic import Field
 from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
+from aerobat.planning.multi_start import MultiStart, quick_guess
 from aerobat.planning.planners import Planner, option, planner
-from aerobat.planning.race import Race, quick_guess
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, Refinement
 from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
@@ -67,7 +67,7 @@ class TimeOptimal(Planner):
         """
         task = flown_task("time-optimal", problem, vehicle, self.reserve, self.clearance)
         refinement = Refinement.of(task, Recorder(progress))
-        return Race(
+        return MultiStart(
             planner="time-optimal",
             refinement=replace(refinement, close=is_course(task.stages)),
             starts=self.starts,

@@ -11,8 +11,8 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from aerobat.declaration import AS_IT_IS, NonNegative
+from aerobat.planning.multi_start import MultiStart, quick_guess
 from aerobat.planning.planners import Planner, option, planner
-from aerobat.planning.race import Race, quick_guess
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.refinement.refine import LEG_SEGMENTS, MAX_SEGMENTS, SEGMENTS, Refinement
 from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
@@ -68,7 +68,7 @@ class FreeKnots(Planner):
         certified.
         """
         task = flown_task("free-knots", problem, vehicle, self.reserve, self.clearance)
-        return Race(
+        return MultiStart(
             planner="free-knots",
             refinement=Refinement.of(task, Recorder(progress), self.still_ends),
             starts=STARTS,

@@ -1,4 +1,4 @@
-"""A race of paths: all starts are refined roughly, the fastest of them with more segments, the best is kept.
+"""Multi-start: paths are refined roughly from many starts, the fastest with more segments, the best is kept.
 
 Paths have many local optima. Where a start is does more for a plan's duration than how finely it is refined.
 """
@@ -33,7 +33,7 @@ SLOWER = 1.5  # times the duration of a plan that knows no rotors
 PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, where paces are drawn
 SEED = 0
 ASIDE = 0.1  # of a path's extent, by which it is bent out of its plane: symmetry is an optimum of its own
-WINNERS = 3  # certified paths, the best of which is kept, where the first touches frames or loses much
+FINISHED = 3  # certified paths, the best of which is kept, where the first touches frames or loses much
 ROUGH_TIME = 0.5  # of the time that is left, where there is a limit, for rough rounds
 
 _Start = tuple[Plan | None, WarmStart]  # a path, and the plan that it is of, if it is one's
@@ -45,15 +45,15 @@ def quick_guess() -> Miqp:
 
 
 @dataclass(frozen=True, eq=False)
-class Race:
-    """The search of a planner for the fastest certified path, from a number of starts."""
+class MultiStart:
+    """The search for the fastest certified path from a number of starts, for a planner."""
 
     planner: str
     refinement: Refinement
-    starts: int  # paths in a race; a course's race alone, one after another, up to one clear of frames
+    starts: int  # that are tried together; on a course one after another, up to one clear of frames
     segments: int  # of a path, at most, but one a phase between stages at least
     leg_segments: int  # of a course's leg, at most
-    start: Plan | None  # whose path races alone, before these
+    start: Plan | None  # whose path is tried alone, before these
     guess: Miqp  # whose plan is one of the starts
 
     def plan(self, time_limit: float | None) -> Plan:
@@ -99,10 +99,10 @@ class Race:
     def _fastest(self) -> Plan | None:
         """The fastest plan of all starts, or one that a start was, if that is faster."""
         best, known = self._around(), list[Plan]()
-        for begun in self._races() if best is None else ():
+        for begun in self._batches() if best is None else ():
             known += [plan for plan, _ in begun if plan is not None]
             found = self._with_or_without_rooms([path for _, path in begun])
-            best = min(filter(None, (best, found)), key=_Winner.rank, default=None)
+            best = min(filter(None, (best, found)), key=_Found.rank, default=None)
             if out_of_time() or (best is not None and best.path.is_clear):
                 break
         return self._or_begun_from(None if best is None else self._plan(best), known)
@@ -119,18 +119,18 @@ class Race:
         attempts = tuple(self.refinement.recorder.attempts)
         return replace(known, planner=self.planner, attempts=attempts, rescue=said)
 
-    def _around(self) -> _Winner | None:
+    def _around(self) -> _Found | None:
         """The fastest path around obstacles; None where there are none, or no route leads to one."""
         if self.start is not None or not len(self._task.environment.pieces):
             return None
         around = fastest_around(self.refinement, self._least_segments)
         if around is None:
             return None
-        found = _Winner(FlownPath.of(around.refinement, around.judged).through_gates())
+        found = _Found(FlownPath.of(around.refinement, around.judged).through_gates())
         return self._finished(around.refinement, [around.judged.solution.source], found)
 
-    def _races(self) -> Iterator[list[_Start]]:
-        """Yield the starts of races, the next one for where those before find no plan clear of frames."""
+    def _batches(self) -> Iterator[list[_Start]]:
+        """Yield starts that are tried together, the next where those before lead to no path clear of frames."""
         task = self._task
         if self.start is not None:
             yield [(self.start, WarmStart.of(self.start, task.stages))]
@@ -145,7 +145,7 @@ class Race:
                 others = list(starts(task, replace(guess, segments=SEGMENTS)))
         yield list(islice(_varied(sorted(others, key=_likeliest)), self.starts))
 
-    def _with_or_without_rooms(self, paths: Sequence[WarmStart]) -> _Winner | None:
+    def _with_or_without_rooms(self, paths: Sequence[WarmStart]) -> _Found | None:
         """The fastest path near some, without rooms in gates where there is none with them."""
         for refinement in self.refinement.with_and_without_rooms:
             found = self._finished(refinement, self._rough(refinement, paths))
@@ -154,19 +154,19 @@ class Race:
         return None
 
     def _finished(
-        self, refinement: Refinement, rough: Sequence[RefinedPath], best: _Winner | None = None
-    ) -> _Winner | None:
+        self, refinement: Refinement, rough: Sequence[RefinedPath], best: _Found | None = None
+    ) -> _Found | None:
         """The best of the certified paths near rough ones, the fastest of them first, and of a known one."""
-        starts, winners = tuple(map(_duration, rough)), [] if best is None else [best]
+        starts, certified = tuple(map(_duration, rough)), [] if best is None else [best]
         with within_share(ROUGH_TIME):
             paths = self._with_more_segments(refinement, rough)
         for path in paths:
-            if len(winners) >= WINNERS or (best is not None and (best.is_ahead_of(path) or out_of_time())):
+            if len(certified) >= FINISHED or (best is not None and (best.is_ahead_of(path) or out_of_time())):
                 break
             judged = refinement.finished(path)
             if judged.feasible:
-                winners.append(_Winner(FlownPath.of(refinement, judged).through_gates(), starts))
-                best = min(winners, key=_Winner.rank)
+                certified.append(_Found(FlownPath.of(refinement, judged).through_gates(), starts))
+                best = min(certified, key=_Found.rank)
         return best
 
     def _rough(self, refinement: Refinement, begun: Sequence[WarmStart]) -> list[RefinedPath]:
@@ -201,9 +201,9 @@ class Race:
             paths = found
         return paths
 
-    def _plan(self, winner: _Winner) -> Plan:
+    def _plan(self, found: _Found) -> Plan:
         """The plan of what was found, with more reserve if its flight wants it."""
-        flown = winner.path.with_reserves() if self._task.reserve > 0.0 else winner.path
+        flown = found.path.with_reserves() if self._task.reserve > 0.0 else found.path
         return flown.judged.plan(
             self.refinement.recorder,
             planner=self.planner,
@@ -211,13 +211,13 @@ class Race:
             status=flown.judged.solution.status,
             backend="builtin",
             stages=flown.judged.solution.source.placed,
-            starts=winner.starts,
+            starts=found.starts,
         )
 
 
 @dataclass(frozen=True)
-class _Winner:
-    """A certified path, and what all starts of its race came to."""
+class _Found:
+    """A certified path, and what all starts that were tried with it came to."""
 
     path: FlownPath
     starts: tuple[float, ...] = ()  # [s] roughly, rising
