@@ -130,7 +130,7 @@ class MultiStart:
         return self._finished(around.refinement, [around.judged.solution.source], found)
 
     def _batches(self) -> Iterator[list[_Start]]:
-        """Yield starts that are tried together, the next where those before lead to no path clear of frames."""
+        """Yield starts that are tried together, the next where these lead to no path clear of frames."""
         task = self._task
         if self.start is not None:
             yield [(self.start, WarmStart.of(self.start, task.stages))]
