@@ -94,13 +94,21 @@ def test_what_too_few_intervals_miss_is_rescued_and_said(quad: Vehicle) -> None:
 
 @pytest.mark.slow
 def test_a_path_that_is_certified_far_from_a_rough_one_gets_more_segments() -> None:
-    """Random problems whose best known plans take 3.13 s and 1.49 s; 3.37 s and 5.36 s were returned once."""
-    slow, poor = random_case(46, 23), random_case(46, 89)
-    planner = Miqp(reserve=FLYING_RESERVE)
-    assert plan(slow.problem, planner, slow.vehicle).duration < 3.2
-    found = plan(poor.problem, planner, poor.vehicle)
-    assert found.duration < 1.6
-    assert "no fast path of miqp with 20 intervals settled; planned with" in found.rescue
+    """A random problem whose best known plan takes 3.13 s; 3.37 s were returned once."""
+    case = random_case(46, 23)
+    assert plan(case.problem, Miqp(reserve=FLYING_RESERVE), case.vehicle).duration < 3.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "k", "best"), [(46, 89, 1.49), (51, 31, 2.289)])
+def test_a_plan_far_behind_a_path_that_nearly_held_is_looked_for_from_other_starts(
+    seed: int, k: int, best: float
+) -> None:
+    """Random problems for which 5.36 s and 2.577 s were returned once."""
+    case = random_case(seed, k)
+    found = plan(case.problem, Miqp(reserve=FLYING_RESERVE), case.vehicle)
+    assert found.duration < 1.05 * best
+    assert "no fast path of miqp with 20 intervals settled; planned by free-knots" in found.rescue
 
 
 @pytest.mark.slow

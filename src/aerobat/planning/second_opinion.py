@@ -68,14 +68,15 @@ def with_explanation(plan: Plan, progress: Progress | None = None) -> Plan:
 def _second_opinion(plan: Plan, progress: Progress | None) -> SecondOpinion:
     """A shorter plan by free knots that is certified and flies, if there is one."""
     free_knots: Any = planner_class(OPINION)
-    planner = free_knots(start=plan, reserve=OPINION_RESERVE)
-    opinion = SecondOpinion(f"--planner {OPINION}", None)
+    planner, shorter = free_knots(start=plan, reserve=OPINION_RESERVE), None
     try:
         found = planner.plan(plan.problem, plan.vehicle, progress)
+        if found.certified and found.duration < plan.duration and found.flies:
+            shorter = found.duration
     except (Infeasible, SpecError):
-        return replace(opinion, missing="the time was over") if out_of_time() else opinion
-    shorter = found.certified and found.duration < plan.duration and found.flies
-    return replace(opinion, duration=found.duration) if shorter else opinion
+        pass
+    missing = "the time was over" if shorter is None and out_of_time() else ""
+    return SecondOpinion(f"--planner {OPINION}", shorter, missing)
 
 
 def _require_vehicle(plan: Plan) -> None:
