@@ -110,3 +110,12 @@ def test_a_course_whose_fast_starts_lead_nowhere_is_planned_from_a_slower_one():
     assert found.certified
     assert found.flies
     assert [placed.gate for placed in found.stages] == [gate.name for gate in course.gates]
+
+
+@pytest.mark.slow
+def test_a_corkscrew_that_no_closed_form_leads_to_begins_at_a_program_of_more_intervals() -> None:
+    """With a Crazyflie and the reserve of the command line it was refused; the MIQP takes 4.75 s."""
+    found = plan("corkscrew", vehicle="crazyflie")
+    assert found.planner == "free-knots"
+    assert found.flies
+    assert found.duration < 4.75

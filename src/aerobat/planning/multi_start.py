@@ -13,11 +13,12 @@ from math import inf
 import numpy as np
 
 from aerobat.errors import Infeasible, Reason, limits_of
-from aerobat.optimization.deadline import out_of_time, within_share
+from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
 from aerobat.planning.around.fastest import fastest_around
 from aerobat.planning.around.guesses import guesses
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
+from aerobat.planning.miqp.rescue import with_more_intervals
 from aerobat.planning.polynomial.starts import SLOWER_PACES, closed_forms, starts
 from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
@@ -34,6 +35,7 @@ PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, wher
 SEED = 0
 ASIDE = 0.1  # of a path's extent, by which it is bent out of its plane: symmetry is an optimum of its own
 FINISHED = 3  # certified paths, the best of which is kept, where the first touches frames or loses much
+MORE_TIME = 10.0  # [s] of the processor, for a program of more intervals: of nine stages one takes four
 ROUGH_TIME = 0.5  # of the time that is left, where there is a limit, for rough rounds
 
 _Start = tuple[Plan | None, WarmStart]  # a path, and the plan that it is of, if it is one's
@@ -136,7 +138,7 @@ class MultiStart:
             yield [(self.start, WarmStart.of(self.start, task.stages))]
         guess = replace(self.guess, reserve=task.reserve)
         if is_course(task.stages):
-            for each in chain(starts(task, guess), closed_forms(task, SLOWER_PACES)):
+            for each in chain(starts(task, guess), closed_forms(task, SLOWER_PACES), self._of_more(guess)):
                 yield [each]
             return
         with within_share(ROUGH_TIME):
@@ -144,6 +146,18 @@ class MultiStart:
             if not any(plan for plan, _ in others):
                 others = list(starts(task, replace(guess, segments=SEGMENTS)))
         yield list(islice(_varied(sorted(others, key=_likeliest)), self.starts))
+
+    def _of_more(self, guess: Miqp) -> Iterator[_Start]:
+        """Yield the plans of mixed-integer programs of more intervals, of an open course."""
+        task = self._task
+        ways = () if task.stages.closed else with_more_intervals(guess, task.problem, task.vehicle)
+        for planner, _ in ways:
+            try:
+                with within_time(MORE_TIME, processor):
+                    plan = planner.plan(task.problem, task.vehicle)
+            except Infeasible:
+                continue
+            yield plan, WarmStart.of(plan, task.stages)
 
     def _with_or_without_rooms(self, paths: Sequence[WarmStart]) -> _Found | None:
         """The fastest path near some, without rooms in gates where there is none with them."""
