@@ -71,7 +71,7 @@ def test_plans_are_certified_and_as_fast_as_the_least_time_in_the_plane(name: st
     plan = planned(name)
     assert Evidence(Task.of(SECTION_V, vehicle(name)), plan.trajectory).certificate.certified
     assert certified(plan)
-    assert plan.trajectory.coefficients.shape[1:] == (10, 3)
+    assert plan.trajectory.coefficients.shape in ((8, 10, 3), (16, 10, 3))
     assert plan.duration / SETS[name][2] < 1.005
 
 

@@ -31,7 +31,7 @@ PROMISING_TIME = 15.0
 ONE_WAY = 0.75  # of the time that is left, for one way, so that the next has some
 # times the duration of a path that nearly held: of 300 random problems' plans those far from the best
 POOR = 1.1
-STARTS = "free-knots"  # the planner that begins at other paths too, quickly
+FREE_KNOTS = "free-knots"  # the planner that begins at other paths too, quickly
 MOTION = "time-optimal"  # the planner that begins at the most paths
 MOTIONS = 2  # that time-optimal starts from: further ones make motions faster, but seldom find the first
 
@@ -74,8 +74,9 @@ class Rescue:
         paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
         if plan.duration <= POOR * min((path.duration for path in paths), default=inf):
             return plan
-        kept = {"reserve": self.asked.reserve, "clearance": self.asked.clearance}
-        ways = chain([(cast(Any, planner_class(STARTS))(**kept), f"by {STARTS}")], more)
+        cls: Any = planner_class(FREE_KNOTS)
+        others = cls(reserve=self.asked.reserve, clearance=self.asked.clearance)
+        ways = chain([(others, f"by {FREE_KNOTS}")], more)
         with within_time(PROMISING_TIME, processor):
             return self._first(ways, f"no fast path of {with_these} settled", plan.duration) or plan
 
@@ -180,7 +181,7 @@ class Rescue:
             yield replace(self.asked, search=None, rescue=False), "with intervals that differ"
         if self.problem.maneuver.through_points:
             yield planner_with_reserve("min-snap", self.asked.reserve), "by min-snap"
-        yield planner_with_reserve("free-knots", self.asked.reserve), "by free-knots"
+        yield planner_with_reserve(FREE_KNOTS, self.asked.reserve), f"by {FREE_KNOTS}"
 
 
 def with_more_intervals(asked: Any, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
