@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerobat.certification import Envelope, PlannedPassage, Verdict, certify
+from aerobat.certification import Envelope, Verdict, certify
 from aerobat.flatness import reference
 from aerobat.problem import Gate, tilted_gate
+from aerobat.problem.planned_passage import PlannedPassage
 from aerobat.simulation.passages import Passage, log_rows, passages_in_log
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Ellipsoid, Vehicle, load_vehicle

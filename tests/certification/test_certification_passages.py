@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from aerobat import so3
-from aerobat.certification import Certificate, Envelope, Finding, PlannedPassage, Verdict, certify
-from aerobat.certification.envelope import CROSSING_SPEED
+from aerobat.certification import Certificate, Envelope, Finding, Verdict, certify
 from aerobat.evaluation import score
 from aerobat.flatness import reference
 from aerobat.planning import Miqp, Plan, load_plan, plan
@@ -24,6 +23,7 @@ from aerobat.problem import (
     tilted_gate,
 )
 from aerobat.problem.condition import Attitude, across
+from aerobat.problem.planned_passage import CROSSING_SPEED, PlannedPassage
 from aerobat.problem.stage import PLANNED_SHARE
 from aerobat.simulation import fly
 from aerobat.trajectory import Trajectory

@@ -15,11 +15,11 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
-from aerobat.certification import PlannedPassage
 from aerobat.kernels.gates.progress import GatePlane, GateProgress
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import PlacedStage, evidence
 from aerobat.problem import StageSequence
+from aerobat.problem.planned_passage import PlannedPassage
 from aerobat.simulation.metrics import Criteria
 from places import ROOT
 

@@ -13,11 +13,10 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage
-from aerobat.certification.envelope import PASSAGE_DEPTH
 from aerobat.engines.floats import FloatOps
 from aerobat.limits.body_in_gate import BodyInGate, extent_of_attitude, extent_of_thrust
 from aerobat.planning import PlacedStage
+from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.reporting.plain_data import plain
 from aerobat.reporting.report import Report
 from aerobat.simulation import Outcome

@@ -11,8 +11,8 @@ import pytest
 import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification.envelope import PASSAGE_DEPTH
 from aerobat.problem.condition import Attitude
+from aerobat.problem.planned_passage import PASSAGE_DEPTH
 from aerobat.simulation import Outcome
 from gate_motions import CRUISE, SPEED
 from score_cases import QUAD, assert_same

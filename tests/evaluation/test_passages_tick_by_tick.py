@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.engines.floats import ArrayOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels.gates import progress
 from aerobat.problem.ball import Ball
+from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.simulation import Outcome
 from aerobat.simulation.metrics import Criteria, metrics_of_log
 from aerobat.simulation.passages import (

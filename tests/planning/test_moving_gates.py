@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.certification import Envelope, PlannedPassage, Verdict, certify
+from aerobat.certification import Envelope, Verdict, certify
 from aerobat.planning import PlacedStage
+from aerobat.problem.planned_passage import PlannedPassage
 from aerobat.simulation import Outcome
 
 QUAD = replace(ab.load_vehicle("agile-quad"), drag_body=np.zeros(3))

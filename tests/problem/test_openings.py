@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.arrays import Array
-from aerobat.certification import Envelope, PlannedPassage, Verdict
+from aerobat.certification import Envelope, Verdict
 from aerobat.declaration import from_table, to_table
 from aerobat.errors import SpecError
 from aerobat.evaluation.opening import opening_of
 from aerobat.planning.passages import require_openings
 from aerobat.problem.gate import in_opening
 from aerobat.problem.opening import Circle, OpeningShape, Polygon, Rectangle
+from aerobat.problem.planned_passage import PlannedPassage
 from aerobat.reporting.scene.glyphs import gate_bars
 from aerobat.simulation.plants.mujoco import _frame_bars
 from gate_motions import motion

@@ -9,7 +9,7 @@ import numpy as np
 import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage
+from aerobat.problem.planned_passage import PlannedPassage
 from aerobat.simulation.passages import log_rows, passages_in_log
 
 RATE = 500.0  # [1/s] as flights are logged

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage
-from aerobat.certification.envelope import PASSAGE_DEPTH
 from aerobat.engines.floats import ArrayOps
 from aerobat.engines.pytree import components, tree_map
 from aerobat.kernels.gates import progress
@@ -20,6 +18,7 @@ from aerobat.kernels.gates.progress import GateProgress
 from aerobat.kernels.gates.section import extent, gap, section
 from aerobat.kernels.gates.snapshot import Snapshot, between
 from aerobat.kernels.gates.swath import Swath, swept_between
+from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.simulation.passages import PASSAGE_WINDOW, bounding_ellipsoid, gate_places
 from aerobat.vehicle import Ellipsoid
 

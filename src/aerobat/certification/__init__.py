@@ -2,15 +2,13 @@
 
 from aerobat.certification.certificate import Certificate, Discontinuity, Finding, Side, Verdict
 from aerobat.certification.certify import certify
-from aerobat.certification.envelope import Envelope, PlannedPassage, PlannedWaypoint
+from aerobat.certification.envelope import Envelope
 
 __all__ = [
     "Certificate",
     "Discontinuity",
     "Envelope",
     "Finding",
-    "PlannedPassage",
-    "PlannedWaypoint",
     "Side",
     "Verdict",
     "certify",

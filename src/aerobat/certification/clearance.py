@@ -31,9 +31,9 @@ from aerobat.certification.certificate import Finding, Side, Verdict
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.extrema import parabola_maximum
 from aerobat.certification.enclosure.queries import SUMMATION_ROUNDING
-from aerobat.certification.envelope import PASSAGE_DEPTH, PlannedPassage
 from aerobat.environment.obstacles import Pieces
 from aerobat.problem import Gate
+from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.trajectory.subintervals import Subintervals
 
 CLEARANCE_TIGHTNESS = 3e-4  # [m] how near the proven bound is to what is reached

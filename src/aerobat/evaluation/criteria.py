@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.declaration import unit
 from aerobat.planning import Plan
 from aerobat.planning.passages import timed_stages
 from aerobat.problem.ball import Ball
 from aerobat.problem.condition import Quantity
+from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.simulation.metrics import Criteria

@@ -9,11 +9,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Protocol, TypeVar
 
-from aerobat.certification import Finding, PlannedPassage, Verdict
-from aerobat.certification.envelope import PASSAGE_DEPTH
+from aerobat.certification import Finding, Verdict
 from aerobat.limits.body_in_gate import FRAME_CLEARANCE, BodyInGate
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.task import Task
+from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.problem.stage import Stage
 
 

@@ -14,13 +14,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from aerobat.certification.envelope import CROSSING_SPEED
 from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.optimization.deadline import within_time
 from aerobat.planning.passages import as_passed
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
 from aerobat.problem import Gate, Problem
+from aerobat.problem.planned_passage import CROSSING_SPEED
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 

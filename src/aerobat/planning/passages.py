@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification.envelope import PlannedPassage, PlannedWaypoint
 from aerobat.errors import Reason, SpecError
 from aerobat.flatness import force_balance
 from aerobat.limits.clearance import Clearance
 from aerobat.problem.gate import Gate
+from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.simulation.outcome import length

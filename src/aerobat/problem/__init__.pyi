@@ -28,6 +28,7 @@ from .maneuvers import (
     Waypoints,
 )
 from .maneuvers.maneuver import maneuver, registered_maneuvers
+from .planned_passage import PlannedPassage, PlannedWaypoint
 from .problem import PAPER_LIMITS, Limits, Problem
 from .stage import Stage, StageSequence
 from .tolerance import Tolerance
@@ -61,6 +62,8 @@ __all__ = [
     "MattyFlip",
     "PassGate",
     "PassWaypoint",
+    "PlannedPassage",
+    "PlannedWaypoint",
     "PowerLoop",
     "Problem",
     "Quantity",

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.certification import PlannedPassage, PlannedWaypoint
 from aerobat.engines.floats import ArrayOps
 from aerobat.engines.pytree import Tree, components, tree_leaves, tree_map
 from aerobat.environment import Environment
@@ -27,6 +26,7 @@ from aerobat.kernels.running_metrics import (
     RunningMetrics,
     lowest_height,
 )
+from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.simulation.components import rotor_commands
 from aerobat.simulation.flight import Flight
 from aerobat.simulation.loop import Component, Signals

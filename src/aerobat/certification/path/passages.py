@@ -13,10 +13,10 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Finding, Side, Verdict
-from aerobat.certification.envelope import PlannedPassage, PlannedWaypoint
 from aerobat.environment import Environment
 from aerobat.flatness import force_balance, has_unequal_drag, reference
 from aerobat.flatness.references import UNDETERMINED
+from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 

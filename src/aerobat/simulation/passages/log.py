@@ -11,13 +11,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification.envelope import PlannedPassage
 from aerobat.engines import choose
 from aerobat.engines.engine import Init, Step, first_row
 from aerobat.engines.pytree import Tree, components, tree_leaves, tree_map, tree_stack
 from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.snapshot import Snapshot
 from aerobat.kernels.ops import Ops, Scalar
+from aerobat.problem.planned_passage import PlannedPassage
 from aerobat.simulation.passages.passage import Passage, bounding_ellipsoid, gate_places, passages
 from aerobat.vehicle import Ellipsoid
 

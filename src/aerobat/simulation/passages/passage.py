@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.certification.envelope import PASSAGE_DEPTH, PlannedPassage
 from aerobat.declaration import by_value
 from aerobat.engines.pytree import components, tree_map
 from aerobat.kernels.gates.progress import GatePlane, GateProgress
@@ -31,6 +30,7 @@ from aerobat.kernels.gates.snapshot import Bend, PlaceMotion
 from aerobat.kernels.gates.swath import NOWHERE, Extreme, Swath
 from aerobat.problem.gate import Gate
 from aerobat.problem.opening import EdgeProbe, edge_name
+from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.vehicle import Ellipsoid
 

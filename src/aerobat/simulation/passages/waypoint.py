@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.certification.envelope import PlannedWaypoint
 from aerobat.declaration import by_value
 from aerobat.engines.pytree import components
 from aerobat.kernels.gates.approach import Approach, Target
+from aerobat.problem.planned_passage import PlannedWaypoint
 from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, one_of_many
 

@@ -1,0 +1,53 @@
+"""Gates and waypoints at their instants: what a certificate and a flight are held to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerobat.declaration import Count, Label, NonNegative, Number, UnitVector, declared
+from aerobat.problem.ball import Ball
+from aerobat.problem.condition import Condition, Quantity
+from aerobat.problem.gate import Gate
+from aerobat.problem.stage import PARALLEL, Stage
+
+CROSSING_SPEED = 1e-3  # [m/s] a path that is slower in the gate's plane does not cross it
+PASSAGE_DEPTH = 0.05  # [m] beyond the plane, where who crosses it has not merely stopped in it
+
+
+@declared
+class PlannedPassage:
+    """A gate to be passed at an instant: its plane crossed in its direction, inside its opening."""
+
+    gate: Gate
+    time: NonNegative  # [s]
+    up: UnitVector  # where the thrust axis shall point
+    attitude_tolerance: Number = np.inf  # [rad] between them, at most; infinite where no attitude is asked
+    min_speed: NonNegative = CROSSING_SPEED  # [m/s] in the gate's direction; 0 where it may be met along it
+    margin: NonNegative = 0.0  # [m] from the edges of its opening
+    lap: Count = 1  # of a course
+
+    @classmethod
+    def of(cls, stage: Stage, gate: Gate, time: float) -> PlannedPassage:
+        """The passage that a stage of `Problem.stages` asks for, placed at a time [s]."""
+        min_speed = 0.0 if any(_keeps_from(gate, each) for each in stage.conditions) else CROSSING_SPEED
+        if stage.attitude is None:
+            return cls(gate, time, gate.up, min_speed=min_speed, margin=stage.margin, lap=stage.lap)
+        asked = stage.attitude.up, gate.attitude_tolerance
+        return cls(gate, time, *asked, min_speed, stage.margin, stage.lap)
+
+
+@declared
+class PlannedWaypoint:
+    """A ball to be met at an instant."""
+
+    name: Label
+    ball: Ball
+    time: NonNegative  # [s]
+    lap: Count = 1  # of a course
+
+
+def _keeps_from(gate: Gate, condition: Condition) -> bool:
+    """True if a condition forbids to move in the gate's direction."""
+    along = float(condition.direction @ gate.normal)
+    forward = condition.upper if along > 0 else -condition.lower
+    return condition.quantity is Quantity.VELOCITY and abs(along) > PARALLEL and forward <= 0
