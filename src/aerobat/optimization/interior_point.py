@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from aerobat.arrays import Array
 from aerobat.optimization.deadline import out_of_time
@@ -226,7 +226,11 @@ class _InteriorPoint:
         self._merit = _Merit()
 
     def run(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
-        """Descend."""
+        """Descend; what makes no sense on the way, or lies at the edge of the box, is infinite."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self._descended(start, multipliers)
+
+    def _descended(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
         iterate, costs, jammed = self._begun(start, multipliers), [], False
         if not np.isfinite(iterate.point.inequalities).all():
             return InteriorPointResult(iterate.x, False, 0, iterate.z)  # no step leads on from there
@@ -396,8 +400,7 @@ class _InteriorPoint:
     def _value(self, x: Array, slacks: Array, point: ConstrainedPoint) -> _Value:
         """Violation and barrier function; the violation is infinite where there is no number."""
         missed = float(np.abs(point.inequalities + slacks).sum() + np.abs(point.equalities).sum())
-        with np.errstate(divide="ignore"):  # infinite at the edge of the box
-            logarithms = np.log(slacks).sum() + np.log((x - self._lower) * (self._upper - x)).sum()
+        logarithms = np.log(slacks).sum() + np.log((x - self._lower) * (self._upper - x)).sum()
         barrier = float(self._cost @ x - self._barrier * logarithms)
         return _Value(missed if np.isfinite(missed) else np.inf, barrier)
 
@@ -434,9 +437,9 @@ class _Equations:
     def __init__(self, at: _Iterate, method: _InteriorPoint) -> None:
         lower, upper = at.x - method._lower, method._upper - at.x
         matrix = at.point.curvature(at.z, at.y, at.z / at.slacks)
-        matrix[np.diag_indices_from(matrix)] += at.z_lower / lower + at.z_upper / upper
+        _diagonal(matrix)[:] += at.z_lower / lower + at.z_upper / upper
         self._equal = at.point.equality_rows
-        largest = max(1.0, np.abs(np.diag(matrix)).max())
+        largest = max(1.0, np.abs(_diagonal(matrix)).max())
         self._weight = largest * _EQUALITY_WEIGHT if len(self._equal) else 0.0
         self._matrix = matrix + self._weight * (self._equal.T @ self._equal)
         barrier = self._barrier = method._barrier
@@ -445,13 +448,14 @@ class _Equations:
 
     def factorize(self, damping: float) -> bool:
         """Factorize the damped matrix; False where it is not positive definite."""
-        try:
-            damped = self._matrix + damping * np.eye(len(self._matrix))
-            self._factor = cho_factor(damped, check_finite=False, overwrite_a=True)
-        except LinAlgError:
+        damped = self._matrix.copy()
+        _diagonal(damped)[:] += damping
+        self._factor, failed = dpotrf(damped.T, clean=False, overwrite_a=True)
+        if failed:
             return False
-        self._moved = cho_solve(self._factor, self._equal.T, check_finite=False)
-        self._schur = self._equal @ self._moved + 1e-14 * np.eye(len(self._equal))
+        self._moved, _ = dpotrs(self._factor, self._equal.T)
+        self._schur = self._equal @ self._moved
+        _diagonal(self._schur)[:] += 1e-14
         return True
 
     def step(self, missed: Array, equal: Array) -> _Step:
@@ -460,7 +464,7 @@ class _Equations:
         sigma, fitting = at.z / at.slacks, self._barrier / at.slacks
         right = -self._residual - at.point.rows.transposed(fitting + sigma * missed)
         right -= self._weight * (self._equal.T @ equal)
-        x = cho_solve(self._factor, right, check_finite=False)
+        x, _ = dpotrs(self._factor, right)
         y = np.linalg.solve(self._schur, self._equal @ x + equal)
         x = x - self._moved @ y
         slacks = -missed - at.point.rows.times(x)
@@ -473,5 +477,10 @@ def _largest(values: Array) -> float:
 
 def _to_zero(values: Array, changes: Array) -> float:
     """How much of the changes positive values stand, at most all of it."""
-    falling = changes < 0.0
-    return min(1.0, float((-_NEARLY * values[falling] / changes[falling]).min(initial=1.0)))
+    fall = float((-changes / values).max(initial=0.0))
+    return _NEARLY / fall if fall > _NEARLY else 1.0
+
+
+def _diagonal(matrix: Array) -> Array:
+    """The diagonal (n,) of a square matrix, in place."""
+    return matrix.reshape(-1)[:: len(matrix) + 1]

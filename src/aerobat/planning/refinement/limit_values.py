@@ -42,6 +42,11 @@ class Frames:
     axes: Array  # (m, 3, 3)
     planes: Planes | None  # between body and obstacles, where there are any
 
+    @cached_property
+    def triads(self) -> Array:
+        """The axes one after another, (m, 9)."""
+        return np.swapaxes(self.axes, 1, 2).reshape(-1, 9)
+
 
 @dataclass(frozen=True, eq=False)
 class LimitValues:
@@ -97,10 +102,10 @@ class LimitValues:
         """The constraints at derivatives (m, 6, 3), (m, c), infinite where thrust is against its frame."""
         found = self._functions.values(self._shared, self._given(derivatives, near), NO_DIRECTION)
         with np.errstate(invalid="ignore"):
-            values = found[0].T @ self.measured.T
+            values = np.asarray(found[0].T @ self.measured.T)
         values[:, self.linear] = derivatives.reshape(-1, 18) @ self.path.T
         values -= self._bounds
-        values = np.where(np.isnan(values), np.inf, values)
+        values[np.isnan(values)] = np.inf
         if near.planes is None:
             return values
         return np.concatenate([values, self.clearances.values(derivatives, near.planes)], axis=1)
@@ -125,10 +130,8 @@ class LimitValues:
         held = len(self._held)
         of_measures = weights[:, :held] @ self.measured, squares[:, :held] @ self._products
         given = self._given(derivatives, near, *of_measures)
-        second = np.zeros((len(derivatives), 18, 18))
-        second[:, 3:, 3:] = self._functions.curvature(self._shared, given, DIRECTIONS).transpose(2, 1, 0)
-        products = self.path[:, :, None] * self.path[:, None]
-        second += np.tensordot(squares[:, :held][:, self.linear], products, 1)
+        second = (squares[:, :held][:, self.linear] @ self._path_products).reshape(-1, 18, 18)
+        second[:, 3:, 3:] += self._functions.curvature(self._shared, given, DIRECTIONS).transpose(2, 1, 0)
         if near.planes is not None:
             beside = self.clearances.slopes(derivatives, near.planes).reshape(len(derivatives), -1, 18)
             second += np.swapaxes(beside, 1, 2) @ (squares[:, held:, None] * beside)
@@ -138,8 +141,8 @@ class LimitValues:
 
     def _given(self, derivatives: Array, near: Frames, *more: Array) -> Array:
         """Velocity to crackle, then body axes, then more, (m, 24 or more)."""
-        axes = np.swapaxes(near.axes, 1, 2).reshape(-1, 9)
-        return np.concatenate([derivatives[:, MOVING].reshape(-1, MOTION), axes, *more], axis=1)
+        motion = derivatives.reshape(-1, 18)[:, -MOTION:]
+        return np.concatenate([motion, near.triads, *more], axis=1)
 
     def _axes(self, times: Array, derivatives: Array) -> Array:
         """Body axes in the world, as columns, (m, 3, 3)."""
@@ -190,6 +193,11 @@ class LimitValues:
         """Weights of the limits that are linear in the path's derivatives, (l, 18)."""
         rows = [sign / limit.size * limit.quantity.path for limit, sign in self._held]
         return np.array(rows).reshape(-1, 18)[self.linear]
+
+    @cached_property
+    def _path_products(self) -> Array:
+        """Products of the weights of each of these, (l, 324)."""
+        return np.asarray((self.path[:, :, None] * self.path[:, None]).reshape(-1, 18 * 18))
 
     @cached_property
     def _bounds(self) -> Array:

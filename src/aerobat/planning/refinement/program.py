@@ -169,12 +169,11 @@ class RefinedPoint:
         """Limits at places, windows of stages, and what stages ask."""
         program = self.program
         values = program.limits.values(self._derivatives.reshape(-1, 6, 3), program.near)
-        with np.errstate(invalid="ignore"):  # of infinite ones that do not count
-            values = values.reshape(program.counts.shape) * program.weights + program.backoff[:, None]
+        values = values.reshape(program.counts.shape) * program.weights + program.backoff[:, None]
+        values[~program.counts] = LIMITED
         rows, bounds = program.windows
         windows = rows @ self._ratios - bounds
-        at_stages = program.stages.inequalities(self._at_stages)
-        return np.concatenate([np.where(program.counts, values, LIMITED).ravel(), windows, at_stages])
+        return np.concatenate([values.ravel(), windows, program.stages.inequalities(self._at_stages)])
 
     @cached_property
     def equalities(self) -> Array:
@@ -255,7 +254,7 @@ class RefinedPoint:
         slopes = self._ends.slopes[segments, 0].reshape(len(at), 18, spline.columns.shape[1])
         rows = np.zeros((len(at), spline.size + 1))
         by_local = (weights.reshape(len(at), 1, 18) @ slopes)[:, 0]
-        np.put_along_axis(rows, spline.columns[segments], by_local, axis=1)
+        rows[np.arange(len(at))[:, None], spline.columns[segments]] = by_local
         return rows[:, :-1]
 
     @property

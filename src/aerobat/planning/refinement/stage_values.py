@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerobat.arrays import Array, Indices, Mask
+from aerobat.arrays import Array, Indices
 from aerobat.engines.llvm.functions import NO_DIRECTION, SmoothFunctions, smooth_functions, triples
 from aerobat.kernels.ops import Ops, Scalar
 from aerobat.kernels.vectors import add, add_scaled
@@ -40,8 +40,7 @@ class StageValues:
 
     def inequalities(self, derivatives: Array) -> Array:
         """The values, (q,)."""
-        at, weights, bounds, equal = self._linear
-        linear = np.sum(weights[~equal] * derivatives[at[~equal]], axis=(1, 2)) - bounds[~equal]
+        linear = self._unequal.values(derivatives)
         balls = [float(offset @ offset) - BALL_SHARE for _, offset, _ in self._in_balls(derivatives)]
         rooms = [
             room.scale * room.functions.values(*room.given(derivatives), NO_DIRECTION)[0, :, 0]
@@ -53,17 +52,18 @@ class StageValues:
     def inequality_count(self) -> int:
         """q."""
         rooms = sum(len(room.scale) for room in self._rooms)
-        return int((~self._linear[3]).sum()) + len(self._balls) + rooms
+        return len(self._unequal.bounds) + len(self._balls) + rooms
 
     def equalities(self, derivatives: Array) -> Array:
         """The values, (p,)."""
-        at, weights, bounds, equal = self._linear
-        return np.asarray(np.sum(weights[equal] * derivatives[at[equal]], axis=(1, 2)) - bounds[equal])
+        return self._equal.values(derivatives)
 
     def inequality_slopes(self, derivatives: Array) -> tuple[Indices, Array]:
         """The stages of inequalities, (q,), and their slopes by the derivatives there, (q, 6, 3)."""
-        at, weights, _, equal = self._linear
-        stages, slopes = at[~equal].tolist(), [*weights[~equal]]
+        at, weights, _ = self._unequal
+        if not (self._balls or self._rooms):
+            return at, weights
+        stages, slopes = at.tolist(), [*weights]
         for stage, offset, radius in self._in_balls(derivatives):
             stages.append(stage)
             slopes.append(np.zeros((6, 3)))
@@ -78,8 +78,7 @@ class StageValues:
 
     def equality_slopes(self) -> tuple[Indices, Array]:
         """The stages of equalities, (p,), and their slopes by the derivatives there, (p, 6, 3)."""
-        at, weights, _, equal = self._linear
-        return at[equal], weights[equal]
+        return self._equal.at, self._equal.weights
 
     def second_derivatives(self, derivatives: Array, weights: Array) -> Array:
         """Return the second derivatives of the weighted inequalities, (stages, 9, 9).
@@ -87,7 +86,7 @@ class StageValues:
         The derivatives are by position, velocity and acceleration at stages.
         """
         found = np.zeros((len(self.stages), STATE, STATE))
-        first = int((~self._linear[3]).sum())
+        first = len(self._unequal.bounds)
         for stage, _, radius in self._in_balls(derivatives):
             found[stage, :3, :3] += weights[first] * 2.0 / radius**2 * np.eye(3)
             first += 1
@@ -107,19 +106,26 @@ class StageValues:
         return tuple((k, stage.ball) for k, stage in enumerate(self.stages) if stage.ball is not None)
 
     @cached_property
-    def _linear(self) -> tuple[Indices, Array, Array, Mask]:
-        """Conditions as weights · derivatives ≤ bounds: stages (q,), weights, bounds, equalities."""
+    def _unequal(self) -> _Linear:
+        return self._conditions(equal=False)
+
+    @cached_property
+    def _equal(self) -> _Linear:
+        return self._conditions(equal=True)
+
+    def _conditions(self, equal: bool) -> _Linear:
+        """Those conditions of stages that are equalities, or those that are not."""
         rows = [
-            (k, *row, condition.lower == condition.upper)
+            (k, *row)
             for k, stage in enumerate(self.stages)
             for condition in stage.conditions
-            for row in _sides(limit_of(condition, self.task.balance), condition.lower == condition.upper)
+            if (condition.lower == condition.upper) is equal
+            for row in _sides(limit_of(condition, self.task.balance), equal)
         ]
-        return (
+        return _Linear(
             np.array([row[0] for row in rows], dtype=np.intp),
             np.array([row[1] for row in rows]).reshape(-1, 6, 3),
             np.array([row[2] for row in rows]),
-            np.array([row[3] for row in rows], dtype=bool),
         )
 
     @cached_property
@@ -135,6 +141,18 @@ class StageValues:
             )
             for body in self.in_gates
         )
+
+
+class _Linear(NamedTuple):
+    """Conditions as weights · derivatives ≤ bounds, or = bounds."""
+
+    at: Indices  # the stage of each, (q,)
+    weights: Array  # (q, 6, 3)
+    bounds: Array  # (q,)
+
+    def values(self, derivatives: Array) -> Array:
+        """The excess over bounds of derivatives at stages (stages, 6, 3), (q,)."""
+        return np.asarray(np.einsum("qka,qka->q", self.weights, derivatives[self.at]) - self.bounds)
 
 
 class _Room(NamedTuple):
