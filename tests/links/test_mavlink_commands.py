@@ -28,6 +28,7 @@ from places import SUPPORT
 
 Flown = tuple[dict[str, Any], str]  # a flight's report, and what was said of it
 SPEEDS = ("0.3", "0.1", "0.03")  # of the wall's time: a machine that does much else at once keeps up
+MAVSDK_SPEEDS = ("3", "1", "0.5")  # likewise; MAVSDK takes three seconds without a heartbeat for a loss
 
 
 def free_port() -> int:
@@ -131,11 +132,17 @@ def flown_at(speed: str, plan: Path, name: str) -> Flown:
 @pytest.mark.peer
 @pytest.mark.process
 def test_mavsdk_takes_off_goes_somewhere_flies_offboard_and_lands() -> None:
-    """A client that others wrote takes our vehicle for one that it knows."""
+    """A client that others wrote takes our vehicle for one that it knows.
+
+    Where the machine does not keep up, set-points or heartbeats are late: then it is flown again, slower.
+    """
     script = SUPPORT / "mavsdk_flight.py"
-    with simulated_vehicle("--speed", "3") as address:
-        command = [sys.executable, str(script), address.replace("udp:", "udpout://")]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    for speed in MAVSDK_SPEEDS:
+        with simulated_vehicle("--speed", speed) as address:
+            command = [sys.executable, str(script), address.replace("udp:", "udpout://")]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if not re.search("TIMEOUT|no set-points|timed out", done.stderr):
+            break
     words = [line for line in done.stdout.splitlines() if "[" not in line]
     assert words == ["took off", "went there", "flew offboard", "landed"], done.stderr
 
