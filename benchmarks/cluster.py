@@ -1,8 +1,9 @@
 """Flights on a cluster: the same bits as in one process, and the processor time that sharing them takes.
 
 Starts a Dask scheduler and three worker processes on this machine, and flies half-flip under `lab` in this
-process, in two processes, and on the cluster, where one worker is killed in mid-run the second time. The
-floor is an overhead of 5 % of the processor's time at 10^5 flights. Each kind flies a little first, so that
+process, in three processes, and on the cluster, where one worker is killed in mid-run the second time. The
+floor is an overhead of 5 % of the processor's time at 10^5 flights, of the cluster over as many processes of
+this machine: those share its cores and caches as the workers do. Each kind flies a little first, so that
 imports and compilations are not counted; of several rounds, the least time of each kind counts. What the
 idle cluster takes (its heartbeats) is measured first, and taken off. Linux only: processor times are read
 from /proc.
@@ -37,7 +38,8 @@ def main() -> None:
     options = {"threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
     with distributed.LocalCluster(n_workers=WORKERS, **options) as cluster:
         address = cluster.scheduler_address.replace("tcp://", "dask://")
-        kinds = {"one process": 1, "two processes": 2, f"{WORKERS} Dask workers": address}
+        alike = f"{WORKERS} processes"
+        kinds = {"one process": 1, alike: WORKERS, f"{WORKERS} Dask workers": address}
         for at_work in kinds.values():
             ab.sweep(plan, "lab", 2000, workers=at_work)
         began = processor_time()
@@ -52,12 +54,11 @@ def main() -> None:
                 spent[kind].append(took)
                 found.append(swept)
             assert found[0] == found[1] == found[2], "other bits"
-        alone = spent["one process"]
         for kind, took in spent.items():
-            report(kind, runs, took, alone)
+            report(kind, runs, took, spent[alike])
         with killing(next(iter(cluster.workers.values())).pid) as progress:
             swept, took = timed(plan, runs, number, idle, workers=address, progress=progress)
-        report("and one of them killed", runs, [took], alone)
+        report("and one of them killed", runs, [took], spent[alike])
         assert swept == found[0], "other bits"
     print("the same bits in all of them")
 
@@ -72,9 +73,9 @@ def timed(
     return swept, (took, processor_time() - spent - idle * took)
 
 
-def report(kind: str, runs: int, spent: list[tuple[float, float]], alone: list[tuple[float, float]]) -> None:
+def report(kind: str, runs: int, spent: list[tuple[float, float]], alike: list[tuple[float, float]]) -> None:
     clock, processor, least = (
-        min(took[k] for took in each) for each, k in ((spent, 0), (spent, 1), (alone, 1))
+        min(took[k] for took in each) for each, k in ((spent, 0), (spent, 1), (alike, 1))
     )
     print(
         f"{kind}: {clock:.1f} s, {1000 * processor / runs:.3f} ms of the processor a flight, "
