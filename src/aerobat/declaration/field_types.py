@@ -67,7 +67,7 @@ def array(value: Any, *shape: int) -> Array:
 
 def finite(value: Any, *shape: int) -> Array:
     """A read-only array of exactly this shape, of finite numbers. Raises FieldError."""
-    return _shaped(_numbers(value, "", infinite=False), value, shape)
+    return _shaped([] if isinstance(value, str) else _numbers(value, "", infinite=False), value, shape)
 
 
 def _shaped(numbers: Any, value: Any, shape: tuple[int, ...]) -> Array:

@@ -59,6 +59,8 @@ def _key(key: str) -> str:
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> SpecError:
     """The error that says no `kind` has this name, which known name is closest, and which there are."""
     known = tuple(known)
+    if not known:
+        return SpecError(f"no {kind} named {shown(name)}: there is none at all")
     guess = closest(name[:_LONGEST], known)
     hint = f"did you mean {guess!r}? Known: " if guess else "known: "
     return SpecError(f"no {kind} named {shown(name)}; {hint}{', '.join(known)}")

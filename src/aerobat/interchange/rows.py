@@ -88,6 +88,12 @@ class PathRows:
     @staticmethod
     def _through(knots: Array, steps: Array) -> Trajectory:
         if np.isnan(knots).any():
+            known = int(np.sum(~np.isnan(knots), axis=(0, 1)).min())
+            if known < len(PATH):
+                raise SpecError(
+                    f"{len(knots)} rows give {known} numbers along an axis, a path takes {len(PATH)}; "
+                    "give more rows, or velocities too"
+                )
             return minimum_effort(knots, steps)
         if len(steps) > 1 and steps[-1] < SHORT * np.median(steps):  # what a grid leaves over of a duration
             knots, steps = np.delete(knots, -2, axis=0), np.append(steps[:-2], steps[-2:].sum())

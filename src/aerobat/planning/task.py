@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf
+from math import inf, isfinite
 
+import numpy as np
+
+from aerobat.arrays import Array
 from aerobat.certification.envelope import Envelope
 from aerobat.environment import Environment
 from aerobat.flatness import force_balance
 from aerobat.limits.along import limits_along
 from aerobat.limits.limit import Limit
 from aerobat.planning.passages import PlacedStage, gaps_at_ends, planned_passages, planned_waypoints
-from aerobat.problem.condition import ForceBalance
-from aerobat.problem.problem import Problem
+from aerobat.problem.condition import Condition, ForceBalance, Quantity
+from aerobat.problem.problem import Limits, Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.vehicle import Vehicle
 
@@ -22,6 +25,8 @@ from aerobat.vehicle import Vehicle
 ASSUMED_THRUST_TO_WEIGHT = 5.0
 SHARE = 0.5  # of the room that a narrow passage leaves to the body, which is kept clear
 KEPT_INSIDE = 0.1  # of a ball's radius, at most, from its surface: flights under lab stray by half of that
+RATES = {Quantity.POSITION: Quantity.VELOCITY, Quantity.VELOCITY: Quantity.ACCELERATION}
+ROUNDING = 1e-9  # of a limit, or of a direction: what is nearer is the same
 LEAST_CLEARANCE = 0.001  # [m] that is kept clear in the narrowest: what lies between places is within it
 
 
@@ -53,7 +58,8 @@ class Task:
         """
         body_radius = 0.0 if vehicle is None else vehicle.body_radius
         stages = problem.stages(max_specific_thrust(problem, vehicle), body_radius)
-        stages = replace(stages, stages=tuple(_well_inside(stage, clearance) for stage in stages.stages))
+        inside = (_well_inside(stage, clearance) for stage in stages.stages)
+        stages = replace(stages, stages=tuple(_at_limits(stage, problem.path_limits) for stage in inside))
         asked = cls(problem, vehicle, stages, reserve, clearance)
         if vehicle is None or not clearance or not problem.surroundings.obstacles:
             return asked
@@ -115,6 +121,41 @@ def _well_inside(stage: Stage, clearance: float) -> Stage:
         return stage
     kept = min(clearance, KEPT_INSIDE * stage.ball.radius)
     return replace(stage, ball=replace(stage.ball, radius=stage.ball.radius - kept))
+
+
+def _at_limits(stage: Stage, limits: Limits) -> Stage:
+    """The stage with all that follows where it asks the very limit: what is at its most stands still there.
+
+    No path is within the limit and beyond it beside; who knows only inequalities finds none that is near.
+    """
+    conditions = list(stage.conditions)
+    for place, asked in enumerate(stage.conditions):
+        if asked.quantity not in RATES:
+            continue
+        used = asked.direction != 0.0
+        ends = [asked.direction[used] * each[used] for each in limits.of(asked.quantity.derivative)]
+        least, most = float(np.minimum(*ends).sum()), float(np.maximum(*ends).sum())
+        reached = next(
+            (end for bound, end in ((asked.lower, most), (asked.upper, least)) if _same(bound, end)), None
+        )
+        if reached is None:
+            continue
+        conditions[place] = replace(asked, lower=reached, upper=reached)
+        if not any(_fixes(known, RATES[asked.quantity], asked.direction) for known in conditions):
+            conditions.append(Condition(RATES[asked.quantity], asked.direction, lower=0.0, upper=0.0))
+    return replace(stage, conditions=tuple(conditions))
+
+
+def _same(bound: float, end: float) -> bool:
+    """True of a bound at a limit's finite end."""
+    return bool(isfinite(end) and abs(bound - end) <= ROUNDING * max(abs(end), 1.0))
+
+
+def _fixes(condition: Condition, quantity: Quantity, direction: Array) -> bool:
+    """True of a condition that fixes a quantity along a direction."""
+    across = np.linalg.norm(np.cross(condition.direction, direction))
+    parallel = across <= ROUNDING * np.linalg.norm(condition.direction) * np.linalg.norm(direction)
+    return bool(condition.quantity is quantity and condition.lower == condition.upper and parallel)
 
 
 def max_specific_thrust(problem: Problem, vehicle: Vehicle | None) -> float:

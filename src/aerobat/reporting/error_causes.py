@@ -13,7 +13,8 @@ from aerobat.studies.error_causes import ErrorCauses, TrialResult
 
 CAPTION = (
     "A row has a plan of its own where its cause concerns the plan. With jerk as the input that is another "
-    "path, along which more flights may go well than without any cause. costs: growth of the median error."
+    "path, along which more flights may go well than without any cause. costs: "
+    "the median growth of a flight's largest error, beside the same flight without any cause."
 )
 
 

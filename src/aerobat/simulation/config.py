@@ -15,7 +15,7 @@ from aerobat.errors import SpecError
 from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot
 from aerobat.simulation.plants import PLANTS, Plant
 from aerobat.states import BodyState
-from aerobat.vehicle import Vehicle
+from aerobat.vehicle import Vehicle, as_vehicle
 
 ControlRate = Annotated[float, Field(ge=1, le=1e6, description="number from 1 to 1e6")]
 MAX_FLIGHTS = 10_000_000  # under conditions
@@ -28,6 +28,14 @@ def _conditions(value: Any) -> Dispersion | None:
     if isinstance(value, str):
         return as_dispersion(value)
     raise FieldError("", f"must be a Dispersion or the name of one, got {shown(value)}")
+
+
+def _vehicle(value: Any) -> Vehicle | None:
+    if value is None or isinstance(value, Vehicle):
+        return value
+    if isinstance(value, str):
+        return as_vehicle(value)
+    raise FieldError("", f"must be a Vehicle or the name of one, got {shown(value)}")
 
 
 def _flights(value: Any) -> range | None:
@@ -50,7 +58,7 @@ class FlightChanges(TypedDict, total=False):
     seed: int
     flights: range | int | None
     start: BodyState | None
-    nominal: Vehicle | None
+    nominal: Vehicle | str | None
     engine: str
     plant: Plant | str | None
     autopilot: Autopilot | str | None
@@ -74,7 +82,8 @@ class FlightConfig:
     # of a batch under conditions, so many, or which; left out, one flight, number 0
     flights: Annotated[range | None, PlainValidator(_flights)] = None
     start: Annotated[BodyState, AS_IT_IS] | None = None  # true, by default the trajectory's; or a batch's
-    nominal: Vehicle | None = None  # that controller and set-points are made for; by default what flies
+    # that controller and set-points are made for, or its name; by default what flies
+    nominal: Annotated[Vehicle | None, PlainValidator(_vehicle)] = None
     # floats, compiled, jax, jax-float32, or the fastest for so many ticks
     engine: str = "auto"
     # physics that others wrote in place of ours, or its name, mujoco or rotorpy: one vehicle a flight

@@ -13,6 +13,7 @@ import numpy as np
 
 from aerobat.declaration import validated
 from aerobat.errors import SpecError
+from aerobat.vehicle.files import as_vehicle
 from aerobat.vehicle.rotor import Rotor
 from aerobat.vehicle.vehicle import Vehicle
 
@@ -50,8 +51,9 @@ class _Check:
 
 
 @validated
-def implausibilities(vehicle: Vehicle) -> tuple[str, ...]:
+def implausibilities(vehicle: Vehicle | str) -> tuple[str, ...]:
     """Return a sentence for each kind of value that hardly any vehicle has, with the unit probably meant."""
+    vehicle = as_vehicle(vehicle)
     found = (*_of_dead_rotors(vehicle), *_of_rotors(vehicle.rotors), *_of_inertia(vehicle))
     return (*found, *_of_thrust(vehicle))
 

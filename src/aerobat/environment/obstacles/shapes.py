@@ -19,7 +19,6 @@ from aerobat.declaration import (
     UnitVector,
     Vector3,
     finite,
-    shown,
 )
 from aerobat.environment.obstacles.attitude import ATTITUDE, angles_in_degrees, angles_in_radians, axes_of
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
@@ -32,7 +31,8 @@ CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))  # of a box of two by t
 def _size(value: Any) -> Array:
     size = finite(value, 3)
     if not (size > 0.0).all():
-        raise FieldError("", f"must be three positive numbers, got {shown(value)}")
+        told = ", ".join(f"{each:g}" for each in size)
+        raise FieldError("", f"must be three positive numbers, got {told}")
     return size
 
 

@@ -133,12 +133,12 @@ class _Planning:
         return durations
 
     def why_infeasible(self) -> Reason:
-        """One sentence, from the last attempt, the slowest, and the last that its stages let pass."""
+        """One sentence, from the slowest attempt, and the fastest that rotors can fly, or nearly can."""
         attempts = self.recorder.attempts
         longest = max(attempts, key=lambda attempt: attempt.duration)
         shortest = min(attempt.duration for attempt in attempts)
         flown = [attempt for attempt in attempts if attempt.margin is not None and attempt is not longest]
-        nearest = max(flown, key=lambda attempt: attempt.duration, default=None)
+        nearest = min(flown, key=lambda made: (max(-(made.margin or 0.0), 0.0), made.duration), default=None)
         before = "" if nearest is None else f"at {nearest.duration:.3g} s {nearest.outcome}; "
         remedy = (
             "scale the times of all segments, or give others"

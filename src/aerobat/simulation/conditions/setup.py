@@ -101,9 +101,10 @@ def _tick_rate(conditions: Dispersion, control_rate: float) -> float:
     for rate in rates:
         if abs(delay * rate - round(delay * rate)) < WHOLE:
             return rate
+    ticks = "imu.rate" if imu is not None else f"up to {MAX_TICKS} a period of the controller"
     raise SpecError(
-        f"computation_delay must be a whole number of ticks, which last {1.0 / rates[-1]:g} s or longer, "
-        f"got {delay:g} s"
+        f"computation_delay, {delay:g} s, must be a whole number of ticks of {1.0 / rates[-1]:g} s, "
+        f"by {ticks}; change one of the two"
     )
 
 

@@ -13,7 +13,7 @@ from math import radians
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
-from aerobat.planning import Attempt, Plan, Planner
+from aerobat.planning import Attempt, Plan, Planner, as_planner
 from aerobat.studies.passing.spread import narrowed
 from aerobat.studies.passing.task import PassingTask, Variant, going_on, passed
 from aerobat.studies.share import Trials
@@ -31,7 +31,7 @@ TRYING_TIME = 30.0  # [s] of the processor for one of these plans, which takes 0
 @validated
 def steadied(
     plan: Plan,
-    planner: Planner,
+    planner: Planner | str,
     conditions: Dispersion | str = "lab",
     *,
     seed: Seed = 0,
@@ -44,12 +44,13 @@ def steadied(
 
     Args:
         plan: What was found first, for a vehicle.
-        planner: What found it.
+        planner: What found it, or its name.
         conditions: Under which flights are flown, or their name.
         seed: Of the flights.
         controller: The name of what flies them.
         progress: Called with every attempt.
     """
+    planner = as_planner(planner)
     vehicle, reserve = plan.vehicle, getattr(planner, "reserve", 0.0)
     if vehicle is None or plan.assessment is None or not (reserve and plan.problem.gates and plan.flies):
         return plan
