@@ -113,7 +113,7 @@ def gaps_at_ends(problem: Problem, vehicle: Vehicle) -> tuple[list[float], list[
     balance = force_balance(environment, vehicle)
     thrusts = [balance.specific_thrust(state.velocity, state.acceleration) for state in ends]
     clearance = Clearance(environment.pieces.still, vehicle.bounding_ellipsoid)
-    return clearance.least(positions, np.array(thrusts), np.zeros(len(positions)))
+    return clearance.least(positions, np.array(thrusts).reshape(-1, 3), np.zeros(len(positions)))
 
 
 def _require(gate: Gate, stage: Stage, vehicle: Vehicle) -> None:

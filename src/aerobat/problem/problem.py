@@ -294,11 +294,17 @@ class Problem:
         lower, upper = self.path_limits.of(derivative)
         for axis, x, low, high in zip("xyz", value, lower, upper, strict=True):
             if not low <= x <= high:
-                limit = "lower and limits.upper" if derivative == 0 else DERIVATIVES[derivative]
+                limit = (
+                    "limits.lower and limits.upper"
+                    if derivative == 0
+                    else f"limits.{DERIVATIVES[derivative]}"
+                )
+                if derivative == 0 and axis == "z" and low == self.environment.ground:
+                    limit = "limits.upper, or lower environment.ground"
                 raise FieldError(
                     name,
                     f": its {axis} component, {x:g} {UNITS[derivative]}, lies outside the limits "
-                    f"[{low:g}, {high:g}]; move it or widen limits.{limit}",
+                    f"[{low:g}, {high:g}]; move it or widen {limit}",
                 )
 
     @property

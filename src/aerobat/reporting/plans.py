@@ -224,6 +224,8 @@ def _beside_least(found: Assessment) -> str:
     """How near a duration is to the proven lower bound."""
     if found.ratio == inf:
         return ""
+    if found.ratio < 1.0:
+        return f", beyond its limits: within them {found.least_duration:.2f} s is the least"
     free = " if nothing stood in the way" if found.obstructed else ""
     if found.ratio > SEVERAL_TIMES:
         return f", at most {found.ratio:.1f} times the shortest possible{free}"

@@ -99,6 +99,8 @@ class Assessment:
             least = f"{self.least_duration:.3f} s or more"
             free = " if nothing stood in the way" if self.obstructed else ""
             at_most = f"at most {self.ratio:.2f} times the shortest possible{free}, which takes {least}"
+            if self.ratio < 1.0:
+                at_most = f"beyond the vehicle's limits, within which the shortest possible takes {least}"
         if self.opinion is None:
             return at_most
         if self.opinion.missing:

@@ -1,7 +1,8 @@
 """Contradictions that no motion resolves, proven in milliseconds: what a stage asks beside the limits.
 
-Where a stage is and how fast is linear; so are the limits per axis, which hold there too. No attitude counts,
-nor what the vehicle's rotors give: without a contradiction a problem may have no plan all the same.
+Where a stage is and how fast is linear; so are the limits per axis, which hold there too. Of attitudes the
+tilt counts. What the vehicle's rotors give does not: without a contradiction a problem may have no plan all
+the same.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from aerobat.optimization import AssignmentProgram, solver
 from aerobat.problem.condition import Condition, LinearBound, Quantity
 from aerobat.problem.problem import DERIVATIVES, UNITS, Limits, Problem
 from aerobat.problem.stage import Stage
+from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
 
 KNOWN = 3  # derivatives of position that stages speak of: itself, velocity, acceleration
+ROUNDING = 1e-9  # [rad]
 LINEAR = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 
 
@@ -31,7 +34,7 @@ class Contradiction:
 
 
 def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
-    """The first stage's whose position, velocity and acceleration no instant within the limits can have.
+    """The first stage's whose position, velocity, acceleration or tilt no instant within the limits can have.
 
     None where there is no such stage, which proves nothing. Raises SpecError for gates that do not suit the
     maneuver.
@@ -41,7 +44,20 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
         asked = [c.bound(balance) for c in _linear(stage)]
         if asked and not _is_possible(asked, problem.path_limits):
             return _contradiction(stage, asked, problem.path_limits)
+        tilt, most = _least_tilt(stage), problem.limits.max_tilt
+        if tilt > most + ROUNDING:
+            sentence = (
+                f"the stage '{stage.name}' asks {np.degrees(tilt):.3g}° of tilt at least, more than "
+                f"limits.max_tilt ({np.degrees(most):.3g}°) allows at whatever time; ask less or widen that"
+            )
+            return Contradiction(stage.name, ("limits.max_tilt",), sentence)
     return None
+
+
+def _least_tilt(stage: Stage) -> float:
+    """The least angle between the vertical and a thrust axis as a stage asks it [rad]."""
+    asked = stage.attitude
+    return 0.0 if asked is None else float(np.arccos(np.clip(asked.up @ UP, -1.0, 1.0))) - asked.tolerance
 
 
 def _linear(stage: Stage) -> list[Condition]:

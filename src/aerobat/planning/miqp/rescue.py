@@ -55,7 +55,10 @@ class Rescue:
         if found is None and self.is_promising:
             with within_time(PROMISING_TIME, processor):
                 found = self._first(iter([self._motion_from_all()]), self._none_found)
-        return self._with_reserve(found) if found is not None and found.planner == MOTION else found
+        if found is None or found.keeps(self.asked.reserve):
+            return found
+        with within_time(RESCUE_TIME, processor):
+            return self._with_reserve(found)
 
     @property
     def _none_found(self) -> str:
@@ -162,14 +165,14 @@ class Rescue:
         except Infeasible:
             return None
 
-    def _with_reserve(self, motion: Plan) -> Plan:
-        """A time-optimal motion again with a reserve to fly by, or itself where there is none."""
-        again = self._planned(
-            planner_with_reserve(MOTION, self.asked.reserve, start=motion, starts=1), f"by {MOTION}"
-        )
+    def _with_reserve(self, found: Plan) -> Plan:
+        """A path near a plan that keeps the reserve to fly by, or the plan where there is none."""
+        name = MOTION if found.planner == MOTION else FREE_KNOTS
+        again = self._planned(planner_with_reserve(name, self.asked.reserve, start=found), f"by {name}")
         if again is None or not again.keeps(self.asked.reserve):
-            return motion
-        return replace(again, attempts=(*motion.attempts, *again.attempts), rescue=motion.rescue)
+            return found
+        said = found.rescue if found.planner == name else f"{self._none_found}; planned by {name}"
+        return replace(again, attempts=(*found.attempts, *again.attempts), rescue=said)
 
     def _others(self) -> Iterator[tuple[Planner, str]]:
         """The ways that seldom find what those before them do not."""

@@ -476,7 +476,11 @@ def _meeting_stages(program: RefinementProgram, answer: InteriorPointResult) -> 
     x = answer.x
     for _ in range(NEWTON_STEPS):
         point = program.at(x)
-        x = x - np.linalg.lstsq(point.equality_rows, point.equalities, rcond=None)[0]
+        with np.errstate(over="ignore", invalid="ignore"):
+            rows, values = point.equality_rows, point.equalities
+        if not (np.isfinite(rows).all() and np.isfinite(values).all()):  # too far away for numbers
+            break
+        x = x - np.linalg.lstsq(rows, values, rcond=None)[0]
     return np.asarray(x)
 
 

@@ -85,11 +85,19 @@ class Course(Maneuver):
         return sequence
 
     def _given(self, element: Maneuver, gates: Sequence[Gate]) -> Sequence[Gate]:
-        """The gates for an element: the one that it names, or none; all of them where it is the only one."""
+        """The gates for an element: those that it names, or none; all of them where it is the only one."""
         if len(self.elements) == 1:
             return gates
-        name = getattr(element, "gate", None)
-        return () if name is None else (named_gate(gates, name),)
+        return tuple(named_gate(gates, name) for name in dict.fromkeys(_gates_of(element)))
+
+
+def _gates_of(element: Maneuver | Stage) -> Iterator[str]:
+    """Yield the names of the gates that an element names, itself or in elements or stages of its own."""
+    name = getattr(element, "gate", None)
+    if name is not None:
+        yield name
+    for part in (*getattr(element, "elements", ()), *getattr(element, "stages", ())):
+        yield from _gates_of(part)
 
 
 def _named(stages: Sequence[Stage]) -> Iterator[Stage]:

@@ -111,6 +111,8 @@ def pose_samples(poses: PoseHistory, size: float, gates: Sequence[Gate]) -> tupl
     """
     step = float(np.ptp(poses.times)) / POSES
     kept = poses.rows_at_gates(gates) or [0]
+    if not step:  # a flight that is over as it begins
+        return [0], step
     for k in poses.rows(np.arange(poses.times[kept[0]] % step, poses.times[-1] + 1e-9, step)):
         if np.linalg.norm(poses.position[kept] - poses.position[k], axis=-1).min() > CLEAR * size:
             kept.append(k)

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from aerobat.environment import Dispersion
+from aerobat.simulation import FlightConfig
 from aerobat.studies.share import Share
 
 CAUSES: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # each with what is there without it
@@ -52,6 +53,8 @@ def standing_in_the_way(conditions: Dispersion, share: Callable[[Dispersion], Sh
     freed = []
     for cause, off in CAUSES.items():
         without = replace(conditions, **off)
+        period = 1.0 / (without.control_rate or FlightConfig().rate)
+        without = replace(without, computation_delay=min(without.computation_delay, period))
         if without != conditions:
             freed.append(Freed(cause, share(without)))
     return max(freed, key=lambda each: each.share.count, default=None)

@@ -25,7 +25,7 @@ LONGEST = 1.01  # times the duration of the plan that was found first
 CHOOSING = range(10**6, 10**6 + 200)  # the flights that choose: others judge
 ENOUGH = 0.975  # of these flights: most plans of which so many succeed are proven for 95 %
 WORTH = 0.4  # of these flights: where fewer succeed, turning slower has not helped
-TRYING_TIME = 30.0  # [s] of the processor for one of these plans, which takes 0.3 to 3: no clock decides
+TRYING_TIME = 10.0  # [s] of the processor for one of these plans, which takes 0.3 to 3: no clock decides
 
 
 @validated
