@@ -18,6 +18,7 @@ from aerobat.links.mission import Mission, MissionSettings
 from aerobat.links.path_follower import PathForwarder
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import least_duration
+from aerobat.planning.passages import gaps_at_ends
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.closure import Closure
 from aerobat.planning.refinement.excess import chebyshev
@@ -236,3 +237,18 @@ def test_a_path_keeps_inside_balls_what_it_keeps_from_obstacles_or_a_tenth_of_th
         assert inside.ball is not None
         assert stage.ball is not None
         assert inside.ball.radius == pytest.approx(stage.ball.radius - kept)
+
+
+STANDING = replace(SHORT, environment=ab.Environment(obstacles=(ab.Sphere((1.0, 0.0, 4.5), 0.4),)))
+
+
+def test_a_closed_course_has_no_ends_that_obstacles_could_reach() -> None:
+    assert gaps_at_ends(STANDING, QUAD) == ([], [])
+    assert Task.of(STANDING, QUAD, clearance=0.1).clearance == 0.1
+
+
+@pytest.mark.slow
+def test_a_closed_course_around_an_obstacle_is_certified_clear_of_it() -> None:
+    found = ab.plan(STANDING, ab.FreeKnots(reserve=0.03), QUAD)
+    assert found.certified
+    assert any("clearance" in finding.name for finding in found.certificate.findings)

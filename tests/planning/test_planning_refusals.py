@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from math import radians
 from typing import Any
 
 import pytest
 
 from aerobat.errors import Infeasible
 from aerobat.planning import FreeKnots, MinSnap, Miqp, Planner, TimeOptimal, plan
+from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.miqp import rescue
 from aerobat.problem import GatePassage, Limits, Line, load_problem, tilted_gate
 from aerobat.studies.feasibility import min_requirements
 from aerobat.vehicle import Vehicle, load_vehicle
+from places import CASES
 
 QUAD = load_vehicle("agile-quad")
 LINE = replace(load_problem("line"), gates=(tilted_gate((5.0, 0.0, 0.0)),))
@@ -124,3 +127,20 @@ def test_the_limit_that_a_path_exceeds_is_named() -> None:
     """It was "a limit or condition on the path"."""
     found = Miqp().plan(replace(LINE, limits=Limits(jerk=2.0)), QUAD)
     assert any(attempt.outcome.startswith("the jerk x is beyond its limit") for attempt in found.attempts)
+
+
+def test_a_stage_that_asks_more_tilt_than_the_limit_allows_is_refused_as_proven() -> None:
+    """Within its tolerance of attitude."""
+    steep = replace(load_problem("half-flip"), limits=Limits(max_tilt=radians(80.0)))  # in a gate at 90°
+    with pytest.raises(Infeasible, match=r"is proven to have no plan: the stage .* limits.max_tilt \(80°\)"):
+        plan(steep, Miqp(), QUAD)
+    assert contradiction(replace(steep, limits=Limits(max_tilt=radians(89.0))), QUAD) is None
+
+
+@pytest.mark.slow
+def test_a_reserve_is_kept_by_free_knots_before_it_is_given_up() -> None:
+    """In drag that slows a dive, where the MIQP's paths keep none."""
+    draggy = load_vehicle(str(CASES / "draggy-vehicle.toml"))
+    found = plan("split-s", Miqp(reserve=0.15), draggy)
+    assert found.keeps(0.15)
+    assert "planned by free-knots" in found.rescue

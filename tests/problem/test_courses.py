@@ -158,3 +158,12 @@ def test_a_gate_inside_another_is_refused_one_beside_it_is_not(heading, size, of
 def test_a_gate_may_stand_once_for_each_way_through_it() -> None:
     back = ab.tilted_gate(RED.position, np.pi, name="back")
     assert problem(ab.PassGate("red"), ab.PassGate("back"), gates=(RED, back)).gates == (RED, back)
+
+
+def test_a_course_within_a_course_and_a_maneuver_of_ones_own_are_given_the_gates_that_they_name() -> None:
+    inner = ab.Course((ab.PassGate("red"), ab.PassWaypoint((5.0, 0.0, 2.0))))
+    own = ab.CustomManeuver((ab.Stage("through", gate="second"),))
+    flat = problem(*inner.elements, ab.PassGate("second")).stages(30.0).stages
+    nested = problem(inner, own).stages(30.0).stages
+    assert [stage.gate for stage in nested] == [stage.gate for stage in flat] == ["red", None, "second"]
+    assert nested[0].conditions == flat[0].conditions

@@ -375,3 +375,11 @@ def test_stages_in_a_row_are_each_shown_in_the_plane_of_their_thrust():
     assert shown.sum() >= 4
     np.testing.assert_allclose(np.abs(scale * level.U)[shown], across[shown], rtol=0.01)
     np.testing.assert_allclose(scale * upward.V, thrust[:, 2], atol=1e-9)
+
+
+def test_a_flight_that_is_over_as_it_begins_is_drawn() -> None:
+    """One row, no time and no way between its poses."""
+    far_off = ab.Dispersion(name="far off", start_position=50.0)
+    flight = ab.fly(shared_plan("line", "agile-quad"), conditions=far_off)
+    assert len(flight.times) == 1
+    assert png(draw(flight))

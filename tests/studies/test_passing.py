@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.studies.passing import Passing, Round, tightening
+from aerobat.studies.passing.causes import standing_in_the_way
 from aerobat.studies.passing.spread import firmer
 from aerobat.studies.passing.tightening import Tightening
+from aerobat.studies.share import Share
 
 WEAK = ab.Dispersion(name="weak", mass=0.05, rotor=0.04, start_position=0.02)
 HARSH = ab.Dispersion(name="harsh", start_velocity=30.0, mass=1e-4)
@@ -187,3 +189,18 @@ def test_figures_whose_flights_stray_off_their_attitudes_are_asked_for_more_thru
     firm = firmer(loose, vehicle, plan, strays, 0.97)
     assert firm.maneuver.min_thrust > 7.0
     assert firm.maneuver.min_thrust <= 0.75 * vehicle.max_specific_thrust
+
+
+@pytest.mark.parametrize("name", ab.dispersion_names())
+def test_without_any_one_cause_conditions_can_still_be_flown_in(name: str) -> None:
+    """Without a control rate of its own a controller has a shorter period, and no longer delay."""
+    tried: list[ab.Dispersion] = []
+
+    def share(conditions: ab.Dispersion) -> Share:
+        tried.append(conditions)
+        return Share(0, 1)
+
+    standing_in_the_way(ab.load_dispersion(name), share)
+    plan = ab.plan("line", ab.MinSnap(), "agile-quad")
+    for conditions in tried:
+        ab.prepare(plan, conditions=conditions)

@@ -25,8 +25,7 @@ def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
     A result that has tables gives the first of them: of a flight its rows, the series by their components, as
     `position_x` and `thrusts_0`, of a batch with the number of the vehicle first; of a plan its attempts, of
     a comparison its planners, of scores the flights with their passages through each gate, of a sweep its
-    flights, of a map of what is feasible its cells. A result whose tables are all empty, or that has none,
-    is one row.
+    flights, of a map of what is feasible its cells. A result without tables is one row.
     Raises BackendMissing without pandas, SpecError for what is no result, or has no such table.
 
     Args:
@@ -42,7 +41,7 @@ def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
     tables = {fact.key: fact.value for fact in facts(result) if fact.key and _is_table(fact.value)}
     if table is not None and table not in tables:
         raise unknown_name("table", table, list(tables))
-    found = tables[table] if table is not None else next(filter(len, tables.values()), None)
+    found = tables[table] if table is not None else next(iter(tables.values()), None)
     if isinstance(found, Columns):
         return pandas.DataFrame(dict(found))
     rows = [plain(result)] if found is None else map(plain, found)
@@ -50,7 +49,7 @@ def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
 
 
 def _is_table(value: Any) -> bool:
-    """True for columns, and for a sequence of results, an empty one too."""
+    """True for columns, and for a sequence of results, an empty one too; arrays are values."""
     is_rows = isinstance(value, list | tuple) and not isinstance(value, Facts)
     return isinstance(value, Columns) or (
         is_rows and not any(isinstance(each, int | float | str) for each in value)

@@ -7,6 +7,8 @@ from itertools import groupby
 from math import degrees, inf
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from aerobat.certification import Certificate, Finding, Side, Verdict
 from aerobat.planning import Assessment, Attempt, Flyability, Plan, Tube
 from aerobat.planning.flyability import FlownPassage
@@ -133,7 +135,8 @@ def _(passage: FlownPassage) -> Iterator[Fact]:
 def _(found: Recoveries) -> Iterator[Fact]:
     yield from kept(reaction_s=found.reaction, ground_m=found.ground, times_s=found.times)
     yield from kept(lowest_m=found.lowest, height_lost_m=found.height_lost, durations_s=found.durations)
-    yield from kept(no_return_s=[[span.start, span.end] for span in found.no_return])
+    spans = np.array([[span.start, span.end] for span in found.no_return]).reshape(-1, 2)  # numbers, no table
+    yield from kept(no_return_s=spans)
     yield Fact("sentence", str(found), "recovery")
 
 

@@ -52,7 +52,8 @@ def _(vehicle: Vehicle) -> Iterator[Fact]:
         yield Fact("attitude_loop_rad_s", bandwidth, "attitude loop", told)
     doubts = vehicle_doubts(vehicle)
     yield from (said("looks wrong", doubt, style="red") for doubt in doubts)
-    yield Fact("doubts", doubts, "looks wrong", "" if doubts else "nothing")
+    # an array: an empty tuple would be a table without rows
+    yield Fact("doubts", np.array(doubts, dtype=object), "looks wrong", "" if doubts else "nothing")
 
 
 @facts.register

@@ -12,6 +12,7 @@ from pydantic import Field, PlainValidator
 from aerobat.declaration import Count, FieldError, within_field
 from aerobat.errors import SpecError
 from aerobat.problem.gate import Gate, named_gate
+from aerobat.problem.maneuvers.custom import CustomManeuver
 from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver, in_sequence, maneuver
 from aerobat.problem.stage import Stage, StageSequence
 
@@ -22,9 +23,9 @@ Element = Annotated[Maneuver, PlainValidator(MANEUVERS.read)]
 class Course(Maneuver):
     """Elements one after another, each a maneuver of any kind, flown `laps` times.
 
-    An element that names a gate is given that one, any other none; of a single element it may be left out.
-    The last lap may end early, after the first `last_lap` elements. What an element asks throughout, it
-    asks of the whole course.
+    An element is given the gates that it names, itself or in elements or stages of its own, and no others; of
+    a single element names may be left out. The last lap may end early, after the first `last_lap` elements.
+    What an element asks throughout, it asks of the whole course.
 
     A `closed` course has neither start nor goal: it ends in the very state in which it begins, in flight
     between its last element and its first, and can be flown over and over.
@@ -96,8 +97,9 @@ def _gates_of(element: Maneuver | Stage) -> Iterator[str]:
     name = getattr(element, "gate", None)
     if name is not None:
         yield name
-    for part in (*getattr(element, "elements", ()), *getattr(element, "stages", ())):
-        yield from _gates_of(part)
+    if isinstance(element, Course | CustomManeuver):
+        for part in element.elements if isinstance(element, Course) else element.stages:
+            yield from _gates_of(part)
 
 
 def _named(stages: Sequence[Stage]) -> Iterator[Stage]:

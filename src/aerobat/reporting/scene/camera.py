@@ -64,7 +64,7 @@ def best_view(path: Array, gates: Sequence[Gate], corners: Array, size: Array) -
 
 def _spread(path: Array, corners: Array, size: Array, cameras: list[Camera]) -> Array:
     """The area over which the path spreads in each picture, (cameras,)."""
-    covariance = np.cov(path.T)
+    covariance = np.cov(path.T) if len(path) > 1 else np.zeros((3, 3))
     covariance = covariance + 1e-3 * (np.trace(covariance) + 1e-9) * np.eye(3)  # a straight path spreads too
     screens = np.array([camera.screen for camera in cameras])
     areas = np.sqrt(np.linalg.det(screens @ covariance @ np.swapaxes(screens, -1, -2)))

@@ -101,10 +101,10 @@ def _tick_rate(conditions: Dispersion, control_rate: float) -> float:
     for rate in rates:
         if abs(delay * rate - round(delay * rate)) < WHOLE:
             return rate
-    ticks = "imu.rate" if imu is not None else f"up to {MAX_TICKS} a period of the controller"
+    tick = 1.0 / rates[-1]
+    lasting = f"which last {tick:g} s or longer" if imu is None else f"which last {tick:g} s by imu.rate"
     raise SpecError(
-        f"computation_delay, {delay:g} s, must be a whole number of ticks of {1.0 / rates[-1]:g} s, "
-        f"by {ticks}; change one of the two"
+        f"computation_delay must be a whole number of ticks, {lasting}, got {delay:g} s; change one"
     )
 
 
