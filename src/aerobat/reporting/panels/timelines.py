@@ -186,7 +186,7 @@ def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, name
     Where there is no room for all names, stages are numbered in their order, of very many only every second
     or third.
     """
-    axes.set_xlim(0.0, duration)
+    axes.set_xlim(0.0, duration or None)  # of a flight that is over as it begins what matplotlib takes
     times = np.array([stage.time for stage in stages])
     gates = [stage.gate is not None for stage in stages]
     lines = [[(t, 0.0), (t, 1.0)] for t in times]
