@@ -261,3 +261,11 @@ def test_the_figure_draws_each_cause_and_the_main_one_in_red() -> None:
     np.testing.assert_allclose(sum(drawn), 100.0 * found.error @ found.direction, atol=0.01)
     colours = [axes.lines[0].get_color() for axes in parts]
     assert colours.count(colours[0]) == 1
+
+
+def test_a_log_without_what_an_observer_saw_does_not_tell_that_from_a_delay() -> None:
+    found = ab.inspect_flight(PLANTED["delay"](planned(0), 1), planned(0))
+    assert found.cause == "delay"
+    assert ("observer" in found.verdict) is not found.observed
+    assert "observer" in replace(found, observed=False).verdict
+    assert "observer" not in replace(found, observed=True).verdict

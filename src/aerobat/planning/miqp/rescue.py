@@ -88,8 +88,9 @@ class Rescue:
         said = ["not proven"]
         if self.failed:
             said.append(f"but none was found {', '.join(self.failed)}")
-        if self.unanswered:
-            said.append(f"{RESCUE_TIME:g} s were too few to plan {', '.join(self.unanswered)}")
+        unanswered = [how for how in self.unanswered if how not in self.failed]
+        if unanswered:
+            said.append(f"{RESCUE_TIME:g} s were too few to plan {', '.join(unanswered)}")
         return ", ".join(said)
 
     def _first(

@@ -41,12 +41,21 @@ def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
         try:
             plan = planner.plan(problem, task.vehicle)
         except Infeasible as infeasible:
-            if not infeasible.attempts:  # no attempt: refused at once, and whatever the planner
+            if not (
+                infeasible.attempts or out_of_time()
+            ):  # no attempt: refused at once, whatever the planner
                 raise
             continue
         yield plan, WarmStart.of(plan, task.stages)
-    if not (on_course or out_of_time()):
-        yield None, WarmStart.of(Miqp().plan(problem), task.stages)
+    if on_course or out_of_time():
+        return
+    try:
+        plan = Miqp().plan(problem)
+    except Infeasible:
+        if out_of_time():
+            return
+        raise
+    yield None, WarmStart.of(plan, task.stages)
 
 
 def closed_forms(task: Task, paces: Sequence[float] = (1.0,)) -> Iterator[tuple[None, WarmStart]]:

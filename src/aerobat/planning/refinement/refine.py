@@ -34,6 +34,7 @@ from aerobat.planning.refinement.stage_values import StageValues
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
+from aerobat.problem.problem import UNITS
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory, polynomial
 
@@ -328,7 +329,13 @@ class Refinement:
             for condition in stage.conditions:
                 excess = float(condition.bound(self.task.balance).excess(flat))
                 if excess > tolerance * limit_of(condition, self.task.balance).size:
-                    return Reason(f"the stage '{stage.name}' is missed by {excess:.2g} in SI units", where)
+                    unit, quantity = (
+                        UNITS[condition.quantity.derivative],
+                        condition.quantity.replace("_", " "),
+                    )
+                    return Reason(
+                        f"the stage '{stage.name}' is missed by {excess:.2g} {unit} of {quantity}", where
+                    )
             ball = stage.ball
             away = 0.0 if ball is None else float(np.linalg.norm(flat[0] - ball.centre)) - ball.radius
             if away > tolerance - RELATIVE_STAGE_TOLERANCE:

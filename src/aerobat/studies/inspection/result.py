@@ -53,6 +53,10 @@ CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
     }
 )
+UNOBSERVED = (  # of a log that does not tell what an observer saw, in the place of a delay
+    "delay, or an observer whose state the log does not hold,",
+    "log that state, which tells them apart; then shorten `computation_delay`, or see `motion_capture`",
+)
 
 
 @dataclass(frozen=True)
@@ -167,6 +171,8 @@ class Inspection:
             return f"nothing stands out: the error is {length(self.largest)} at most"
         first = self.shares[0]
         name, remedy = CAUSES[first.cause]
+        if first.cause == "delay" and not self.observed:
+            name, remedy = UNOBSERVED
         of = f"{length(first.error)} of the largest error, {length(self.largest)} at {self.time:.2f} s"
         return f"{name} explains {of}; {remedy}"
 
