@@ -41,9 +41,8 @@ def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
         try:
             plan = planner.plan(problem, task.vehicle)
         except Infeasible as infeasible:
-            if not (
-                infeasible.attempts or out_of_time()
-            ):  # no attempt: refused at once, whatever the planner
+            is_refused_at_once = not infeasible.attempts and not out_of_time()
+            if is_refused_at_once:  # and whatever the planner
                 raise
             continue
         yield plan, WarmStart.of(plan, task.stages)

@@ -329,13 +329,9 @@ class Refinement:
             for condition in stage.conditions:
                 excess = float(condition.bound(self.task.balance).excess(flat))
                 if excess > tolerance * limit_of(condition, self.task.balance).size:
-                    unit, quantity = (
-                        UNITS[condition.quantity.derivative],
-                        condition.quantity.replace("_", " "),
-                    )
-                    return Reason(
-                        f"the stage '{stage.name}' is missed by {excess:.2g} {unit} of {quantity}", where
-                    )
+                    quantity = condition.quantity
+                    missed = f"{excess:.2g} {UNITS[quantity.derivative]} of {quantity.replace('_', ' ')}"
+                    return Reason(f"the stage '{stage.name}' is missed by {missed}", where)
             ball = stage.ball
             away = 0.0 if ball is None else float(np.linalg.norm(flat[0] - ball.centre)) - ball.radius
             if away > tolerance - RELATIVE_STAGE_TOLERANCE:
