@@ -294,12 +294,8 @@ class Problem:
         lower, upper = self.path_limits.of(derivative)
         for axis, x, low, high in zip("xyz", value, lower, upper, strict=True):
             if not low <= x <= high:
-                limit = (
-                    "limits.lower and limits.upper"
-                    if derivative == 0
-                    else f"limits.{DERIVATIVES[derivative]}"
-                )
-                if derivative == 0 and axis == "z" and low == self.environment.ground:
+                limit = f"limits.{DERIVATIVES[derivative]}" if derivative else "limits.lower and limits.upper"
+                if not derivative and axis == "z" and low == self.environment.ground:
                     limit = "limits.upper, or lower environment.ground"
                 raise FieldError(
                     name,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, TypedDict
 
@@ -22,20 +22,17 @@ MAX_FLIGHTS = 10_000_000  # under conditions
 LogRate = Annotated[float, Field(ge=1e-3, le=1e6, description="number from 0.001 to 1e6")]
 
 
-def _conditions(value: Any) -> Dispersion | None:
-    if value is None or isinstance(value, Dispersion):
-        return value
-    if isinstance(value, str):
-        return as_dispersion(value)
-    raise FieldError("", f"must be a Dispersion or the name of one, got {shown(value)}")
+def _or_named(cls: type, named: Callable[[str], Any]) -> PlainValidator:
+    """The validator of an instance of a class, of its name, or of None."""
 
+    def made(value: Any) -> Any:
+        if value is None or isinstance(value, cls):
+            return value
+        if isinstance(value, str):
+            return named(value)
+        raise FieldError("", f"must be a {cls.__name__} or the name of one, got {shown(value)}")
 
-def _vehicle(value: Any) -> Vehicle | None:
-    if value is None or isinstance(value, Vehicle):
-        return value
-    if isinstance(value, str):
-        return as_vehicle(value)
-    raise FieldError("", f"must be a Vehicle or the name of one, got {shown(value)}")
+    return PlainValidator(made)
 
 
 def _flights(value: Any) -> range | None:
@@ -77,13 +74,13 @@ class FlightConfig:
     controller: Annotated[Controller | ControlLaw | str | None, PlainValidator(as_controller)] = None
     rate: ControlRate = 500.0  # [1/s] of the controller, unless conditions say it
     # as it would really be flown: what varies, disturbs, and is measured how; left out, as planned
-    conditions: Annotated[Dispersion | None, PlainValidator(_conditions)] = None
+    conditions: Annotated[Dispersion | None, _or_named(Dispersion, as_dispersion)] = None
     seed: Seed = 0  # of conditions
     # of a batch under conditions, so many, or which; left out, one flight, number 0
     flights: Annotated[range | None, PlainValidator(_flights)] = None
     start: Annotated[BodyState, AS_IT_IS] | None = None  # true, by default the trajectory's; or a batch's
     # that controller and set-points are made for, or its name; by default what flies
-    nominal: Annotated[Vehicle | None, PlainValidator(_vehicle)] = None
+    nominal: Annotated[Vehicle | None, _or_named(Vehicle, as_vehicle)] = None
     # floats, compiled, jax, jax-float32, or the fastest for so many ticks
     engine: str = "auto"
     # physics that others wrote in place of ours, or its name, mujoco or rotorpy: one vehicle a flight

@@ -67,7 +67,7 @@ class MachineLoop(CompiledLoop):
             self._packing.pad_lanes([leaf for leaf, one in zip(leaves, equal, strict=True) if not one]),
         )
         self._latest: tuple[Tree, Array] = (None, _UNUSED)
-        self._addresses = [array.ctypes.data for array in self._parameters]
+        self._addresses = [*map(address, self._parameters)]
         self._cuts = _thread_cuts(self._packing.blocks, threads or available_cores(), width)
         self._logical = [i for i, n in enumerate(self._loop.carry) if self._loop.is_logical(n)]
         self._logical_outputs = [i for i, n in enumerate(self._loop.outputs) if self._loop.is_logical(n)]
@@ -122,7 +122,7 @@ class MachineLoop(CompiledLoop):
         self, function: Function, inputs: PackedInputs, arrays: Sequence[Array], ticks: int, log_stride: int
     ) -> None:
         """All lanes, divided among threads in whole blocks; a thread holds no lock of Python's meanwhile."""
-        arguments = [*self._addresses, *(array.ctypes.data for array in (*inputs.arrays, *arrays))]
+        arguments = [*self._addresses, *map(address, (*inputs.arrays, *arrays))]
         arguments += [self._packing.lanes, ticks, *inputs.rows, log_stride]
         if len(self._cuts) == 2:
             function(*arguments, *self._cuts)
@@ -140,6 +140,11 @@ def _traced(init: Init, step: Step, parameters: Tree, inputs: Tree) -> TracedLoo
 def _bare(tree: Tree) -> Tree:
     """The tree without its numbers."""
     return tree_map(lambda leaf: 0, tree)
+
+
+def address(array: Array) -> int:
+    """The place in memory at which an array's values begin, in a third of the time of `array.ctypes`."""
+    return int(array.__array_interface__["data"][0])
 
 
 @lru_cache(maxsize=32)

@@ -16,7 +16,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.engines.duals import Dual, DualOps, value_and_tangent
 from aerobat.engines.gradient import gradient
-from aerobat.engines.llvm.engine import lanes, machine_code
+from aerobat.engines.llvm.engine import address, lanes, machine_code
 from aerobat.engines.llvm.packing import ARRAYS, InputKind, Layout
 from aerobat.engines.traced_loop import TracedLoop
 from aerobat.engines.tracing import Symbol, Trace, TraceOps
@@ -77,11 +77,6 @@ def smooth_functions(
     )
 
 
-def _address(array: Array) -> int:
-    """Where an array's values begin; `array.ctypes` takes three times as long to say so."""
-    return int(array.__array_interface__["data"][0])
-
-
 def triples(values: Sequence[Scalar]) -> list[Vector]:
     """Return values as vectors of three each."""
     return [(values[k], values[k + 1], values[k + 2]) for k in range(0, len(values), 3)]
@@ -111,8 +106,8 @@ def place_function(
         padded = np.concatenate([own, own[:1].repeat(lacking, 0)]) if lacking else own
         packed = padded.reshape(blocks, width, -1).swapaxes(1, 2).copy()
         result = np.empty((len(directions), len(found), blocks * width))
-        given = map(_address, (shared, packed, directions))
-        addresses = [*given, *_UNUSED, _address(result)]
+        given = map(address, (shared, packed, directions))
+        addresses = [*given, *_UNUSED, address(result)]
         scan(*addresses, blocks * width, len(directions), 0, 0, 1, 0, blocks * width)
         return result[..., : len(own)]
 

@@ -16,7 +16,6 @@ from aerobat.optimization import AssignmentProgram, solver
 from aerobat.problem.condition import Condition, LinearBound, Quantity
 from aerobat.problem.problem import DERIVATIVES, UNITS, Limits, Problem
 from aerobat.problem.stage import Stage
-from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
 
 KNOWN = 3  # derivatives of position that stages speak of: itself, velocity, acceleration
@@ -57,7 +56,7 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
 def _least_tilt(stage: Stage) -> float:
     """The least angle between the vertical and a thrust axis as a stage asks it [rad]."""
     asked = stage.attitude
-    return 0.0 if asked is None else float(np.arccos(np.clip(asked.up @ UP, -1.0, 1.0))) - asked.tolerance
+    return 0.0 if asked is None else float(np.arccos(np.clip(asked.up[2], -1.0, 1.0))) - asked.tolerance
 
 
 def _linear(stage: Stage) -> list[Condition]:

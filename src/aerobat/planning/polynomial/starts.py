@@ -37,24 +37,19 @@ def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
     if task.stages.closed:
         return
     closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points and not on_course else []
-    for planner in (*closed_form, guess):
+    asked = [(planner, task.vehicle_if_any) for planner in (*closed_form, guess)]
+    for planner, vehicle in asked if on_course else [*asked, (Miqp(), None)]:
+        if vehicle is None and out_of_time():
+            return
         try:
-            plan = planner.plan(problem, task.vehicle)
+            plan = planner.plan(problem, vehicle)
         except Infeasible as infeasible:
-            is_refused_at_once = not infeasible.attempts and not out_of_time()
-            if is_refused_at_once:  # and whatever the planner
+            # at once, or without rotors: whatever the planner
+            is_refused = vehicle is None or not infeasible.attempts
+            if is_refused and not out_of_time():
                 raise
             continue
-        yield plan, WarmStart.of(plan, task.stages)
-    if on_course or out_of_time():
-        return
-    try:
-        plan = Miqp().plan(problem)
-    except Infeasible:
-        if out_of_time():
-            return
-        raise
-    yield None, WarmStart.of(plan, task.stages)
+        yield None if vehicle is None else plan, WarmStart.of(plan, task.stages)
 
 
 def closed_forms(task: Task, paces: Sequence[float] = (1.0,)) -> Iterator[tuple[None, WarmStart]]:
