@@ -13,6 +13,9 @@ from aerobat.flatness import TimeInterval
 from aerobat.limits.limit import quantity_name
 
 
+BINDING = 0.01  # of a limit's size: a quantity that comes so near is limited by it
+
+
 class Verdict(StrEnum):
     """Knowledge about a limit over continuous time."""
 
@@ -170,6 +173,16 @@ class Certificate:
         rotors = [finding for finding in self.findings if finding.rotor is not None]
         violated = [finding for finding in rotors if finding.verdict is Verdict.VIOLATED]
         return min(violated or rotors, key=_margin, default=None)
+
+    @property
+    def binding(self) -> Finding | None:
+        """The finding about the whole path, of no rotor, that all but reaches its limit; None if none does.
+
+        Of several that which is nearest, as a fraction of its size.
+        """
+        sized = ((f, f.margin / f.size) for f in self.findings if f.margin is not None and f.size)
+        near = [(f, left) for f, left in sized if f.rotor is None and f.place is None and left < BINDING]
+        return min(near, key=lambda pair: pair[1], default=(None, 0.0))[0]
 
     @property
     def margin(self) -> float | None:

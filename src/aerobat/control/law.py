@@ -82,9 +82,14 @@ CONTROL_LAWS: Registry[ControlLaw] = Registry(
 @validated
 @dataclass_transform(frozen_default=True, field_specifiers=(Field,))
 def controller(name: Label) -> Callable[[type[L]], type[L]]:
-    """Declare the class that follows and register it: by `name`, flights and the command line know it."""
+    """Declare the class that follows and register it: by `name`, flights and the command line know it.
+
+    Raises SpecError for a name that another controller has.
+    """
 
     def register(cls: type[L]) -> type[L]:
+        if name in CONTROLLERS:
+            raise SpecError(f"controller '{name}' comes with Aerobat; give the class another name")
         return cast("type[L]", CONTROL_LAWS.add(name, cls))
 
     return register

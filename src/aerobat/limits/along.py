@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from aerobat.declaration import shown
+from aerobat.declaration import placed, shown
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.limits import body_rate, box, path_condition, rotor_command, rotor_thrust, thrust_floor, tilt
@@ -57,10 +57,13 @@ def limits_along(
 
 def _limits(family: Family, asked: Asked) -> Iterator[Limit]:
     """The limits of a family. Raises SpecError for what is none, which a function of one's own may return."""
-    found: Any = family(asked)
-    if not isinstance(found, Iterable):
-        raise SpecError(f"limits '{family.__name__}' returned {shown(found)}, nothing to iterate over")
-    for limit in found:
-        if not isinstance(limit, Limit):
-            raise SpecError(f"limits '{family.__name__}' yielded {shown(limit)}, not a Limit")
-        yield limit
+    try:
+        found: Any = family(asked)
+        if not isinstance(found, Iterable):
+            raise SpecError(f"limits '{family.__name__}' returned {shown(found)}, nothing to iterate over")
+        for limit in found:
+            if not isinstance(limit, Limit):
+                raise SpecError(f"limits '{family.__name__}' yielded {shown(limit)}, not a Limit")
+            yield limit
+    except SpecError as error:
+        raise placed(error, family) from None

@@ -11,7 +11,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.environment import Environment
-from aerobat.errors import Reason
+from aerobat.errors import Reason, SpecError
 from aerobat.flatness.references import force_balance
 from aerobat.limits.quantity import PathQuantity
 from aerobat.problem import Condition, Limits
@@ -43,6 +43,16 @@ class Limit:
     is_implied: bool = False  # whether others imply it along a whole path: an optimizer may leave it out
     is_proven: bool = True  # whether a certificate states it; else it guards what planners do between
     search: tuple[Limit, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check what a family of one's own may get wrong."""
+        if not self.lower <= self.upper:
+            ends = f"lower {self.lower:g} and upper {self.upper:g}"
+            raise SpecError(f"limit '{self.name}' has {ends}; give numbers that rise, inf where a side is open")
+        if not 0.0 < self.size < inf:
+            raise SpecError(f"limit '{self.name}' has size {self.size:g}; give what its range is, more than 0")
+        if isinstance(self.fields, str) or len(self.fields) != 2:
+            raise SpecError(f"limit '{self.name}': fields must be a pair, of the lower and of the upper end")
 
     @cached_property
     def linear(self) -> tuple[Limit, ...]:

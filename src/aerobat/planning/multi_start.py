@@ -245,10 +245,10 @@ class _Found:
         return self.path.is_clear and self.path.duration <= _duration(rough)
 
 
-def _likeliest(begun: _Start) -> tuple[bool, float]:
-    """The key that sorts starts: certified plans first, the shortest of them foremost."""
+def _likeliest(begun: _Start) -> tuple[bool, bool, float]:
+    """The key that sorts starts: certified plans, other plans, paths of no plan; the shortest foremost."""
     plan, path = begun
-    return plan is None or not plan.certified, path.trajectory.duration
+    return plan is None, plan is None or not plan.certified, path.trajectory.duration
 
 
 def _varied(begun: Sequence[_Start]) -> Iterator[_Start]:

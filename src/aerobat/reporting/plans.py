@@ -81,7 +81,7 @@ def _(plan: Plan) -> Iterator[Fact]:
     yield Fact("rotor_feasible", certificate and certificate.certified)
     proof = ""
     if certificate is not None:
-        yield _limiting(certificate)
+        yield from _limiting(certificate)
         proof = ("" if certificate.certified else "not certified: ") + certificate.why
     yield Fact("certificate", certificate, "proof", proof)
     yield Fact("flyability", plan.flyability)
@@ -213,14 +213,21 @@ def _of_finding(*texts: str) -> Facts:
     return Facts(Fact("", text, name) for name, text in zip(names, texts, strict=True))
 
 
-def _limiting(found: Certificate) -> Fact:
-    """The quantity that is nearest to its limit, or the reason why a plan is not certified."""
-    worst = found.worst
+def _limiting(found: Certificate) -> Iterator[Fact]:
+    """The rotor nearest to its limit, and what else is next to its own; or why a plan is not certified."""
+    worst, binding = found.worst, found.binding
     if not found.certified or worst is None or worst.limit is None:
-        return said("not proven", found.why, level=REPORT, style="red")
-    allowed = f"{'at most' if worst.side is Side.MAX else 'at least'} {worst.shown(worst.limit, 2)}"
-    text = f"{worst.name}: {worst.shown(worst.value, 2)} at {worst.time:.2f} s, {allowed}"
-    return said("limited by", text, level=REPORT)
+        yield said("not proven", found.why, level=REPORT, style="red")
+        return
+    yield said("limited by", _within(worst, worst.limit), level=REPORT)
+    if binding is not None and binding.limit is not None:
+        yield said("and by", _within(binding, binding.limit), level=REPORT)
+
+
+def _within(found: Finding, limit: float) -> str:
+    """What a quantity reaches, when, and what it may reach."""
+    allowed = f"{'at most' if found.side is Side.MAX else 'at least'} {found.shown(limit, 2)}"
+    return f"{found.name}: {found.shown(found.value, 2)} at {found.time:.2f} s, {allowed}"
 
 
 def _beside_least(found: Assessment) -> str:

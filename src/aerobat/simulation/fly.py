@@ -22,7 +22,7 @@ from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.flight import SERIES, Flight, setpoint_rows, setpoint_series
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
 from aerobat.simulation.plants.outside import fly_outside
-from aerobat.simulation.prepare import prepare
+from aerobat.simulation.prepare import setup_of
 from aerobat.simulation.setup import FlightSetup
 from aerobat.states import Setpoint
 from aerobat.trajectory import Trajectory
@@ -54,7 +54,7 @@ def fly(
     Raises SpecError for arguments that do not fit together, BackendMissing for an engine that is not
     installed.
     """
-    setup = prepare(plan, vehicle, environment=environment, config=config, **changes)
+    setup = setup_of(plan, vehicle, environment, config.changed(changes))
     outside = [each.kind for each in (setup.config.autopilot, setup.config.plant) if each is not None]
     if outside:
         gates = () if isinstance(plan, Trajectory) else plan.problem.gates

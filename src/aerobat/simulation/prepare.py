@@ -47,9 +47,23 @@ def prepare(
         config: how.
         changes: fields of FlightConfig that replace those of `config`, as `seed=3`.
 
-    Raises SpecError for arguments that do not fit together.
+    Raises SpecError for arguments that do not fit together, and for a `plant` or an `autopilot`, which are
+    not stepped.
     """
     config = config.changed(changes)
+    for name, outside in (("plant", config.plant), ("autopilot", config.autopilot)):
+        if outside is not None:
+            raise SpecError(f"{name}: '{outside.kind}' is flown as a whole; give it to fly(), or leave it out")
+    return setup_of(plan, vehicle, environment, config)
+
+
+def setup_of(
+    plan: Planned | Trajectory,
+    vehicle: Vehicle | str | Sequence[Vehicle | str] | None,
+    environment: Environment | None,
+    config: FlightConfig,
+) -> FlightSetup:
+    """All that a flight takes, of `prepare`'s arguments, whatever flies in the place of the built-in loop."""
     if isinstance(vehicle, str) and vehicle in dispersion_names() and vehicle not in vehicle_names():
         raise SpecError(f"{vehicle!r} are conditions, not a vehicle; give conditions={vehicle!r}")
     environment = environment_of(plan, environment)

@@ -59,7 +59,7 @@ def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -
     if not isinstance(found, Plan):
         raise SpecError(f"{plan} holds a path alone; give it to `aerobat fly`, and export what that writes")
     form = FORMATS[options.to]
-    default = Path("out") / f"{plan.resolve().stem}{form.suffix or '-' + options.to}"
+    default = Path("out") / f"{plan.resolve().stem}{form.suffix or '.' + options.to}"
     made = export_plan(found, options.out or default, options.to, options.rate)
     if options.json:
         facts = {"format": made.format, "files": list(map(str, made.files)), "loss": made.loss.record()}

@@ -15,10 +15,10 @@ from aerobat.cli.failures import ExitCode
 from aerobat.cli.interrupts import end_interrupts
 from aerobat.cli.options import OutputOptions
 from aerobat.cli.progress import Progress, showing
-from aerobat.cli.runs.record import RECORD, USUAL_CONDITIONS, RunRecord, write_record
+from aerobat.cli.runs.record import RECORD, USUAL_CONDITIONS, FlightSettings, RunRecord, write_record
 from aerobat.cli.terminal import print_json
 from aerobat.control import named_controller
-from aerobat.environment import load_dispersion
+from aerobat.environment import dispersion_names, load_dispersion
 from aerobat.errors import SpecError
 from aerobat.evaluation import Score
 from aerobat.interchange.columns import write_columns
@@ -183,9 +183,24 @@ def finish(
     tables = [table(report, most=REPORT)]
     if explain:
         tables.append(table(report, least=EXPLAIN, title=f"{plan.problem.name} · all facts"))
-    hint = f"--explain tells more; `aerobat sweep {options.out or record.folder}` counts more flights\n"
-    written(record, options, write, facts, *tables, hint="" if explain else hint)
+    hint = "" if explain else f"--explain tells more{_sweep_hint(record, options.out or record.folder)}\n"
+    written(record, options, write, facts, *tables, hint=hint)
     return ExitCode.WELL if report.is_well else ExitCode.NOT_WELL
+
+
+def _sweep_hint(record: RunRecord, folder: Path) -> str:
+    """The command that flies more of a run's flights; empty where no options of a sweep name how it flew."""
+    flight = record.flight
+    conditions = None if flight.conditions is None else flight.conditions.name
+    is_own = conditions is not None and conditions not in dispersion_names()
+    if flight.plant is not None or flight.autopilot is not None or is_own:
+        return ""
+    options = [f" --import {file}" for file in record.plugins]
+    if flight.controller != FlightSettings().controller:
+        options.append(f" --controller {flight.controller}")
+    if conditions is not None:
+        options.append(f" --conditions {conditions}")
+    return f"; `aerobat sweep {folder}{''.join(options)}` counts more flights"
 
 
 def trial_flights(plan: Plan, record: RunRecord) -> Trials | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import filterfalse, pairwise
-from math import sqrt
+from math import isfinite, sqrt
 
 import numpy as np
 
@@ -25,7 +25,9 @@ LEG_THRUST_FRACTION = 0.3  # of the specific thrust, that accelerates along a le
 SHORTEST_LEG = 0.2  # [s] that a leg is given at first
 EXCEEDED = 0.3  # of the rotors' range, by which a stretched path may exceed it
 PACE = 1.05  # times the duration, in one step of stretching
-PACES = 80  # steps at most: 50 times the duration
+PACES = 80  # steps at most: 50 times the duration,
+FIGURE_PACES = 12  # or of figures, whose attitudes slow motions pass in free fall, 1.8 times
+PACE_STRIDE = 4  # steps at a time, to the nearest to the limits where none of these will do
 MIN_GATE_SPEED = 3.0  # [m/s] of starts through gates
 STAGE_TOLERANCE = 1e-6  # in SI units: by how much a condition may be missed through rounding
 
@@ -34,10 +36,10 @@ def fixed_at_knots(task: Task, order: int, velocities: Array) -> Array:
     """Position and its derivatives below `order` at start, stages and goal, (K, order, 3); NaN: free.
 
     The closed form takes each axis alone and equalities only. So conditions in oblique directions fix, by
-    least norm, every component that they touch. Balls and gates are met at their centres. An attitude fixes
-    the thrust to exactly its direction, and a lower bound on thrust to itself or to the hover's if that is
-    more, one on speed to itself or to the velocity given; other inequalities are left free, to be checked
-    afterwards.
+    least norm, every component that they touch. Balls, gates and ranges of places are met at their centres.
+    An attitude fixes the thrust to exactly its direction, and a lower bound on thrust to itself or to the
+    hover's if that is more, one on speed to itself or to the velocity given; other inequalities are left
+    free, to be checked afterwards.
 
     Args:
         task: Its ends and its stages' equalities are fixed.
@@ -79,6 +81,26 @@ def unhurried(task: Task) -> Task:
     return _with_stages(task, stages)
 
 
+def _without_figures_attitudes(task: Task) -> Task:
+    """The same without the attitudes of figures' stages that say where they are."""
+    stages = (
+        replace(stage, attitude=None, conditions=tuple(filterfalse(_is_of_thrust, stage.conditions)))
+        if _is_of_figure(stage) and stage.is_placed
+        else stage
+        for stage in task.stages.stages
+    )
+    return _with_stages(task, stages)
+
+
+def _is_of_figure(stage: Stage) -> bool:
+    """True of a stage that asks an attitude in no gate."""
+    return stage.gate is None and stage.attitude is not None
+
+
+def _is_of_thrust(condition: Condition) -> bool:
+    return condition.quantity is Quantity.SPECIFIC_THRUST
+
+
 def _with_stages(task: Task, stages: Iterable[Stage]) -> Task:
     """The task with other stages."""
     return replace(task, stages=replace(task.stages, stages=tuple(stages)))
@@ -88,27 +110,32 @@ def stretched_path(task: Task, order: int) -> Trajectory:
     """The closed form through ordered stages, legs as long as the roots of their distances, for a warm start.
 
     So slow as a whole that rotors exceed their limits by EXCEEDED at most: a motion that is a little too fast
-    is nearer to the fastest than one that is too slow.
+    is nearer to the fastest than one that is too slow. Of figures, which no slow motion flies, it is the pace
+    that exceeds limits least, where none nearby will do.
 
     Args:
-        task: Its ends and stages are met.
+        task: Its ends are met, and its stages but for the attitudes of figures, which follow from their
+            places.
         order: The derivative of position whose square is minimized.
     """
     vehicle, still = task.vehicle, np.zeros((len(task.stages.stages), 3))
-    fixed = fixed_at_knots(unhurried(task), order, still)
+    fixed = fixed_at_knots(_without_figures_attitudes(unhurried(task)), order, still)
     durations = first_times(task.problem, fixed, vehicle.max_specific_thrust)
     allowed = -EXCEEDED * float(vehicle.thrust_ranges.max())
+    paces = FIGURE_PACES if any(map(_is_of_figure, task.stages.stages)) else PACES
 
     def path(steps: int) -> Trajectory:
         return minimum_effort(fixed, durations * PACE**steps, heading=task.problem.heading.start)
 
-    def too_fast(steps: int) -> bool:
-        return sampled_margin(path(steps), vehicle, task.environment).margin < allowed
+    def margin(steps: int) -> float:
+        return float(sampled_margin(path(steps), vehicle, task.environment).margin)
 
-    slower = next((steps for steps in range(PACES) if not too_fast(steps)), PACES)
+    slower = next((steps for steps in range(paces) if margin(steps) >= allowed), None)
+    if slower is None:
+        return path(max(range(-2 * paces, paces, PACE_STRIDE), key=margin))
     if slower > 0:
         return path(slower)
-    return path(1 - next((steps for steps in range(1, PACES) if too_fast(-steps)), PACES))
+    return path(1 - next((steps for steps in range(1, PACES) if margin(-steps) < allowed), PACES))
 
 
 def path_along_normals(task: Task, order: int) -> Trajectory:
@@ -200,6 +227,8 @@ def _equalities(
             value = float(np.clip(hover, condition.lower, condition.upper))
         elif condition.quantity is Quantity.VELOCITY and 0.0 < condition.lower < condition.upper:
             value = min(max(value, float(condition.direction @ velocity)), condition.upper)
+        elif condition.quantity is Quantity.POSITION and isfinite(condition.upper - condition.lower):
+            value = 0.5 * (condition.lower + condition.upper)
         elif condition.lower < condition.upper:
             continue
         bound = condition.bound(balance)

@@ -26,7 +26,8 @@ def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
 
     Args:
         task: What is planned.
-        guess: The mixed-integer planner, asked for the vehicle, then for none; courses ask it last.
+        guess: The mixed-integer planner, asked for the vehicle, then for none; courses ask it last, if it
+            has as many intervals as they need.
 
     Raises:
         Infeasible: A stage asks more thrust than the vehicle has.
@@ -34,7 +35,7 @@ def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
     problem, on_course = task.problem, is_course(task.stages)
     if on_course:
         yield from closed_forms(task)
-    if task.stages.closed:
+    if task.stages.closed or (on_course and guess.intervals <= len(task.stages.stages)):
         return
     closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points and not on_course else []
     asked = [(planner, task.vehicle_if_any) for planner in (*closed_form, guess)]
