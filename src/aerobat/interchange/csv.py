@@ -15,7 +15,13 @@ import numpy as np
 
 from aerobat.declaration import PathName, Positive, validated
 from aerobat.errors import SpecError
-from aerobat.interchange.rows import PathRows, has_header, number_table, rows_of_columns
+from aerobat.interchange.rows import (
+    PathRows,
+    has_header,
+    number_table,
+    require_numbers,
+    rows_of_columns,
+)
 from aerobat.storage import read_whole, write_whole
 from aerobat.trajectory import Carrier, Trajectory, as_trajectory
 from aerobat.trajectory.piecewise import MAX_DURATION
@@ -67,6 +73,7 @@ def read_rows(path: PathName, rate: Positive = 100.0) -> PathRows:
 
 
 def _bare_rows(text: str, rate: float) -> PathRows:
+    require_numbers(text)
     asked = f"a path's have {CSV_COLUMNS}, or {CSV_COLUMNS + 1} with a time"
     rows = number_table(text, 1, (CSV_COLUMNS, CSV_COLUMNS + 1), asked)
     times = rows[:, CSV_COLUMNS] if rows.shape[1] > CSV_COLUMNS else np.arange(len(rows)) / rate

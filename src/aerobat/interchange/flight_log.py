@@ -26,6 +26,10 @@ MAX_LOG = 2**27  # bytes: ten minutes at 1 kHz
 FEWEST = 3  # rows, of which rates can be told
 SHORTEST = 1e-6  # [s] from row to row
 LARGEST = 1e6  # [m], [m/s], [rad/s], [N] of what a multirotor does
+GAP, LONG = 20.0, 0.25  # times the usual step, and [s]: a longer one is a gap
+STRONGER = 2.0  # times a rotor's most: a thrust that is more has another unit
+# of the plan's extent, and [m]: a path that is as far from the plan's most of the time is another one
+ELSEWHERE = (0.25, 0.5)
 AT_LIMIT = 1e-3  # of a rotor's range, within which a command is at its limit
 ESTIMATED = ("est_x", "est_y", "est_z")
 ESTIMATED_RATES = ("est_vx", "est_vy", "est_vz")
@@ -74,6 +78,13 @@ def _columns(path: Path, duration: float) -> dict[str, Array]:
     if close.any():
         line = 3 + int(np.argmax(close))
         raise SpecError(f"line {line}: times, the column t, must rise, by {SHORTEST:g} s or more")
+    steps = np.diff(columns["t"])
+    if len(steps) and steps.max() > max(GAP * np.median(steps), LONG):
+        line = 3 + int(np.argmax(steps))
+        raise SpecError(
+            f"line {line}: t rises by {steps.max():.3g} s, where rows are {np.median(steps):.2g} s apart; "
+            "give a part without gaps"
+        )
     flown = (columns["t"] >= 0.0) & (columns["t"] <= duration)
     if flown.sum() < FEWEST:
         raise SpecError(
@@ -103,6 +114,7 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
     span = nominal.max_thrusts - nominal.min_thrusts
     margin = np.minimum(commands - nominal.min_thrusts, nominal.max_thrusts - commands)
     asked = reference(plan, nominal, times=times)
+    _require_near(position, asked.setpoint.flat.position)
     series = {
         "position": position,
         "velocity": _group(columns, ("vx", "vy", "vz"), _rate(times, position)),
@@ -135,6 +147,27 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
     )
 
 
+def _require_newtons(names: tuple[str, ...], thrusts: Array, nominal: Vehicle) -> None:
+    """Refuse thrusts (T, n) that no such rotor gives."""
+    for name, thrust, most in zip(names, thrusts.T, nominal.max_thrusts, strict=True):
+        if thrust.max() > STRONGER * most:
+            raise SpecError(
+                f"the column {name} reaches {thrust.max():.3g}, where {nominal.name}'s rotor gives {most:.3g} N "
+                "at most; give newtons"
+            )
+
+
+def _require_near(position: Array, asked: Array) -> None:
+    """Refuse positions of another path, in other units or along other axes."""
+    off = float(np.median(np.linalg.norm(position - asked, axis=1)))
+    share, least = ELSEWHERE
+    if off > max(share * float(np.linalg.norm(np.ptp(asked, axis=0))), least):
+        raise SpecError(
+            f"x, y, z are {off:.3g} m from the plan's path half of the time; give metres, x east, y north, "
+            "z up, of a flight of this plan"
+        )
+
+
 def _group(columns: Mapping[str, Array], names: tuple[str, ...], otherwise: Array | None = None) -> Array:
     """Columns side by side, (T, len(names)), or what stands for them where one is not there."""
     if otherwise is not None and not all(name in columns for name in names):
@@ -150,6 +183,7 @@ def _of_rotors(columns: Mapping[str, Array], times: Array, nominal: Vehicle) -> 
         names = tuple(f"{letter}{k}" for k in range(count))
         if all(name in columns for name in names):
             given[letter] = _group(columns, names)
+            _require_newtons(names, given[letter], nominal)
         if f"{letter}{count}" in columns:
             raise SpecError(
                 f"line 1: there is a column {letter}{count}, and {nominal.name} has {count} rotors"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -36,6 +36,7 @@ MEETING = len(PATH) + 1  # the derivative that is continuous, and the number of 
 SHORT = 0.2  # of the usual step: a last one that is shorter has derivatives of rounding
 DENSE = 6e-3  # [s] from row to row: half of 100 Hz's, and a little more
 REPEATED = 1e-7  # [m]: a row that is met so nearly adds nothing to a path
+SEVERAL = 8  # columns, that are named
 FEWEST = 5  # rows, of which every second can be left out
 
 
@@ -46,6 +47,7 @@ class PathRows:
     knots: Array  # [m/s^d] position to jerk, world, (rows, 4, 3), NaN where a derivative is not there
     steps: Array  # [s] from row to row, (rows - 1,)
     attitude: Array | None = None  # body to world at the first row, (4,)
+    unused: tuple[str, ...] = ()  # what else the file holds, in words
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -167,6 +169,16 @@ def has_header(text: str) -> bool:
     return all(word.strip().strip('"').isidentifier() and not _is_number(word) for word in words)
 
 
+def require_numbers(text: str) -> None:
+    """Refuse a first line that neither is numbers nor names columns. Raises SpecError."""
+    first = text.partition("\n")[0].strip()
+    if first and not any(_is_number(word) for word in first.split(",", MAX_COLUMNS)):
+        raise SpecError(
+            f"line 1 is neither numbers nor names of columns, got {first[:60]!r}; name them t,x,y,z and so on, "
+            "without units, commas between"
+        )
+
+
 def rows_of_columns(text: str, rate: float) -> PathRows:
     """The rows of a table with a header; columns of other names are left out.
 
@@ -186,7 +198,21 @@ def rows_of_columns(text: str, rate: float) -> PathRows:
     for derivative, group in enumerate(PATH):
         if all(name in columns for name in NAMES[group]):
             knots[:, derivative] = np.stack([columns[name] for name in NAMES[group]], axis=1)
-    return PathRows(knots, steps, _first_attitude(columns))
+    return PathRows(knots, steps, _first_attitude(columns), tuple(_unused(columns)))
+
+
+def _unused(columns: Mapping[str, Array]) -> Iterator[str]:
+    """What a table holds beside a path, in words."""
+    used = set(NAMES["time"])
+    for group in (*PATH, "attitude"):
+        if all(name in columns for name in NAMES[group]):
+            used.update(NAMES[group])
+    if used.issuperset(NAMES["attitude"]):
+        yield "attitudes after the first row"
+    others = [name for name in columns if name not in used]
+    if others:
+        more = f" and {len(others) - SEVERAL} more" if len(others) > SEVERAL else ""
+        yield f"column{'s' * (len(others) > 1)} {', '.join(others[:SEVERAL])}{more}"
 
 
 def named_columns(text: str, needed: Sequence[str], asked: str) -> dict[str, Array]:
@@ -235,6 +261,8 @@ def number_table(text: str, first: int, counts: Sequence[int], asked: str) -> Ar
     if text.count("\n") > MAX_ROWS:
         raise SpecError(f"it has more than {MAX_ROWS} lines; give the part that is a path's")
     lines = text.splitlines()[first - 1 :]
+    while len(lines) > 1 and not lines[-1].strip():
+        lines.pop()
     if len(lines) > 1 and not text.endswith("\n"):
         raise SpecError(f"line {first - 1 + len(lines)} is cut off, it has no line end")
     width = lines[0].count(",") + 1 if lines else 0

@@ -27,7 +27,6 @@ from aerobat.planning.task import Task
 from aerobat.planning.time_limit import best_in_time
 from aerobat.planning.warm_start import WarmStart
 
-FINALISTS = (3, 1)  # of the fastest paths, that are given twice as many segments, then four times as many
 WORTHWHILE = 0.01  # of the duration: four times as many where twice as many gain more
 SAME = 1e-3  # of the duration: starts that come to nearly the same have come to the same path
 SLOWER = 1.5  # times the duration of a plan that knows no rotors
@@ -57,6 +56,7 @@ class MultiStart:
     leg_segments: int  # of a course's leg, at most
     start: Plan | None  # whose path is tried alone, before these
     guess: Miqp  # whose plan is one of the starts
+    finalists: int  # of the fastest rough paths, that are given twice as many segments; one then four times
 
     def plan(self, time_limit: float | None) -> Plan:
         """The fastest certified plan found; where none is faster, one that it began from.
@@ -199,7 +199,7 @@ class MultiStart:
         self, refinement: Refinement, paths: Sequence[RefinedPath]
     ) -> Sequence[RefinedPath]:
         """Sorted paths, the fastest with twice as many segments, and fewer of them again while that gains."""
-        for doubling, count in enumerate(FINALISTS, 1):
+        for doubling, count in enumerate((self.finalists, 1), 1):
             segments = min(2**doubling * self._least_segments, self._most_segments)
             paths, known = _distinct(paths), inf
             found = list(paths)

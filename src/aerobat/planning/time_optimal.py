@@ -21,6 +21,7 @@ from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 STARTS = 8
+FINALISTS = 3  # of the fastest paths
 LEG_SEGMENTS = 4  # of a course's leg
 
 
@@ -75,4 +76,5 @@ class TimeOptimal(Planner):
             leg_segments=LEG_SEGMENTS,
             start=self.start,
             guess=self.guess,
+            finalists=FINALISTS,
         ).plan(self.time_limit)

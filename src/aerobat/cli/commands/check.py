@@ -13,7 +13,7 @@ from aerobat.certification import Certificate, Envelope, certify
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import POSITIVE, VehicleOptions, limiting
 from aerobat.cli.runs.record import default_vehicle
-from aerobat.cli.runs.saved_plans import named_vehicle
+from aerobat.cli.runs.saved_plans import between_rows, named_vehicle
 from aerobat.cli.terminal import print_json
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
@@ -87,13 +87,15 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     )
     certificate = certify(trajectory, vehicle, environment, envelope)
     explained = _explained(found, trajectory, vehicle) if isinstance(found, Plan) else None
-    beside = Facts(evidence(explained))
+    beside, assumed = Facts(evidence(explained)), list[str]()
+    if not isinstance(found, Plan):
+        assumed = [*_assumed(options, vehicle, environment), *between_rows(plan, options.rate)]
     if options.json:
-        print_json(to_json(plain(certificate) | plain(beside)))
+        print_json(to_json(plain(certificate) | plain(beside) | ({"assumed": assumed} if assumed else {})))
         return _judgement(certificate)
     print_table(table(certificate, title=f"{plan} · {vehicle.name}"))
-    if not isinstance(found, Plan):
-        print(_assumed(options, vehicle, environment))
+    if assumed:
+        print(f"judged as a path; assumed: {', '.join(assumed)}")
     elif explained is not None:
         print_table(table(Facts((Fact("", beside, "beside the proof"),))))
     return _judgement(certificate)
@@ -113,8 +115,7 @@ def _explained(plan: Plan, trajectory: Trajectory, vehicle: Vehicle) -> Plan | N
         return None
 
 
-def _assumed(options: CheckOptions, vehicle: Vehicle, environment: Environment) -> str:
-    """All that a file with no more than a path leaves open and no option says."""
+def _assumed(options: CheckOptions, vehicle: Vehicle, environment: Environment) -> list[str]:
+    """All that a path leaves open and no option says."""
     facts = [] if options.vehicle else [f"the vehicle {vehicle.name}"]
-    facts += [f"gravity {environment.gravity:g} m/s²", "no wind", "no limits, stages or gates of a problem"]
-    return "assumed, as the file holds no more than a path: " + ", ".join(facts)
+    return [*facts, f"gravity {environment.gravity:g} m/s²", "no wind", "no limits, stages or gates of a problem"]

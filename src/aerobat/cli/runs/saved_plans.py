@@ -86,8 +86,16 @@ def _plan_of_path(path: Path, trajectory: Trajectory, options: PlanningOptions) 
 def _assumed(path: Path, vehicle: Vehicle, problem: Problem, options: PlanningOptions) -> list[str]:
     facts = [] if options.vehicle else [f"the vehicle {vehicle.name}"]
     facts += [f"gravity {problem.environment.gravity:g} m/s²", "no wind, limits or gates"]
-    if path.suffix == ".csv":
-        error = read_rows(path, options.rate or RATE).fit_error
-        if error is not None:
-            facts.append(f"a smooth path between rows (without every second row it is off by {error:.1g} m)")
+    return facts + between_rows(path, options.rate or RATE)
+
+
+def between_rows(path: Path, rate: float) -> list[str]:
+    """What is assumed of a path in a CSV file, and what else the file holds, in words; nothing of others."""
+    if path.suffix != ".csv":
+        return []
+    rows = read_rows(path, rate)
+    error = rows.fit_error
+    facts = [f"without {each}, which the file holds too" for each in rows.unused]
+    if error is not None:
+        facts.append(f"a smooth path between rows (without every second row it is off by {error:.1g} m)")
     return facts

@@ -38,14 +38,16 @@ class Loss:
     thrust_axis: float  # [rad] the angle between thrust axes, heading aside
     reading: str  # how the file is read
     obstacles: float = 0.0  # [m] by which triangles of round obstacles lie inside these
+    without: str = ""  # what the format has no place for, in words
 
     def __str__(self) -> str:
         """One line for people."""
         flat = f"; round obstacles drawn up to {length(self.obstacles)} inside" if self.obstacles else ""
+        lacks = f"; the file has no place for {self.without}" if self.without else ""
         return (
             f"lost at most {length(self.position)} of position, {self.velocity:.2g} m/s of velocity, "
-            f"{degrees(self.attitude):.2g}° of attitude and {degrees(self.thrust_axis):.2g}° of the thrust's "
-            f"direction ({self.reading}){flat}"
+            f"{_degrees(self.attitude)} of attitude and {_degrees(self.thrust_axis)} of the thrust's "
+            f"direction ({self.reading}){flat}{lacks}"
         )
 
     def record(self) -> dict[str, object]:
@@ -57,6 +59,7 @@ class Loss:
             "thrust_axis_deg": degrees(self.thrust_axis),
             "reading": self.reading,
             "obstacles_m": self.obstacles,
+            "without": self.without,
         }
 
 
@@ -116,6 +119,12 @@ class ExportRows:
         turn = so3.log(so3.multiply(so3.conjugate(q[:-1]), q[1:]))
         read = first if held else so3.multiply(first, so3.exp(s[:, None] * turn[:, None]))
         return peak_angles(planned, np.broadcast_to(read, planned.shape))
+
+
+def _degrees(angle: float) -> str:
+    """An angle [rad] in degrees, two digits of small ones."""
+    value = degrees(angle)
+    return f"{value:.2g}°" if value < 10.0 else f"{value:.0f}°"
 
 
 def attitudes(plan: Plan, times: Array) -> Array:

@@ -19,6 +19,7 @@ from pydantic import Field
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment.obstacles import ConvexPiece, Obstacle
+from aerobat.environment.obstacles.convex_piece import ObstacleMotion
 from aerobat.environment.obstacles.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from aerobat.environment.obstacles.surface import surface_of
 from aerobat.errors import import_extra
@@ -72,9 +73,7 @@ class MujocoRun:
         names = [self._model.geom(k).name for k in range(self._model.ngeom)]
         self._kinds = [_KINDS[name.partition(" ")[0]] for name in names]
         self._contact = Contact.NOTHING
-        moving = [each.motion for each in scene.obstacles for _ in _shapes(each)]
-        moving += [gate.motion for gate in scene.gates if gate.wall is None]
-        self._motions = [motion for motion in moving if motion is not None]
+        self._motions = moving_bodies(scene)
         self._begin(motion)
 
     def _begin(self, motion: VehicleState) -> None:
@@ -124,6 +123,13 @@ class MujocoRun:
     def _feel(self) -> None:
         touched = self._data.contact.geom[: self._data.ncon].ravel().tolist()
         self._contact = max((self._contact, *(self._kinds[geom] for geom in touched)))
+
+
+def moving_bodies(scene: PlantScene) -> list[ObstacleMotion]:
+    """The motions of the model's mocap bodies, in their order: of obstacles and gates that move."""
+    moving = [each.motion for each in scene.obstacles for _ in _shapes(each)]
+    moving += [gate.motion for gate in scene.gates if gate.wall is None]
+    return [motion for motion in moving if motion is not None]
 
 
 def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
