@@ -50,6 +50,24 @@ def handed_over(plan: ab.Plan, seed: int) -> ab.Flight:
     return under(plan, seed, imu=lab.imu, motion_capture=cameras, control_rate=500.0)
 
 
+def with_slow_rotors(plan: ab.Plan, seed: int) -> ab.Flight:
+    return ab.fly(plan, with_rotors(plan, lag=1.5 + 0.25 * seed), nominal=plan.vehicle)
+
+
+def with_late_commands(plan: ab.Plan, seed: int) -> ab.Flight:
+    """A flight of slow rotors, with the commands in its log that make rotors as planned for as late."""
+    assert plan.vehicle is not None
+    flight, lags = with_slow_rotors(plan, seed), plan.vehicle.lags
+    led = flight.thrusts + lags * np.gradient(flight.thrusts, flight.times, axis=0)
+    late = flight.times + (0.5 + 0.25 * seed) * lags.mean()
+    commands = np.stack([np.interp(late, flight.times, each) for each in led.T], axis=1)
+    return replace(flight, series={**flight.series, "commands": commands})
+
+
+def with_an_empty_battery(plan: ab.Plan, seed: int) -> ab.Flight:
+    return under(plan, seed, battery=ab.Battery(endurance=30.0, sag=0.45, charge_spread=0.9))
+
+
 def with_weak_gains(plan: ab.Plan, seed: int) -> ab.Flight:
     frequency = (12.0, 14.0, 16.0)[seed % 3]
     weak = ab.Controller(attitude_frequency=frequency, moment_feedforward=False)
@@ -61,7 +79,9 @@ PLANTED: dict[str, Callable[[ab.Plan, int], ab.Flight]] = {
     "vehicle": lambda plan, seed: under(plan, seed, mass=0.1),
     "hand-off": handed_over,
     "saturation": lambda plan, seed: ab.fly(plan, with_rotors(plan, max_thrust=0.55 + 0.05 * seed)),
-    "delay": lambda plan, seed: ab.fly(plan, with_rotors(plan, lag=1.5 + 0.25 * seed), nominal=plan.vehicle),
+    "delay": with_late_commands,
+    "lag": with_slow_rotors,
+    "thrust": with_an_empty_battery,
     "gains": with_weak_gains,
 }
 
@@ -124,7 +144,7 @@ def with_twice_the_lag() -> ab.Flight:
         ("motor order", with_motors_swapped, "rotor 1 obeys what rotor 2 should"),
         ("rates", with_half_the_rates, r"turns at 0\.5\d? of the rates asked"),
         ("rate gains", with_gains_for_more_inertia, r"gain is [23]\.\d times as large in roll"),
-        ("lag", with_twice_the_lag, "rotors take 4[01] ms to follow, not 20 ms"),
+        ("lag", with_twice_the_lag, r"rotor \d takes 4[01] ms to follow, not 20 ms"),
     ],
 )
 def test_a_fault_of_the_inner_loop_is_named_by_its_log(

@@ -12,7 +12,6 @@ from aerobat.errors import Reason
 from aerobat.flatness import TimeInterval
 from aerobat.limits.limit import quantity_name
 
-
 BINDING = 0.01  # of a limit's size: a quantity that comes so near is limited by it
 
 

@@ -2,6 +2,7 @@
 
 # no postponed annotations here: the class of options is made from them, where nobody could look names up
 
+import dataclasses
 from dataclasses import dataclass, field, make_dataclass
 from functools import partial
 from inspect import getdoc
@@ -11,6 +12,7 @@ from typing import Annotated, Any, TypeVar
 from cyclopts import Group, Parameter, validators
 
 from aerobat.cli.runs.record import USUAL_CONDITIONS
+from aerobat.errors import SpecError
 from aerobat.interchange.columns import ALL
 from aerobat.planning import PlannerOption, planner_options, registered_planners
 
@@ -142,7 +144,11 @@ def is_given(value: Any) -> bool:
 
 def _with_planner_options(cls: Options) -> Options:
     """The class with a field for each option that some planner offers, None where it was not given."""
-    fields = [_field(flag, offers) for flag, offers in offered_options().items()]
+    offered = offered_options()
+    for flag in sorted({f"--{each.name}" for each in dataclasses.fields(cls)} & offered.keys()):
+        takers = " and ".join(offered[flag])
+        raise SpecError(f"{flag} is an option of the command, and of the planner {takers}; rename that field")
+    fields = [_field(flag, offers) for flag, offers in offered.items()]
     own = {"__doc__": cls.__doc__}  # else its signature is written out, in milliseconds
     made: Any = make_dataclass(cls.__name__, fields, bases=(cls,), namespace=own, frozen=True, kw_only=True)
     made.__module__ = cls.__module__  # else it seems to be one of Python's own types

@@ -64,7 +64,7 @@ class Registry(Generic[T]):
             raise SpecError(f"there are two {self._noun}s named {name!r}, {both}; rename one")
         made: Any = declared(cls)
         if "kind" in vars(cls).get("__annotations__", {}):
-            raise SpecError(f"{cls.__name__}.kind would hide the name of the {self._noun} in files; rename it")
+            raise SpecError(f"{cls.__name__}.kind hides the name of the {self._noun} in files; rename it")
         if not made.__pydantic_complete__:
             raise SpecError(f"{cls.__name__} has a field whose type is no known name; import that type")
         made.kind = name

@@ -34,6 +34,7 @@ from aerobat.simulation.passages import (
 )
 from aerobat.vehicle import Vehicle, as_vehicle
 
+OTHER_PATH = 0.5  # [m] from a flight's set-points at the median: clocks that differ make less
 COASTING = 0.1  # [s] without a pose: several periods of any motion capture
 _FELT = {  # by the plant
     Contact.GROUND: Outcome.TOUCHED_GROUND,
@@ -236,13 +237,25 @@ def _failures(judged: Iterable[Passage | WaypointPassage | StageAttitude]) -> It
     yield from (each.failure for each in judged if each.failure is not None)
 
 
+def _require_own_plan(times: Array, asked: Array, plan: Plan) -> None:
+    """Refuse a plan whose path is not that of the set-points (T, 3) at these times [s]."""
+    path = plan.trajectory.evaluate(np.clip(times, 0.0, plan.duration))
+    off = float(np.median(np.linalg.norm(asked - path, axis=1)))
+    if off > OTHER_PATH:
+        raise SpecError(
+            f"goal: the plan's path lies {length(off)} from the flight's set-points half of the time; give "
+            "the flight's own plan"
+        )
+
+
 @validated
 def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | None = None) -> Score:
     """Score one flight; with the vehicle, by default the plan's, its clearance in the gates too.
 
     Errors are against the set-points in the flight: position as a distance [m], attitude as the angle of
     the relative rotation [deg]. With a plan, gates are to be passed at its stages' instants; with the
-    problem alone, at the set-points' nearest approaches. Raises SpecError for a batch of flights.
+    problem alone, at the set-points' nearest approaches. Raises SpecError for a batch of flights, and for
+    the plan of another flight.
     """
     if flight.is_batch:
         raise SpecError("score takes one flight at a time; of a batch, score flight[k]")
@@ -251,6 +264,8 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
         vehicle = goal.vehicle
     body = None if vehicle is None else as_vehicle(vehicle).bounding_ellipsoid
     setpoint = flight.setpoint
+    if isinstance(goal, Plan):
+        _require_own_plan(flight.times, setpoint.flat.position, goal)
     criteria = criteria_of(goal, SampledPath(flight.times, setpoint.flat.position, setpoint.q_world_body))
     contact, touched = flight.first_contact
     states, pieces = flight.states, flight.environment.pieces

@@ -152,8 +152,8 @@ def _require_newtons(names: tuple[str, ...], thrusts: Array, nominal: Vehicle) -
     for name, thrust, most in zip(names, thrusts.T, nominal.max_thrusts, strict=True):
         if thrust.max() > STRONGER * most:
             raise SpecError(
-                f"the column {name} reaches {thrust.max():.3g}, where {nominal.name}'s rotor gives {most:.3g} N "
-                "at most; give newtons"
+                f"the column {name} reaches {thrust.max():.3g}, where {nominal.name}'s rotor gives "
+                f"{most:.3g} N at most; give newtons"
             )
 
 

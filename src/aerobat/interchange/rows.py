@@ -174,8 +174,8 @@ def require_numbers(text: str) -> None:
     first = text.partition("\n")[0].strip()
     if first and not any(_is_number(word) for word in first.split(",", MAX_COLUMNS)):
         raise SpecError(
-            f"line 1 is neither numbers nor names of columns, got {first[:60]!r}; name them t,x,y,z and so on, "
-            "without units, commas between"
+            f"line 1 is neither numbers nor names of columns, got {first[:60]!r}; name them t,x,y,z and so "
+            "on, without units, commas between"
         )
 
 

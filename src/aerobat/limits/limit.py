@@ -48,9 +48,9 @@ class Limit:
         """Check what a family of one's own may get wrong."""
         if not self.lower <= self.upper:
             ends = f"lower {self.lower:g} and upper {self.upper:g}"
-            raise SpecError(f"limit '{self.name}' has {ends}; give numbers that rise, inf where a side is open")
+            raise SpecError(f"limit '{self.name}' has {ends}; let them rise, and inf be where a side is open")
         if not 0.0 < self.size < inf:
-            raise SpecError(f"limit '{self.name}' has size {self.size:g}; give what its range is, more than 0")
+            raise SpecError(f"limit '{self.name}' has size {self.size:g}; give its range, more than 0")
         if isinstance(self.fields, str) or len(self.fields) != 2:
             raise SpecError(f"limit '{self.name}': fields must be a pair, of the lower and of the upper end")
 

@@ -39,7 +39,8 @@ def _(vehicle: Vehicle) -> Iterator[Fact]:
     yield Fact("body_m", body, "body", f"{' x '.join(map(length, body))} with its propellers")
     lag = float(vehicle.lags.max())
     yield Fact("lag_s", lag, "lag", f"{1e3 * lag:.3g} ms of the slowest rotor")
-    if not vehicle.dead_rotors:
+    doubts = vehicle_doubts(vehicle)
+    if not vehicle.dead_rotors and _can_hover(vehicle):
         hover = _hover(vehicle)
         yield Fact("hover", hover, "hover", f"at {100 * hover:.0f} % of the most loaded rotor's thrust")
         fleet, environment = Fleet.of([vehicle]), Environment()
@@ -50,7 +51,6 @@ def _(vehicle: Vehicle) -> Iterator[Fact]:
         bandwidth = float(max_bandwidth(fleet, environment)[0])
         told = f"up to {bandwidth:.3g} rad/s, {bandwidth / tau:.2g} Hz"
         yield Fact("attitude_loop_rad_s", bandwidth, "attitude loop", told)
-    doubts = vehicle_doubts(vehicle)
     yield from (said("looks wrong", doubt, style="red") for doubt in doubts)
     # an array: an empty tuple would be a table without rows
     yield Fact("doubts", np.array(doubts, dtype=object), "looks wrong", "" if doubts else "nothing")
@@ -107,6 +107,14 @@ def _weaknesses(vehicle: Vehicle) -> Iterator[str]:
             f"the attitude loop has {bandwidth:.2g} rad/s at most: slow for flips; are inertia and "
             "position_body those of this vehicle?"
         )
+
+
+def _can_hover(vehicle: Vehicle) -> bool:
+    try:
+        vehicle.require_hover(STANDARD_GRAVITY)
+    except SpecError:
+        return False
+    return True
 
 
 def _hover(vehicle: Vehicle) -> float:

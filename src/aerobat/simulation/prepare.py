@@ -53,7 +53,7 @@ def prepare(
     config = config.changed(changes)
     for name, outside in (("plant", config.plant), ("autopilot", config.autopilot)):
         if outside is not None:
-            raise SpecError(f"{name}: '{outside.kind}' is flown as a whole; give it to fly(), or leave it out")
+            raise SpecError(f"{name}: '{outside.kind}' is not stepped; give it to fly(), or leave it out")
     return setup_of(plan, vehicle, environment, config)
 
 

@@ -16,6 +16,7 @@ from aerobat.engines import CompiledLoop, Engine, choose
 from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import Tree, tree_map
 from aerobat.environment import Environment
+from aerobat.errors import SpecError
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.components import PlantParameters, RigidBodyPlant, log_row
@@ -148,7 +149,9 @@ class FlightSetup(LoopSetup):
         return self.tick(0)
 
     def tick(self, tick: int) -> LoopInput:
-        """The inputs of one tick, for `init` and `step`."""
+        """The inputs of one tick, for `init` and `step`. Raises SpecError for one that the flight has not."""
+        if not 0 <= tick < len(self.times):
+            raise SpecError(f"tick must be from 0 to {len(self.times) - 1}, the flight's last, got {tick}")
         inputs: LoopInput = first_row(self.inputs(tick, tick + 1))
         return inputs
 

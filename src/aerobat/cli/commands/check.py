@@ -118,4 +118,5 @@ def _explained(plan: Plan, trajectory: Trajectory, vehicle: Vehicle) -> Plan | N
 def _assumed(options: CheckOptions, vehicle: Vehicle, environment: Environment) -> list[str]:
     """All that a path leaves open and no option says."""
     facts = [] if options.vehicle else [f"the vehicle {vehicle.name}"]
-    return [*facts, f"gravity {environment.gravity:g} m/s²", "no wind", "no limits, stages or gates of a problem"]
+    facts += [f"gravity {environment.gravity:g} m/s²", "no wind", "no limits, stages or gates of a problem"]
+    return facts

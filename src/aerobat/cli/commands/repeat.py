@@ -20,6 +20,7 @@ from aerobat.cli.runs.folder import FLIGHT, finish, finish_study
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
+from aerobat.declaration.registry import imported_plugins
 from aerobat.documents import read_json
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_table
@@ -53,6 +54,10 @@ def repeat(
         A folder that `aerobat plan`, `fly`, `sweep`, `feasibility` or `compare` wrote.
     """
     record = read_record(folder)
+    imported = imported_plugins()
+    missing = [file for file in record.plugins if str(Path(file).resolve()) not in imported]
+    if missing:
+        raise SpecError(f"{folder}/ was made with --import {' '.join(missing)}; give that here too")
     out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")
     options = replace(options, out=out)
     if record.command in STUDIES:

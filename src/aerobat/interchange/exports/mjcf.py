@@ -1,7 +1,7 @@
 """A plan as a MuJoCo model, an .xml file: the vehicle, gates, obstacles and ground, and a keyframe a row.
 
-A keyframe holds pose, velocity, rotor thrusts and commands of an instant, at which a simulation may begin, and
-where gates and obstacles that move are then. A command is the thrust and what the rotor's lag takes of it.
+A keyframe holds pose, velocity, rotor thrusts and commands of an instant, at which a simulation may begin,
+and where gates and obstacles that move are then. A command leads the thrust by the rotor's lag.
 """
 
 from __future__ import annotations

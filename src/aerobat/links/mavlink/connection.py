@@ -57,13 +57,15 @@ def connect(address: str, *, listen: bool, system: int, component: int = 1, baud
 
     Args:
         address: udp:HOST:PORT, udpin:, udpout:, tcp: or tcpin: likewise, or a serial device.
-        listen: of udp:, to wait on that port rather than send there first.
+        listen: of udp: and tcp:, to wait on that port rather than send there first.
         system: our number among MAVLink's systems.
         component: likewise among its components.
         baud: the rate of a serial device [bit/s].
     """
     dialect()
     _check(address)
+    if listen and address.startswith("tcp:"):
+        address = address.replace("tcp:", "tcpin:", 1)
     from pymavlink import mavutil
 
     # pymavlink prints what ails a link on standard output, which is the report's

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import ceil
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from aerobat.declaration import placed, shown
 from aerobat.engines.engine import expanded
 from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.engines.pytree import tree_map, tree_stack
@@ -42,7 +43,7 @@ from aerobat.simulation.components import (
 from aerobat.simulation.flight_controller import AutopilotRun, Sensed
 from aerobat.simulation.loop import Component, Controlling, LoopInput, Signals, compose
 from aerobat.simulation.outcome import Contact
-from aerobat.simulation.plants.plant import Actuation, PlantRun, PlantScene
+from aerobat.simulation.plants.plant import Actuation, Plant, PlantRun, PlantScene
 from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle.ellipsoid import Ellipsoid
 
@@ -160,7 +161,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
     controller = next(each for each in init(FloatOps, *numbers) if isinstance(each, Controlling))
     motion = motion._replace(thrusts=controller.thrusts)
     scene = _scene(setup, gates)
-    run: PlantRun = RigidBodyRun(scene, motion) if plant is None else plant.begin(scene, motion)
+    run: PlantRun = RigidBodyRun(scene, motion) if plant is None else _begun(plant, scene, motion)
     rows, touched = [], np.zeros(len(setup.times), dtype=np.int64)
     with _Firmware(setup, scene) as firmware:
         for tick, period in enumerate(np.diff(setup.times, append=setup.times[-1]).tolist()):
@@ -172,6 +173,22 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
             if period > 0.0:
                 run.advance(actuation, period)
     return tree_stack(rows, lambda parts: np.stack(parts, axis=-1)), touched
+
+
+def _begun(plant: Plant, scene: PlantScene, motion: VehicleState) -> PlantRun:
+    """The plant's vehicle at its start. Raises SpecError where a plant of one's own gives something else."""
+    run: Any = plant.begin(scene, motion)
+    names = ("motion", "contact", "advance")
+    missing = [
+        name for name in names if not hasattr(type(run), name) and name not in getattr(run, "__dict__", ())
+    ]
+    if missing:
+        wrong = f"returned {shown(run)} from begin(), which has no {' and no '.join(missing)}"
+    elif not isinstance(run.motion, VehicleState):
+        wrong = f"has {shown(run.motion)} for its motion, not a VehicleState"
+    else:
+        return cast(PlantRun, run)
+    raise placed(SpecError(f"plant '{plant.kind}' {wrong}"), plant.begin)
 
 
 def _without_rate_loop(parts: tuple[LoopPart, ...]) -> tuple[LoopPart, ...]:

@@ -102,8 +102,16 @@ def disturbances(flight: Flight, vehicle: Vehicle, loop: PositionLoop) -> Distur
     )
 
 
-def command_delay(flight: Flight, vehicle: Vehicle) -> float:
-    """The time [s] from commands to the rotors that obey them, by the rotors' nominal lags; 0 to 0.2 s.
+@dataclass(frozen=True)
+class CommandDelay:
+    """The time from commands to the rotors that obey them."""
+
+    time: float  # [s] 0 to 0.2
+    unexplained: float  # [N²] of what thrusts change by in a row, the mean square that it leaves
+
+
+def command_delay(flight: Flight, vehicle: Vehicle) -> CommandDelay:
+    """The time from commands to the rotors that obey them, by the rotors' nominal lags.
 
     Rotors with lag τ that take up commands d late, d within one row, miss what they would give at once by
     (u' − u) (e^(−(h − d)/τ) − e^(−h/τ)), where u follows u': of which d is told by regression.
@@ -126,7 +134,7 @@ def command_delay(flight: Flight, vehicle: Vehicle) -> float:
         if remains < best * (1.0 - 1e-6):
             lag = float(lags.mean())
             best, delay = remains, rows * h + h + lag * float(np.log(slope + np.exp(-h / lag)))
-    return delay
+    return CommandDelay(delay, float(best))
 
 
 def _lift(flight: Flight, vehicle: Vehicle) -> Array:

@@ -22,6 +22,8 @@ from aerobat.kernels import rate_loop
 from aerobat.kernels.rate_loop import RateLoopModel, RateSetpoint, rate_gains
 from aerobat.simulation import Flight
 from aerobat.simulation.law_controller import DERIVATIVE, GYRO
+from aerobat.studies.inspection.fault import Fault
+from aerobat.studies.inspection.rotors import lag_fault, slower
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
@@ -31,25 +33,12 @@ _OTHER_RATES = 0.5  # [-] of what the model does not explain, that other rates l
 _RATES_OFF = 0.15  # [-] by which rates are others
 _GAIN_OFF = 0.4  # [-] by which a gain is another one: rounding, filters and delays take 0.2
 _ERRORS = 4.0  # standard errors of a gain, beside that
-_LAG_OFF = 0.4  # [-] by which rotors are slower than planned for: twice what a lab's spread makes of four
 _EXCITED = 0.05  # [rad/s] of the rate error, RMS, that tells a gain
 _FEWEST = 20  # rows without saturation that tell a gain
 _AXES = ("roll", "pitch", "yaw")
 
 
-@dataclass(frozen=True)
-class InnerLoopFault:
-    """A fault that a log shows of the inner loop, whatever it cost."""
-
-    cause: str  # of CAUSES
-    evidence: str  # a sentence with its numbers
-
-    def __str__(self) -> str:
-        """One line for people."""
-        return self.evidence
-
-
-def inner_loop_fault(flight: Flight, vehicle: Vehicle) -> InnerLoopFault | None:
+def inner_loop_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
     """Return the fault of the inner loop that a log shows, None where it shows none, or no inner loop.
 
     Args:
@@ -79,7 +68,7 @@ class _InnerLoopLog:
         free = lfilter(felt, [1.0], flight.saturated.astype(np.float64)) < 0.5
         return cls(flight, vehicle, Fleet.of([vehicle]), period, free)
 
-    def order(self) -> InnerLoopFault | None:
+    def order(self) -> Fault | None:
         """Other rotors than the model's do what it commands."""
         expected = self._model_commands()
         misfit = np.mean((self.flight.commands[:, :, None] - expected[:, None, :]) ** 2, axis=0)
@@ -89,9 +78,9 @@ class _InnerLoopLog:
         swapped = (
             f"rotor {k} obeys what rotor {m} should" for k, m in zip(rotors, meant, strict=True) if k != m
         )
-        return InnerLoopFault("motor order", f"motors are in another order: {', '.join(swapped)}")
+        return Fault("motor order", f"motors are in another order: {', '.join(swapped)}")
 
-    def rates(self) -> InnerLoopFault | None:
+    def rates(self) -> Fault | None:
         """The commands are those for a multiple of the rates asked."""
         asked, rest = self._asked, self._commanded + self._model_feedback
         factors, unexplained, before = [], 0.0, 0.0
@@ -110,29 +99,21 @@ class _InnerLoopLog:
         if unexplained > _OTHER_RATES**2 * before or abs(factor - 1.0) < _RATES_OFF:
             return None
         axis_name = _AXES[strongest]
-        return InnerLoopFault(
-            "rates", f"the inner loop turns at {factor:.2f} of the rates asked in {axis_name}"
-        )
+        return Fault("rates", f"the inner loop turns at {factor:.2f} of the rates asked in {axis_name}")
 
-    def gains(self) -> InnerLoopFault | None:
+    def gains(self) -> Fault | None:
         """The commands are those of another proportional gain."""
         off = [
             f"{factor:.1f} times as large in {axis}"
             for axis, (factor, error) in zip(_AXES, self._gain_factors(), strict=False)
             if abs(factor - 1.0) > _GAIN_OFF + _ERRORS * error
         ]
-        return InnerLoopFault("rate gains", f"the inner loop's gain is {', '.join(off)}") if off else None
+        return Fault("rate gains", f"the inner loop's gain is {', '.join(off)}") if off else None
 
-    def lag(self) -> InnerLoopFault | None:
+    def lag(self) -> Fault | None:
         """Rotors follow their commands later than the vehicle's file says."""
-        thrusts = self.flight.thrusts
-        missing, change = (self.flight.commands - thrusts)[:-1], np.diff(thrusts, axis=0)
-        share = float(np.sum(missing * change) / max(np.sum(missing**2), 1e-12))
-        lag = -self.period / np.log(np.clip(1.0 - share, 1e-9, 1.0 - 1e-9))
-        planned = float(self.vehicle.lags.mean())
-        if lag < (1.0 + _LAG_OFF) * planned:
-            return None
-        return InnerLoopFault("lag", f"rotors take {1e3 * lag:.0f} ms to follow, not {1e3 * planned:.0f} ms")
+        found = max(slower(self.flight, self.vehicle), key=lambda late: late[1], default=None)
+        return None if found is None else lag_fault(*found, self.vehicle)
 
     def _gain_factors(self) -> Iterator[tuple[float, float]]:
         """The proportional gain over the model's, and its standard error, by axis."""

@@ -23,6 +23,7 @@ from aerobat.studies.inspection.disturbances import (
 )
 from aerobat.studies.inspection.inner_loop import inner_loop_fault
 from aerobat.studies.inspection.result import Inspection
+from aerobat.studies.inspection.rotors import rotor_fault
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
 
@@ -136,12 +137,12 @@ def inspect_flight(
         )
     alignment = aligned(flight, plan.trajectory)
     loop = PositionLoop.of(controller or nominal.controller, nominal, flight)
-    delay = command_delay(flight, nominal)
+    delay = command_delay(flight, nominal).time
     causes = disturbances(flight, nominal, loop)
     error = flight.position - flight.setpoint_position
     rate = flight.velocity - flight.setpoint_velocity
     unsaturated = "delay" if delay > NOTICED else "gains"
-    fault = inner_loop_fault(flight, nominal)
+    fault = inner_loop_fault(flight, nominal) or rotor_fault(flight, nominal)
     named = None if fault is None else fault.cause
     errors = responses(flight.times, (error[0], rate[0]), causes, loop, unsaturated, named)
     return Inspection(

@@ -13,7 +13,7 @@ from aerobat.arrays import Array
 from aerobat.declaration import by_value, short
 from aerobat.simulation.outcome import length
 from aerobat.studies.inspection.alignment import Alignment
-from aerobat.studies.inspection.inner_loop import InnerLoopFault
+from aerobat.studies.inspection.fault import Fault
 
 NEGLIGIBLE = 0.005  # [m] of error at most that calls for no cause: millimetres remain in the best flights
 _SHOWN = 5e-4  # [m] that is more than nothing in a line
@@ -50,6 +50,10 @@ CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
         "lag": (
             "a lag of the rotors longer than planned for",
             "measure their step response, set `lag`, and plan and configure anew",
+        ),
+        "thrust": (
+            "rotors that give less thrust than they are commanded",
+            "charge the battery, measure `max_thrust`, and plan with a larger `reserve`",
         ),
     }
 )
@@ -93,7 +97,7 @@ class Inspection:
     saturated: float  # [-] part of the rows
     observed: bool  # false where the log does not tell what an observer saw
     alignment: Alignment
-    fault: InnerLoopFault | None = None  # of the inner loop, whatever it cost
+    fault: Fault | None = None  # of the inner loop or of rotors, whatever it cost
 
     def __post_init__(self) -> None:
         """Write-protect."""
@@ -102,7 +106,7 @@ class Inspection:
 
     @property
     def cause(self) -> str | None:
-        """The inner loop's fault, whatever it cost; else the largest error's main cause, if it has one."""
+        """The fault that the log shows, whatever it cost; else the largest error's main cause, if any."""
         return self._main_cause if self.fault is None else self.fault.cause
 
     @property
@@ -160,7 +164,7 @@ class Inspection:
 
     @property
     def verdict(self) -> str:
-        """The main cause and what would mend it, in one sentence; before it a fault of the inner loop."""
+        """The main cause and what would mend it, in a sentence; before it a fault that the log shows."""
         if self.fault is None or self.fault.cause == self._main_cause:
             return self._explanation
         return f"{self.fault}; {CAUSES[self.fault.cause][1]}. Of the error: {self._explanation}"
