@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import aerobat as ab
 from aerobat.certification import Certificate, Envelope, Finding, Side, Verdict, certify
 from aerobat.errors import SpecError
 from aerobat.planning import plan
@@ -232,3 +233,16 @@ def test_a_finding_is_nearer_than_can_be_told_only_where_its_bound_is_beyond_the
     said = str(Finding("collective thrust", "N", Side.MAX, value, bound, 1.0, limit, Verdict.UNDECIDED))
     assert ("nearer to its limit than can be told" in said) == (bound > limit)
     assert ("within its limit" in said) == (bound <= limit)
+
+
+def test_what_all_but_reaches_its_limit_is_named_beside_the_rotors():
+    slow = ab.Problem(
+        "slow", ab.at_rest((0, 0, 1.0)), ab.at_rest((4.0, 0, 1.0)), ab.Line(), limits=ab.Limits(velocity=1.0)
+    )
+    found, free = (
+        ab.plan(problem, ab.Miqp(reserve=0.15), "agile-quad").certificate
+        for problem in (slow, replace(slow, limits=ab.Limits()))
+    )
+    assert found.binding.name == "velocity x"
+    assert found.worst.rotor is not None
+    assert free.binding is None

@@ -174,7 +174,7 @@ def test_what_fails_in_a_planner_of_ones_own_is_one_sentence(body: str, said: st
 @pytest.mark.parametrize(
     ("name", "body", "said"),
     [
-        ("mine-a", "return object()", "AttributeError: 'object' object has no attribute"),
+        ("mine-a", "return object()", "from begin(), which has no motion"),
         ("mine-b", "raise OSError('no server')", "OSError: no server"),
     ],
 )

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import aerobat as ab
 from aerobat import so3
 from aerobat.control import Controller
 from aerobat.errors import SpecError
@@ -152,3 +153,16 @@ def test_a_vehicle_with_weak_rotors_gets_slower_loops_of_the_same_shape() -> Non
     assert half.position == pytest.approx(usual.position / 4)
     assert half.velocity == pytest.approx(usual.velocity / 2)
     assert half.stiffness / half.damping**2 == pytest.approx(usual.stiffness / usual.damping**2)
+
+
+@pytest.mark.parametrize("name", ["full", "paper"])
+def test_a_law_of_ones_own_takes_no_name_that_comes_with_aerobat(name: str) -> None:
+    with pytest.raises(ab.SpecError, match=f"controller '{name}' comes with Aerobat"):
+
+        @ab.controller(name)
+        class Mine(ab.ControlLaw):
+            def init(self, *args: object) -> object:
+                return ()
+
+            def step(self, *args: object) -> object:  # type: ignore[override]
+                return args

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import aerobat as ab
 from aerobat import so3
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
@@ -13,6 +14,7 @@ from aerobat.problem import Gate, Problem, at_rest, tilted_gate
 from aerobat.simulation import Flight, Outcome, fly
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, load_vehicle
+from shared_plans import shared_plan
 
 SPEED = 4.0  # [m/s]
 
@@ -197,3 +199,9 @@ def test_scores_of_many_flights_are_a_sequence_of_scores(quad: Vehicle) -> None:
     for k in (2, -3):
         with pytest.raises(IndexError, match=f"there are 2 flights, no flight {k}"):
             scores[k]
+
+
+def test_a_flight_is_not_judged_by_the_plan_of_another() -> None:
+    flip, line = shared_plan("half-flip"), shared_plan("line")
+    with pytest.raises(ab.SpecError, match="from the flight's set-points half of the time"):
+        ab.score(ab.fly(flip), line)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerobat.errors import SpecError
-from aerobat.interchange import read_csv, write_csv
+from aerobat.interchange import read_csv, read_rows, write_csv
 from aerobat.interchange.rows import SHORT
 from aerobat.trajectory import Trajectory
 from suites import examples
@@ -146,6 +146,7 @@ TIMED = [",".join([GOOD, time]) for time in ("0.0", "0.01", "0.015")]
         ("", "two lines"),
         (f"{GOOD}\n", "two lines"),
         ("\x00\x01", "line 1"),
+        ("t [s],x [m],y [m],z [m]\n0,0,0,0\n1,0,0,0\n", "line 1 is neither numbers nor names of columns"),
     ],
 )
 def test_malformed_files_get_one_sentence_that_names_the_line(text, line, tmp_path):
@@ -206,3 +207,12 @@ def test_a_written_file_has_the_rights_that_any_new_file_has(tmp_path):
     write_csv(random_trajectory(0), tmp_path / "plan.csv")
     modes = [stat.S_IMODE(os.stat(tmp_path / name).st_mode) for name in ("other", "plan.csv")]
     assert modes[0] == modes[1]
+
+
+def test_empty_lines_at_the_end_are_no_rows_and_what_is_not_used_is_named(tmp_path):
+    path = tmp_path / "path.csv"
+    rows = [f"{0.1 * k},{0.01 * k**2},0,0,1,0,0,0,30" for k in range(6)]
+    path.write_text("\n".join(["t,x,y,z,qw,qx,qy,qz,yaw", *rows, "", ""]))
+    found = read_rows(path)
+    assert found.trajectory.duration == pytest.approx(0.5)
+    assert found.unused == ("attitudes after the first row", "column yaw")

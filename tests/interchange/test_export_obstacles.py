@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -19,6 +20,13 @@ from obstacle_cases import open_cruise, walled_cruise
 from places import ROOT
 
 NAMES = {"trunk", "sphere", "box", "the wall of gate"}
+
+
+def through_a_moving_gate() -> ab.Plan:
+    gate = replace(ab.tilted_gate((4.0, 1.0, 1.5)), velocity=np.array([0.0, -0.5, 0.2]))
+    ends = ab.at_rest((0.0, 0.0, 1.0)), ab.at_rest((8.0, 0.0, 1.5))
+    problem = ab.Problem("moving", *ends, ab.Line(), (gate,))
+    return ab.plan(problem, ab.Miqp(order=5), "agile-quad")
 
 
 def directions() -> np.ndarray:
@@ -73,6 +81,23 @@ def test_in_a_model_for_mujoco_the_body_is_as_far_from_obstacles_as_it_is_here(t
         bodies, beside = pieces.near(data.qpos[None, :3] + offset, plan.vehicle.body_radius, 100.0)
         here = pieces.separated(beside, (data.qpos[None, :3] + offset)[bodies], shapes[bodies]).gaps.min()
         assert there == pytest.approx(here, abs=0.005)
+
+
+@pytest.mark.slow
+def test_a_model_for_mujoco_moves_gates_and_plays_the_plan_by_its_commands(tmp_path: Path) -> None:
+    plan = through_a_moving_gate()
+    made = ab.export(plan, tmp_path / "moving.xml", "mujoco", rate=1000.0)
+    assert "no place for the vehicle's drag" not in str(made)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "moving.xml"))
+    gate = plan.problem.gates[0]
+    np.testing.assert_allclose(model.key_mpos, model.key_time[:, None] * gate.velocity, atol=1e-9)
+    data = mujoco.MjData(model)
+    model.opt.timestep = 0.001
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    for ctrl in model.key_ctrl[:200]:
+        data.ctrl[:] = ctrl
+        mujoco.mj_step(model, data)
+    assert np.linalg.norm(data.qpos[:3] - plan.trajectory.evaluate(0.2)) < 0.03  # 0.07 m by thrusts alone
 
 
 @pytest.mark.parametrize(("to", "name"), [("ros1-bag", "walled.bag"), ("mcap", "walled.mcap")])

@@ -160,3 +160,23 @@ def test_a_malformed_log_is_refused_in_a_sentence(text: str, told: str, tmp_path
     file.write_text(text)
     with pytest.raises(ab.SpecError, match=told):
         ab.read_flight_log(file, plan())
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"position": lambda x: 1000.0 * x}, "from the plan's path half of the time; give metres"),
+        ({"position": lambda x: x[:, [1, 0, 2]] * [1.0, 1.0, -1.0]}, "z up, of a flight of this plan"),
+        ({"thrusts": lambda f: 102.0 * f}, "the column f0 reaches .* N at most; give newtons"),
+        ({"times": lambda t: t + (t > 0.5 * t[-1]) * 0.4}, "t rises by 0.4[0-9]* s, where rows are"),
+    ],
+)
+def test_a_log_in_other_units_or_axes_or_with_a_gap_is_refused(
+    change: dict[str, Callable[[Any], Any]], told: str, tmp_path: Path
+) -> None:
+    flight = PLANTED["vehicle"]()
+    changed = {name: how(getattr(flight, name)) for name, how in change.items()}
+    times = changed.pop("times", flight.times)
+    other = replace(flight, times=times, series={**flight.series, **changed})
+    with pytest.raises(ab.SpecError, match=told):
+        ab.read_flight_log(log(tmp_path / "log.csv", other, (*POSE, *THRUSTS)), plan())

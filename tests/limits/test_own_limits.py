@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from aerobat.certification import Side, certify
-from aerobat.errors import Infeasible
+from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import reference
 from aerobat.limits import Asked, Limit, PathQuantity, register_limits
 from aerobat.limits.along import FAMILIES
@@ -94,3 +94,18 @@ def test_a_flip_below_a_ceiling_on_tilt_is_refused() -> None:
         Miqp(rescue=False).plan(
             replace(load_problem("flip-roll"), limits=Limits(max_tilt=radians(60.0))), QUAD
         )
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"lower": float("nan")}, "limit 'thrust rate' has lower nan and upper 9"),
+        ({"lower": 10.0}, "lower 10 and upper 9"),
+        ({"size": 0.0}, "has size 0; give its range"),
+        ({"fields": "battery"}, "fields must be a pair"),
+    ],
+)
+def test_a_limit_that_is_none_is_refused_in_a_sentence(changed: dict[str, object], told: str) -> None:
+    rate = PathQuantity.of_wrench(np.zeros(4), [1.0, 0.0, 0.0, 0.0])
+    with pytest.raises(SpecError, match=told):
+        replace(Limit("thrust rate", "N/s", rate, -9.0, 9.0, ("a", "b"), 18.0), **changed)  # type: ignore[arg-type]

@@ -297,3 +297,14 @@ def test_a_maneuver_that_nobody_registered_has_no_place_in_a_file() -> None:
 
     with pytest.raises(SpecError, match="Tumble has no place in a file: it is not registered"):
         to_table(Tumble())
+
+
+def test_a_field_called_kind_would_hide_a_maneuvers_name() -> None:
+    with pytest.raises(ab.SpecError, match=r"Mine\.kind hides the name of the maneuver in files"):
+
+        @ab.maneuver("with-a-kind")
+        class Mine(ab.Maneuver):
+            kind: str = "x"  # type: ignore[misc]
+
+            def stage_sequence(self, gates: object, max_specific_thrust: float) -> ab.StageSequence:
+                return ab.StageSequence(())

@@ -9,9 +9,11 @@ import pytest
 
 import aerobat as ab
 from aerobat.environment.obstacles import OBSTACLES
+from aerobat.kernels.motors import VehicleState
 from aerobat.simulation.outcome import Contact, Outcome
 from aerobat.simulation.plants import PLANTS
 from aerobat.simulation.plants.mujoco import Mujoco
+from aerobat.simulation.plants.plant import Plant, PlantScene
 from aerobat.simulation.plants.rotorpy import RotorPy, rotorpy_vehicle
 from flat_outputs import FlatOutputs
 from shared_plans import shared_plan
@@ -198,6 +200,21 @@ def test_plants_that_cannot_fly_are_refused_in_a_sentence(wrong: dict, sentence:
 def test_scores_of_many_flights_refuse_a_plant() -> None:
     with pytest.raises(ab.SpecError, match="one vehicle at a time"):
         ab.score_flights(through_the_gate(), plant="mujoco")
+
+
+@pytest.mark.parametrize("outside", [{"plant": "mujoco"}, {"autopilot": "betaflight"}])
+def test_what_flies_as_a_whole_is_not_prepared_to_be_stepped(outside: dict[str, Any]) -> None:
+    with pytest.raises(ab.SpecError, match="is not stepped; give it to fly"):
+        ab.prepare(through_the_gate(), **outside)
+
+
+def test_a_plant_whose_vehicle_is_none_is_refused_by_name() -> None:
+    class Wrong(Plant):
+        def begin(self, scene: PlantScene, motion: VehicleState) -> Any:
+            return 42
+
+    with pytest.raises(ab.SpecError, match=r"returned 42 from begin\(\), which has no motion"):
+        ab.fly(through_the_gate(), plant=Wrong())
 
 
 def test_unknown_vehicles_of_rotorpy_are_refused() -> None:

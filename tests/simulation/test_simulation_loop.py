@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+import aerobat as ab
 from aerobat.engines import ENGINE_NAMES, choose, run_whole
 from aerobat.engines.pytree import tree_leaves, tree_map
 from aerobat.environment import Environment
@@ -18,6 +19,7 @@ from aerobat.simulation.loop import Due, LoopInput, LoopParameters, StepClock, c
 from aerobat.simulation.setup import FlightSetup
 from aerobat.vehicle import load_vehicle
 from looping_flights import HEXA, QUAD, assert_same, loops, near
+from shared_plans import shared_plan
 
 
 def flight_of(engine: str, vehicles: Any = QUAD, duration: float = 1.0) -> FlightSetup:
@@ -198,3 +200,10 @@ def test_what_cannot_fly_is_refused(vehicle: Any, environment: Any, sentence: st
 def test_starts_of_a_batch_are_its_vehicles() -> None:
     batch = fly(loops(1.0), QUAD, start=near(3))
     assert batch.states.position.shape[0] == len(batch.vehicles) == 3
+
+
+@pytest.mark.parametrize("tick", [-1, 10**6])
+def test_a_tick_that_a_flight_has_not_is_refused(tick: int) -> None:
+    setup = ab.prepare(shared_plan("line"))
+    with pytest.raises(ab.SpecError, match="tick must be from 0 to"):
+        setup.tick(tick)

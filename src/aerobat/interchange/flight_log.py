@@ -29,7 +29,7 @@ LARGEST = 1e6  # [m], [m/s], [rad/s], [N] of what a multirotor does
 GAP, LONG = 20.0, 0.25  # times the usual step, and [s]: a longer one is a gap
 STRONGER = 2.0  # times a rotor's most: a thrust that is more has another unit
 # of the plan's extent, and [m]: a path that is as far from the plan's most of the time is another one
-ELSEWHERE = (0.25, 0.5)
+ELSEWHERE = (0.5, 0.5)
 AT_LIMIT = 1e-3  # of a rotor's range, within which a command is at its limit
 ESTIMATED = ("est_x", "est_y", "est_z")
 ESTIMATED_RATES = ("est_vx", "est_vy", "est_vz")

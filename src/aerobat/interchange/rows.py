@@ -172,7 +172,8 @@ def has_header(text: str) -> bool:
 def require_numbers(text: str) -> None:
     """Refuse a first line that neither is numbers nor names columns. Raises SpecError."""
     first = text.partition("\n")[0].strip()
-    if first and not any(_is_number(word) for word in first.split(",", MAX_COLUMNS)):
+    is_table = first.count(",") < MAX_COLUMNS
+    if first and is_table and not any(map(_is_number, first.split(","))):
         raise SpecError(
             f"line 1 is neither numbers nor names of columns, got {first[:60]!r}; name them t,x,y,z and so "
             "on, without units, commas between"

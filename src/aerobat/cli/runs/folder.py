@@ -34,6 +34,7 @@ from aerobat.storage import whole_folder
 from aerobat.studies.share import Share, Trials
 
 FLIGHT = "flight.npz"
+CALM = "none"  # the conditions under which nothing varies, so that no flights are counted
 AUTOPILOT = "autopilot.txt"  # the settings of the firmware that flew
 BLACKBOX = "blackbox.bfl"  # its own log of the flight
 INSPECTION = "inspect.png"  # so does its inspection, by `aerobat inspect`
@@ -192,13 +193,13 @@ def _sweep_hint(record: RunRecord, folder: Path) -> str:
     """The command that flies more of a run's flights; empty where no options of a sweep name how it flew."""
     flight = record.flight
     conditions = None if flight.conditions is None else flight.conditions.name
-    is_own = conditions is not None and conditions not in dispersion_names()
+    is_own = conditions is not None and conditions not in dispersion_names()  # its file's name is not known
     if flight.plant is not None or flight.autopilot is not None or is_own:
         return ""
     options = [f" --import {file}" for file in record.plugins]
     if flight.controller != FlightSettings().controller:
         options.append(f" --controller {flight.controller}")
-    if conditions is not None:
+    if conditions not in (None, CALM):
         options.append(f" --conditions {conditions}")
     return f"; `aerobat sweep {folder}{''.join(options)}` counts more flights"
 
@@ -221,7 +222,7 @@ def trial_flights(plan: Plan, record: RunRecord) -> Trials | None:
     if flight.conditions is None and record.paper:
         return None
     conditions = load_dispersion(USUAL_CONDITIONS) if flight.conditions is None else flight.conditions
-    if flight.plant is not None or conditions == load_dispersion("none"):
+    if flight.plant is not None or conditions == load_dispersion(CALM):
         return None
     if flight.probability is not None and plan.tube is not None:
         return Trials(conditions, flight.seed, Share(plan.tube.passed, plan.tube.flights))

@@ -90,7 +90,7 @@ def _assumed(path: Path, vehicle: Vehicle, problem: Problem, options: PlanningOp
 
 
 def between_rows(path: Path, rate: float) -> list[str]:
-    """What is assumed of a path in a CSV file, and what else the file holds, in words; nothing of others."""
+    """Assumptions about a path in a CSV file, and what else the file holds, in words; none of other files."""
     if path.suffix != ".csv":
         return []
     rows = read_rows(path, rate)
