@@ -78,18 +78,18 @@ def _columns(path: Path, duration: float) -> dict[str, Array]:
     if close.any():
         line = 3 + int(np.argmax(close))
         raise SpecError(f"line {line}: times, the column t, must rise, by {SHORTEST:g} s or more")
-    steps = np.diff(columns["t"])
-    if len(steps) and steps.max() > max(GAP * np.median(steps), LONG):
-        line = 3 + int(np.argmax(steps))
-        raise SpecError(
-            f"line {line}: t rises by {steps.max():.3g} s, where rows are {np.median(steps):.2g} s apart; "
-            "give a part without gaps"
-        )
     flown = (columns["t"] >= 0.0) & (columns["t"] <= duration)
     if flown.sum() < FEWEST:
         raise SpecError(
             f"{flown.sum()} of its rows lie within the plan's time, 0 to {duration:.3f} s; "
             "let t be 0 where the plan begins"
+        )
+    steps = np.diff(columns["t"][flown])
+    if steps.max() > max(GAP * np.median(steps), LONG):
+        line = 3 + int(np.argmax(flown)) + int(np.argmax(steps))
+        raise SpecError(
+            f"line {line}: t rises by {steps.max():.3g} s, where rows are {np.median(steps):.2g} s apart; "
+            "give a part without gaps"
         )
     used = {name: column[flown] for name, column in columns.items() if _is_known(name)}
     for name, column in used.items():
