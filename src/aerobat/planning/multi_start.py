@@ -101,9 +101,9 @@ class MultiStart:
     def _fastest(self) -> Plan | None:
         """The fastest plan of all starts, or one that a start was, if that is faster."""
         best, known = self._around(), list[Plan]()
-        for begun in self._batches() if best is None else ():
+        for refinement, begun in self._batches() if best is None else ():
             known += [plan for plan, _ in begun if plan is not None]
-            found = self._with_or_without_rooms([path for _, path in begun])
+            found = self._with_or_without_rooms(refinement, [path for _, path in begun])
             best = min(filter(None, (best, found)), key=_Found.rank, default=None)
             if out_of_time() or (best is not None and best.path.is_clear):
                 break
@@ -131,21 +131,27 @@ class MultiStart:
         found = _Found(FlownPath.of(around.refinement, around.judged).through_gates())
         return self._finished(around.refinement, [around.judged.solution.source], found)
 
-    def _batches(self) -> Iterator[list[_Start]]:
-        """Yield starts that are tried together, the next where these lead to no path clear of frames."""
+    def _batches(self) -> Iterator[tuple[Refinement, list[_Start]]]:
+        """Yield starts that are tried together, the next where these lead to no path clear of frames.
+
+        Each comes with the refinement that it is given: a course's closed forms are tried in haste first.
+        """
         task = self._task
         if self.start is not None:
-            yield [(self.start, WarmStart.of(self.start, task.stages))]
+            yield self.refinement, [(self.start, WarmStart.of(self.start, task.stages))]
         guess = replace(self.guess, reserve=task.reserve)
         if is_course(task.stages):
+            hasty = replace(self.refinement, hasty=True)
+            for start in closed_forms(task, (1.0, *SLOWER_PACES)):
+                yield hasty, [start]
             for each in chain(starts(task, guess), closed_forms(task, SLOWER_PACES), self._of_more(guess)):
-                yield [each]
+                yield self.refinement, [each]
             return
         with within_share(ROUGH_TIME):
             others = list(starts(task, guess))
             if not any(plan for plan, _ in others):
                 others = list(starts(task, replace(guess, segments=SEGMENTS)))
-        yield list(islice(_varied(sorted(others, key=_likeliest)), self.starts))
+        yield self.refinement, list(islice(_varied(sorted(others, key=_likeliest)), self.starts))
 
     def _of_more(self, guess: Miqp) -> Iterator[_Start]:
         """Yield the plans of mixed-integer programs of more intervals, of an open course."""
@@ -159,9 +165,9 @@ class MultiStart:
                 continue
             yield plan, WarmStart.of(plan, task.stages)
 
-    def _with_or_without_rooms(self, paths: Sequence[WarmStart]) -> _Found | None:
+    def _with_or_without_rooms(self, whole: Refinement, paths: Sequence[WarmStart]) -> _Found | None:
         """The fastest path near some, without rooms in gates where there is none with them."""
-        for refinement in self.refinement.with_and_without_rooms:
+        for refinement in whole.with_and_without_rooms:
             found = self._finished(refinement, self._rough(refinement, paths))
             if found is not None or out_of_time():
                 return found

@@ -117,6 +117,9 @@ class Refinement:
     still_ends: bool = False  # without jerk
     close: bool = False  # whether paths come within a thousandth of what they come near otherwise
     grows: bool = False  # whether paths get twice as many segments where they are much slower otherwise
+    # whether paths of few segments that miss a stage get no more, which take several times as long, mostly in
+    # vain: where other starts are at hand
+    hasty: bool = False
     _known: dict[tuple[Stage, ...], StageValues] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -194,7 +197,7 @@ class Refinement:
             known: The duration [s] of a path that is known: one that stays far behind it is left early.
         """
         number = found.path.trajectory.segments
-        while number < segments and not out_of_time():
+        while number < segments and not out_of_time() and not self._gives_up(found):
             number = min(2 * number, segments)
             found = self._rough(knots_at_stages(found.path, number), known, found.certified)
         return self._spread_anew(found, known)
@@ -283,8 +286,15 @@ class Refinement:
 
     def is_promising(self, path: RefinedPath) -> bool:
         """True of a path that meets its stages and exceeds limits by so little that rounds may mend it."""
-        missed = self._missed_stage(path.path, NEARLY_MISSED)
-        return path.excess.largest <= MENDABLE and missed is None
+        return path.excess.largest <= MENDABLE and self._nearly_meets_stages(path)
+
+    def _gives_up(self, path: RefinedPath) -> bool:
+        """True of a path that gets no more segments, although it has fewer than were asked."""
+        return self.hasty and not self._nearly_meets_stages(path)
+
+    def _nearly_meets_stages(self, path: RefinedPath) -> bool:
+        """True of a path whose stages rounds may still meet."""
+        return self._missed_stage(path.path, NEARLY_MISSED) is None
 
     def path(self, guess: WarmStart) -> RefinedPath:
         """A path, looked at densely."""
