@@ -40,19 +40,6 @@ class ThrustAlone(ab.ControlLaw):
         return state, RotorWrench(self.part * model.airframe.mass_properties.mass * thrust, ZERO)
 
 
-@ab.controller("thrust-of-none")
-class ThrustOfNone(ab.ControlLaw):
-    """No number for the thrust, from the second tick on."""
-
-    def init(self, ops: Any, model: Any, seen: Seen) -> Any:
-        """Return the thrust of the first tick."""
-        return (9.81 * model.airframe.mass_properties.mass,)
-
-    def step(self, ops: Any, model: Any, state: Any, seen: Seen, elapsed: Any) -> tuple[Any, RotorWrench]:
-        """Return the force."""
-        return (state[0] - np.inf,), RotorWrench(0.0 * state[0], ZERO)
-
-
 @ab.controller("thrust-for-floats")
 class ThrustForFloats(ThrustAlone):
     """The same, as anybody would write it."""
@@ -99,13 +86,6 @@ def test_a_law_of_ones_own_is_flown_as_itself_and_by_its_name() -> None:
     assert own == named
     weaker = ab.fly(GENTLE, QUAD, controller=ThrustAlone(part=0.9), engine="compiled")
     assert weaker != own
-
-
-@pytest.mark.parametrize("engine", ["floats", "compiled"])
-def test_a_force_that_is_no_number_is_none_of_the_rotors_either(engine: str) -> None:
-    flight = ab.fly(GENTLE, QUAD, controller=ThrustOfNone(), engine=engine)
-    assert flight.outcome is ab.Outcome.STATE_NOT_FINITE
-    assert flight.times[-1] < 0.01
 
 
 def test_the_engine_of_floats_flies_a_law_with_branches() -> None:

@@ -165,6 +165,13 @@ def test_a_flight_by_an_inner_loop_as_set_shows_no_fault_of_it() -> None:
     assert ab.inspect_flight(ab.fly(plan), plan).fault is None
 
 
+def test_rotors_that_do_not_change_tell_no_lag() -> None:
+    plan, flight = planned(0), ab.fly(planned(0))
+    steady = np.broadcast_to(flight.thrusts.mean(axis=0), flight.thrusts.shape)
+    still = replace(flight, series={**flight.series, "thrusts": steady, "commands": steady})
+    assert ab.inspect_flight(still, plan).fault is None
+
+
 @pytest.mark.parametrize("number", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_flight_without_causes_is_told_to_be_without(number: int) -> None:
     found = ab.inspect_flight(ab.fly(planned(number)), planned(number))

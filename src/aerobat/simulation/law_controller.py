@@ -78,7 +78,7 @@ class LawController(Component):
             raise _wrong(self.law.step, f"returned the state {shown(own)}, of another shape than before")
         loads = load, _change_ahead(model, axes(body.q_world_body), reference)
         commands = control.rotor_commands(ops, self.flags, model, loads, thrusts, decay_factors, elapsed)
-        return LawState(own, thrusts, _none_of_none(commands, load))
+        return LawState(own, thrusts, commands)
 
     def _checked(self, answer: Any) -> tuple[Any, RotorWrench]:
         """The state and the wrench that a law answered. Raises SpecError for anything else."""
@@ -90,12 +90,6 @@ class LawController(Component):
         raise _wrong(
             self.law.step, f"returned {shown(answer)}, not the state and a RotorWrench of four numbers"
         )
-
-
-def _none_of_none(commands: Commands, load: RotorWrench) -> Commands:
-    """Commands that are no numbers where force or moment are none: keeping rotors' limits would hide it."""
-    nothing = 0.0 * sum(load.moment_body, load.thrust)
-    return commands._replace(thrusts=tuple(thrust + nothing for thrust in commands.thrusts))
 
 
 def _wrong(method: Any, complaint: str) -> SpecError:

@@ -18,6 +18,7 @@ from aerobat.studies.inspection.fault import Fault
 from aerobat.vehicle import Vehicle
 
 LAG_OFF = 0.4  # [-] by which rotors are slower than planned for: twice what a lab's spread makes of four
+_EXCITED = 0.005  # of a rotor's range, that thrusts lack of their commands (RMS), so that they tell a lag
 _SHORT = 0.1  # of a rotor's range, by which thrust stays below its command,
 _WHILE = 0.06  # [s] for which it has been commanded so much: longer than delays,
 _STILL = 0.2  # of what it should rise by within a row: it rises by less
@@ -41,8 +42,9 @@ def slower(flight: Flight, vehicle: Vehicle) -> Iterator[tuple[int, float]]:
     shares = _shares(missing, change)
     period = float(np.median(np.diff(flight.times)))
     lags = -period / np.log(np.clip(1.0 - shares, 1e-9, 1.0 - 1e-9))
+    tells = np.sqrt(np.mean(missing**2, axis=0)) > _EXCITED * vehicle.thrust_ranges
     for rotor, (lag, planned) in enumerate(zip(lags.tolist(), vehicle.lags.tolist(), strict=True)):
-        if lag > (1.0 + LAG_OFF) * max(planned, period):
+        if tells[rotor] and lag > (1.0 + LAG_OFF) * max(planned, period):
             yield rotor, lag
 
 
