@@ -39,8 +39,7 @@ def _(vehicle: Vehicle) -> Iterator[Fact]:
     yield Fact("body_m", body, "body", f"{' x '.join(map(length, body))} with its propellers")
     lag = float(vehicle.lags.max())
     yield Fact("lag_s", lag, "lag", f"{1e3 * lag:.3g} ms of the slowest rotor")
-    doubts = vehicle_doubts(vehicle)
-    if not vehicle.dead_rotors and _can_hover(vehicle):
+    if not vehicle.dead_rotors and not _why_grounded(vehicle):
         hover = _hover(vehicle)
         yield Fact("hover", hover, "hover", f"at {100 * hover:.0f} % of the most loaded rotor's thrust")
         fleet, environment = Fleet.of([vehicle]), Environment()
@@ -51,6 +50,7 @@ def _(vehicle: Vehicle) -> Iterator[Fact]:
         bandwidth = float(max_bandwidth(fleet, environment)[0])
         told = f"up to {bandwidth:.3g} rad/s, {bandwidth / tau:.2g} Hz"
         yield Fact("attitude_loop_rad_s", bandwidth, "attitude loop", told)
+    doubts = vehicle_doubts(vehicle)
     yield from (said("looks wrong", doubt, style="red") for doubt in doubts)
     # an array: an empty tuple would be a table without rows
     yield Fact("doubts", np.array(doubts, dtype=object), "looks wrong", "" if doubts else "nothing")
@@ -89,10 +89,9 @@ def _weaknesses(vehicle: Vehicle) -> Iterator[str]:
     """What leaves a vehicle little or nothing to maneuver by."""
     if vehicle.dead_rotors:
         return
-    try:
-        vehicle.require_hover(STANDARD_GRAVITY)
-    except SpecError as error:
-        yield str(error)
+    grounded = _why_grounded(vehicle)
+    if grounded:
+        yield grounded
         return
     if vehicle.thrust_to_weight < MIN_THRUST_TO_WEIGHT:
         yield (
@@ -109,12 +108,13 @@ def _weaknesses(vehicle: Vehicle) -> Iterator[str]:
         )
 
 
-def _can_hover(vehicle: Vehicle) -> bool:
+def _why_grounded(vehicle: Vehicle) -> str:
+    """Why a vehicle cannot hover, in a sentence; empty where it can."""
     try:
         vehicle.require_hover(STANDARD_GRAVITY)
-    except SpecError:
-        return False
-    return True
+    except SpecError as error:
+        return str(error)
+    return ""
 
 
 def _hover(vehicle: Vehicle) -> float:

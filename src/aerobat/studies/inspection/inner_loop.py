@@ -23,7 +23,7 @@ from aerobat.kernels.rate_loop import RateLoopModel, RateSetpoint, rate_gains
 from aerobat.simulation import Flight
 from aerobat.simulation.law_controller import DERIVATIVE, GYRO
 from aerobat.studies.inspection.fault import Fault
-from aerobat.studies.inspection.rotors import lag_fault, slower
+from aerobat.studies.inspection.rotors import lag_fault
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
@@ -48,7 +48,7 @@ def inner_loop_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
     if not flight.has_inner_loop:
         return None
     log = _InnerLoopLog.of(flight, vehicle)
-    return log.order() or log.rates() or log.gains() or log.lag()
+    return log.order() or log.rates() or log.gains() or lag_fault(flight, vehicle)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +109,6 @@ class _InnerLoopLog:
             if abs(factor - 1.0) > _GAIN_OFF + _ERRORS * error
         ]
         return Fault("rate gains", f"the inner loop's gain is {', '.join(off)}") if off else None
-
-    def lag(self) -> Fault | None:
-        """Rotors follow their commands later than the vehicle's file says."""
-        found = max(slower(self.flight, self.vehicle), key=lambda late: late[1], default=None)
-        return None if found is None else lag_fault(*found, self.vehicle)
 
     def _gain_factors(self) -> Iterator[tuple[float, float]]:
         """The proportional gain over the model's, and its standard error, by axis."""

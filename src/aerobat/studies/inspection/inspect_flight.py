@@ -137,19 +137,19 @@ def inspect_flight(
         )
     alignment = aligned(flight, plan.trajectory)
     loop = PositionLoop.of(controller or nominal.controller, nominal, flight)
-    delay = command_delay(flight, nominal).time
+    delay = command_delay(flight, nominal)
     causes = disturbances(flight, nominal, loop)
     error = flight.position - flight.setpoint_position
     rate = flight.velocity - flight.setpoint_velocity
-    unsaturated = "delay" if delay > NOTICED else "gains"
-    fault = inner_loop_fault(flight, nominal) or rotor_fault(flight, nominal)
+    unsaturated = "delay" if delay.time > NOTICED else "gains"
+    fault = inner_loop_fault(flight, nominal) or rotor_fault(flight, nominal, delay)
     named = None if fault is None else fault.cause
     errors = responses(flight.times, (error[0], rate[0]), causes, loop, unsaturated, named)
     return Inspection(
         times=flight.times,
         error=error,
         errors=MappingProxyType(errors),
-        delay=delay,
+        delay=delay.time,
         saturated=float(flight.saturated.mean()),
         observed=flight.is_observed,
         alignment=alignment,

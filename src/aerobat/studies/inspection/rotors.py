@@ -7,17 +7,15 @@ regression. A delay makes rotors late too: the fault is the one that explains th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.simulation import Flight
-from aerobat.studies.inspection.disturbances import command_delay
+from aerobat.studies.inspection.disturbances import CommandDelay
 from aerobat.studies.inspection.fault import Fault
 from aerobat.vehicle import Vehicle
 
-LAG_OFF = 0.4  # [-] by which rotors are slower than planned for: twice what a lab's spread makes of four
+_LAG_OFF = 0.4  # [-] by which rotors are slower than planned for: twice what a lab's spread makes of four
 _EXCITED = 0.005  # of a rotor's range, that thrusts lack of their commands (RMS), so that they tell a lag
 _SHORT = 0.1  # of a rotor's range, by which thrust stays below its command,
 _WHILE = 0.06  # [s] for which it has been commanded so much: longer than delays,
@@ -26,32 +24,34 @@ _FEWEST_STILL = 0.02  # of the rows, that show it
 _BETTER = 0.5  # of what a delay leaves unexplained, that another lag leaves at most
 
 
-def rotor_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
+def rotor_fault(flight: Flight, vehicle: Vehicle, delay: CommandDelay) -> Fault | None:
     """Return the fault of rotors that a log shows, None where it shows none.
 
     Args:
         flight: The log of one flight.
         vehicle: The vehicle that it was flown for.
+        delay: Of its commands, which explains late rotors too.
     """
-    return _weak(flight, vehicle) or _late(flight, vehicle)
-
-
-def slower(flight: Flight, vehicle: Vehicle) -> Iterator[tuple[int, float]]:
-    """Yield the rotors that follow their commands later than planned for, each with its lag [s]."""
+    weak = _weak(flight, vehicle)
     missing, change = _missing_and_change(flight)
-    shares = _shares(missing, change)
+    unexplained = float(np.mean((change - _shares(missing, change) * missing) ** 2))
+    if weak is not None or unexplained > _BETTER * delay.unexplained:
+        return weak
+    return lag_fault(flight, vehicle)
+
+
+def lag_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
+    """The fault of the rotor that follows its commands latest; None where none is late beside its file."""
+    missing, change = _missing_and_change(flight)
     period = float(np.median(np.diff(flight.times)))
-    lags = -period / np.log(np.clip(1.0 - shares, 1e-9, 1.0 - 1e-9))
+    lags = -period / np.log(np.clip(1.0 - _shares(missing, change), 1e-9, 1.0 - 1e-9))
     tells = np.sqrt(np.mean(missing**2, axis=0)) > _EXCITED * vehicle.thrust_ranges
-    for rotor, (lag, planned) in enumerate(zip(lags.tolist(), vehicle.lags.tolist(), strict=True)):
-        if tells[rotor] and lag > (1.0 + LAG_OFF) * max(planned, period):
-            yield rotor, lag
-
-
-def lag_fault(rotor: int, lag: float, vehicle: Vehicle) -> Fault:
-    """The fault of a rotor whose lag [s] is longer than its file's."""
-    planned = f"{1e3 * float(vehicle.lags[rotor]):.0f} ms"
-    return Fault("lag", f"rotor {rotor} takes {1e3 * lag:.0f} ms to follow, not {planned}")
+    late = tells & (lags > (1.0 + _LAG_OFF) * np.maximum(vehicle.lags, period))
+    if not late.any():
+        return None
+    rotor = int(np.argmax(np.where(late, lags, 0.0)))
+    lag, planned = (f"{1e3 * float(each[rotor]):.0f} ms" for each in (lags, vehicle.lags))
+    return Fault("lag", f"rotor {rotor} takes {lag} to follow, not {planned}")
 
 
 def _weak(flight: Flight, vehicle: Vehicle) -> Fault | None:
@@ -70,18 +70,6 @@ def _weak(flight: Flight, vehicle: Vehicle) -> Fault | None:
     rotor = int(np.argmax(still.sum(axis=0)))
     short, asked = (float(np.median(x[:, rotor][still[:, rotor]])) for x in (given, lasting))
     return Fault("thrust", f"rotor {rotor} gives {short:.2g} N where {asked:.2g} N are commanded")
-
-
-def _late(flight: Flight, vehicle: Vehicle) -> Fault | None:
-    """Rotors follow their commands later than planned for, and a delay does not explain it as well."""
-    found = max(slower(flight, vehicle), key=lambda late: late[1], default=None)
-    if found is None:
-        return None
-    missing, change = _missing_and_change(flight)
-    unexplained = float(np.mean((change - _shares(missing, change) * missing) ** 2))
-    if unexplained > _BETTER * command_delay(flight, vehicle).unexplained:
-        return None
-    return lag_fault(*found, vehicle)
 
 
 def _missing_and_change(flight: Flight) -> tuple[Array, Array]:
