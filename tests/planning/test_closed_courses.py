@@ -20,8 +20,7 @@ from aerobat.links.stream import SetpointStream
 from aerobat.planning import least_duration
 from aerobat.planning.passages import gaps_at_ends
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.refinement.closure import Closure
-from aerobat.planning.refinement.excess import chebyshev
+from aerobat.planning.refinement.closure import FRACTIONS, Closure
 from aerobat.planning.refinement.refine import Refinement
 from aerobat.planning.task import Task
 from aerobat.reporting.facts import facts
@@ -81,12 +80,12 @@ def test_the_turn_once_around_follows_from_its_slopes() -> None:
     """Central differences of the body's turn about its thrust axis, along random changes of a lap."""
     task = Task.of(SHORT, QUAD)
     limits = Refinement.of(task, Recorder(None)).limits
-    closure = Closure(limits, chebyshev(16))
+    closure = Closure(limits)
     path = planned().trajectory
-    places = np.stack([path.on_segments(chebyshev(16), k) for k in range(6)], axis=2)
+    places = np.stack([path.on_segments(FRACTIONS, k) for k in range(6)], axis=2)
     rng, durations, step = np.random.default_rng(0), path.durations, 1e-5
     # a smooth closed change of the path, the same at both ends of the lap
-    phase = 2.0 * np.pi * (path.knots[:-1, None] + durations[:, None] * chebyshev(16)) / path.duration
+    phase = 2.0 * np.pi * (path.knots[:-1, None] + durations[:, None] * FRACTIONS) / path.duration
     rate, amplitude = 2.0 * np.pi / path.duration, rng.normal(size=3)
     change = np.stack([rate**k * np.cos(phase + k * np.pi / 2)[..., None] * amplitude for k in range(6)], 2)
     ahead, behind = (closure.values(places + sign * step * change, durations)[0] for sign in (1.0, -1.0))

@@ -1,11 +1,12 @@
 """Room for the body in gates: paths that hit a frame are mended, by all planners; slopes of room."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import pytest
 
+from aerobat.certification import Finding, Side, Verdict
 from aerobat.planning import FreeKnots, Miqp, Planner, TimeOptimal, plan
-from aerobat.planning.gate_clearance import bodies_in_gates
+from aerobat.planning.gate_clearance import MAX_ATTEMPTS, bodies_in_gates, cleared
 from aerobat.planning.task import Task
 from aerobat.problem import Course, PassGate, Problem, at_rest, load_problem, tilted_gate
 from aerobat.vehicle import load_vehicle
@@ -45,3 +46,27 @@ def test_openings_of_any_shape_may_have_room_for_the_body(shape: dict[str, objec
     course = Course(tuple(PassGate(gate.name, crossing_point="free") for gate in gates))
     problem = Problem("shapes", at_rest((0.0, 0.0, 1.0)), at_rest((6.0, 0.0, 1.0)), course, shaped)
     assert [body.stage for body in bodies_in_gates(Task.of(problem, QUAD))] == [0, 1]
+
+
+@dataclass(frozen=True)
+class Attempted:
+    """A path after so many attempts at a more direct one."""
+
+    attempts: int
+
+    @property
+    def frames(self) -> tuple[Finding, ...]:
+        """Clear after the last attempt that is made, and nearer to it with each."""
+        gap = float(self.attempts - MAX_ATTEMPTS)
+        verdict = Verdict.HOLDS if gap >= 0.0 else Verdict.VIOLATED
+        return (Finding("clearance", "m", Side.MIN, gap, gap, 0.0, 0.0, verdict, gate="gate"),)
+
+
+@pytest.mark.parametrize("last", [0, 1, MAX_ATTEMPTS])
+def test_of_all_attempts_at_a_more_direct_path_the_clearest_is_kept(last: int) -> None:
+    """The last attempt was made, and its path dropped."""
+
+    def again(path: Attempted) -> Attempted | None:
+        return Attempted(path.attempts + 1) if path.attempts < last else None
+
+    assert cleared(Attempted(0), again) == Attempted(last)

@@ -15,7 +15,7 @@ from aerobat.planning.gate_clearance import bodies_in_gates
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.limit_values import LimitValues
-from aerobat.planning.refinement.program import RefinementProgram
+from aerobat.planning.refinement.program import Multipliers, RefinementProgram
 from aerobat.planning.refinement.refine import Refinement, knots_at_stages
 from aerobat.planning.refinement.spline import Spline, basis
 from aerobat.planning.refinement.stage_values import StageValues
@@ -45,7 +45,7 @@ def program(problem: Problem, vehicle: Vehicle, segments: int) -> RefinementProg
         limits=limits,
         stages=StageValues(stages, task, bodies_in_gates(task)[:-1]),
         stage_segments=tuple(int(np.argmin(np.abs(trajectory.knots[1:] - time))) for time in guess.times),
-        fractions=np.linspace(0.0, 1.0, 5),
+        fractions=np.sort(np.random.default_rng(1).uniform(size=(trajectory.segments, 5))),
         backoff=np.full((trajectory.segments, len(limits.sides)), 1e-3),
         radius=1.0,
         stretch=1.5,
@@ -112,6 +112,23 @@ def test_variables_of_a_path_give_the_path_and_others_meet_its_ends() -> None:
             np.testing.assert_allclose(reached, state.derivatives(3)[order], atol=1e-7)
     for order in range(5):
         assert moved.jumps(order).max() <= 1e-6 * np.abs(moved.component_range(order)).max()
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_program_with_other_places_takes_all_multipliers_over(seed: int) -> None:
+    """Each place's are shared by those beside it; those of the same place stay as they are."""
+    near = program(COURSE, QUAD, 6)
+    rng, kinds = np.random.default_rng(seed), near.counts.shape[-1]
+    peaks = rng.uniform(size=(len(near.fractions), 1))
+    ends = np.broadcast_to([0.0, 1.0], (len(near.fractions), 2))
+    others = replace(near, fractions=np.sort(np.hstack([near.fractions, peaks, ends]), axis=1))
+    known = Multipliers(rng.uniform(size=near.counts.size + 3), near.fractions)
+    np.testing.assert_array_equal(near.at_its_places(known), known.values)
+    found = others.at_its_places(known)
+    at_places = found[: others.counts.size].reshape(len(near.fractions), -1, kinds)
+    expected = known.values[: near.counts.size].reshape(len(near.fractions), -1, kinds)
+    np.testing.assert_allclose(at_places.sum(axis=1), expected.sum(axis=1))
+    np.testing.assert_array_equal(found[others.counts.size :], known.values[near.counts.size :])
 
 
 @given(fraction=st.floats(0.0, 1.0), segment=st.integers(0, 5), order=st.integers(0, 5))

@@ -76,12 +76,13 @@ def cleared(found: Found, again: Callable[[Found], Found | None]) -> Found:
         found: A certified path, its stages placed.
         again: What is found with more room in gates; None where there is nothing.
     """
-    best, following = found, None if is_clear(found.frames) else again(found)
-    for _ in range(MAX_ATTEMPTS - 1):
+    best = latest = found
+    for _ in range(MAX_ATTEMPTS):
+        following = None if is_clear(latest.frames) or out_of_time() else again(latest)
         if following is None:
             break
-        best = max(best, following, key=lambda each: min(frame.bound for frame in each.frames))
-        following = None if is_clear(following.frames) or out_of_time() else again(following)
+        latest = following
+        best = max(best, latest, key=lambda each: min(frame.bound for frame in each.frames))
     return best
 
 

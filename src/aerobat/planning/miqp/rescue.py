@@ -65,9 +65,9 @@ class Rescue:
         return f"miqp found none with {self.asked.intervals} intervals"
 
     def shortened(self, plan: Plan) -> Plan:
-        """The plan, or where it is poor a shorter one by another way, which says so.
+        """The plan, or where it is poor a better one by another way, which says so.
 
-        It is poor where it is a program's own answer, or paths that nearly held are faster.
+        It is poor where it is not certified or a program's own answer, or paths that nearly held are faster.
         """
         with_these = f"miqp with {self.asked.intervals} intervals"
         more = with_more_intervals(self.asked, self.problem, self.vehicle)
@@ -75,13 +75,15 @@ class Rescue:
             return self._first(more, f"no path of {with_these} settled", plan.duration, share=1.0) or plan
         # programs have a dt; of paths those that nearly hold have a cost
         paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
-        if plan.duration <= POOR * min((path.duration for path in paths), default=inf):
+        fastest = min((path.duration for path in paths), default=inf)
+        if plan.certified and plan.duration <= POOR * fastest:
             return plan
+        longest = plan.duration if plan.certified else inf
         cls: Any = planner_class(FREE_KNOTS)
         others = cls(reserve=self.asked.reserve, clearance=self.asked.clearance)
         ways = chain([(others, f"by {FREE_KNOTS}")], more)
         with within_time(PROMISING_TIME, processor):
-            return self._first(ways, f"no fast path of {with_these} settled", plan.duration) or plan
+            return self._first(ways, f"no fast path of {with_these} settled", longest) or plan
 
     def __str__(self) -> str:
         """The ways that were tried in vain, in a part of a sentence."""

@@ -13,20 +13,22 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from aerobat.arrays import Array
+from aerobat.planning.refinement.excess import chebyshev
 from aerobat.planning.refinement.limit_values import LimitValues
+
+FRACTIONS = chebyshev(24)  # of every segment, (p,), its ends among them
 
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """The turn as a constraint on derivatives at places of all segments, the ends of each among them."""
+    """The turn as a constraint on derivatives at `FRACTIONS` of all segments."""
 
     limits: LimitValues
-    fractions: Array  # of every segment, (p,)
 
     def values(self, derivatives: Array, durations: Array) -> Array:
         """The turn [rad], (1,), of derivatives (S, p, 6, 3) on segments that last so long [s], (S,)."""
         ends = np.cumsum(durations)
-        times = (ends - durations)[:, None] + durations[:, None] * self.fractions
+        times = (ends - durations)[:, None] + durations[:, None] * FRACTIONS
         axes = self.limits.frames(times.ravel(), derivatives.reshape(-1, 6, 3)).axes
         turn = axes[0].T @ axes[-1]
         return np.array([np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])])
@@ -46,6 +48,6 @@ class Closure:
     @cached_property
     def _weights(self) -> Array:
         """Weights on values at places that integrate polynomials along a segment, (p,)."""
-        count = len(self.fractions)
-        values = legendre.legvander(2.0 * self.fractions - 1.0, count - 1)
+        count = len(FRACTIONS)
+        values = legendre.legvander(2.0 * FRACTIONS - 1.0, count - 1)
         return np.asarray(np.linalg.solve(values.T, np.eye(count)[0]))

@@ -15,6 +15,7 @@ from aerobat.trajectory import Trajectory
 
 LOOKED_AT = 64  # places of a segment
 JUST_INSIDE = 1e-9  # of a duration from its knots, where a segment is still itself and not its neighbour
+INWARD = 0.02  # of a segment, the ends that have no peaks: places are dense there, and motion stands still
 NEGLIGIBLE = 1e-9  # of a limit's size
 
 
@@ -25,6 +26,7 @@ class Excess:
     worst: Array  # in each segment, (S, c)
     sides: tuple[tuple[Limit, float], ...]  # of each constraint
     place: tuple[int, float]  # the constraint that is exceeded most, and when [s]
+    peaks: Array  # the fraction of each segment at which its worst is, its ends left out, (S,)
 
     @classmethod
     def of(cls, trajectory: Trajectory, limits: LimitValues, places: int = LOOKED_AT) -> Excess:
@@ -45,7 +47,9 @@ class Excess:
         if not limits.task.stages.closed:
             values[0, 0, limits.at_ends] = values[-1, -1, limits.at_ends] = -1.0
         segment, place, side = np.unravel_index(int(np.argmax(values)), values.shape)
-        return cls(values.max(axis=1), limits.sides, (int(side), float(times[segment, place])))
+        inside = np.flatnonzero((fractions > INWARD) & (fractions < 1.0 - INWARD))
+        peaks = fractions[inside[np.argmax(values[:, inside].max(axis=2), axis=1)]]
+        return cls(values.max(axis=1), limits.sides, (int(side), float(times[segment, place])), peaks)
 
     @property
     def largest(self) -> float:

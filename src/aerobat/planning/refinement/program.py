@@ -13,17 +13,25 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
-from aerobat.planning.refinement.closure import Closure
-from aerobat.planning.refinement.excess import chebyshev
+from aerobat.planning.refinement.closure import FRACTIONS, Closure
 from aerobat.planning.refinement.limit_values import Frames, LimitSlopes, LimitValues
 from aerobat.planning.refinement.spline import KnotData, Motion, Spline, basis
 from aerobat.planning.refinement.stage_values import KNOWN, STATE, StageValues
 
 AT_END = basis(np.array([1.0]))  # of a segment, (1, 6, 10)
+CLOSURE_PLACES = basis(FRACTIONS)  # (p, 6, 10)
 FADED = 0.1  # of the first and the last segment, along which constraints of the path grow from nothing,
 FADING = 3  # with this power of the way inward: positions leave rest no faster
 LEAST_FADED = 1e-6  # so that the very ends, which do not count, divide by no zero
 LIMITED = -1.0  # the value of a constraint that does not count
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """The multipliers of a program's inequalities, and the places of its limits."""
+
+    values: Array
+    fractions: Array  # (S, p)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +42,7 @@ class RefinementProgram:
     limits: LimitValues
     stages: StageValues
     stage_segments: tuple[int, ...]  # at whose ends stages hold
-    fractions: Array  # of every segment, at which limits hold, (p,)
+    fractions: Array  # of each segment, at which limits hold, rising, (S, p)
     backoff: Array  # of each segment and constraint, (S, c)
     radius: float  # of the box, of scaled derivatives
     stretch: float  # the factor by which durations may differ
@@ -57,23 +65,22 @@ class RefinementProgram:
         """The constraints at a point."""
         return RefinedPoint(self, x)
 
-    def at_its_places(self, multipliers: Array) -> Array:
-        """Multipliers of a program with the same segments and stages at places of this one.
+    def at_its_places(self, multipliers: Multipliers) -> Array:
+        """Multipliers of a program with the same segments and stages, at the places of this one.
 
-        A place's multiplier is shared by those beside it here.
+        The two places here beside each of its places share its multipliers.
         """
-        segments, _, kinds = self.counts.shape
-        apart = len(self.windows[1]) + self.stages.inequality_count
-        at_places, others = np.split(multipliers, [len(multipliers) - apart])
-        before = chebyshev(at_places.size // (segments * kinds))
-        hats = np.array([np.interp(self.fractions, before, each) for each in np.eye(len(before))])
-        shares = hats / hats.sum(axis=1, keepdims=True)
-        spread = np.einsum("sbc,bp->spc", at_places.reshape(segments, -1, kinds), shares)
+        before, places = multipliers.fractions, np.arange(self.fractions.shape[1])
+        at_places, others = np.split(multipliers.values, [before.size * self.counts.shape[-1]])
+        pairs = zip(before, self.fractions, strict=True)
+        numbers = np.array([np.interp(there, here, places) for there, here in pairs])
+        shares = np.maximum(1.0 - np.abs(numbers[:, None] - places[:, None]), 0.0)
+        spread = shares @ at_places.reshape(*before.shape, -1)
         return np.concatenate([spread.ravel(), others])
 
     @cached_property
     def places(self) -> Array:
-        """The basis at fractions, (p, 6, 10)."""
+        """The basis at fractions, (S, p, 6, 10)."""
         return basis(self.fractions)
 
     @cached_property
@@ -91,7 +98,7 @@ class RefinementProgram:
         Constraints of the path do not count at ends, which are fixed, and planes only where there are
         obstacles near.
         """
-        counts = np.ones((self.spline.segments, len(self.fractions), len(self.limits.sides)), dtype=bool)
+        counts = np.ones((*self.fractions.shape, len(self.limits.sides)), dtype=bool)
         counts[0, 0, self.limits.at_ends] = counts[-1, -1, self.limits.at_ends] = self._is_closed
         planes = self.near.planes
         if planes is not None:
@@ -106,7 +113,7 @@ class RefinementProgram:
         What is kept there from limits fades instead, as ends may lie on limits of the path.
         """
         weights = np.where(self.counts, 1.0, 0.0)
-        ends = () if self._is_closed else ((0, self.fractions), (-1, 1.0 - self.fractions))
+        ends = () if self._is_closed else ((0, self.fractions[0]), (-1, 1.0 - self.fractions[-1]))
         for segment, inward in ends:
             faded = np.maximum(np.minimum(inward / FADED, 1.0) ** FADING, LEAST_FADED)
             weights[segment, :, self.limits.of_path] /= faded
@@ -139,7 +146,7 @@ class RefinementProgram:
     @cached_property
     def closure(self) -> Closure | None:
         """The constraint that a closed course ends in the attitude in which it begins; None of others."""
-        return Closure(self.limits, self.fractions) if self._is_closed else None
+        return Closure(self.limits) if self._is_closed else None
 
     @property
     def _is_closed(self) -> bool:
@@ -181,7 +188,8 @@ class RefinedPoint:
         rows, targets = self.program.timed
         found = [rows @ self._ratios - targets, self.program.stages.equalities(self._at_stages)]
         if self.program.closure is not None:
-            found.append(self.program.closure.values(self._derivatives, self._durations))
+            around = self._data.derivatives(CLOSURE_PLACES)
+            found.append(self.program.closure.values(around, self._durations))
         return np.concatenate(found)
 
     @cached_property
@@ -202,8 +210,9 @@ class RefinedPoint:
         timed[:, self.program.spline.ratio_columns] = rows * self._ratios
         found = [timed, self._stage_rows(*self.program.stages.equality_slopes())]
         if self.program.closure is not None:
-            by_motion = self.program.closure.slopes(self._motion.derivatives, self._durations)
-            by_local = np.einsum("spka,spkaK->sK", by_motion, self._motion.slopes)
+            around = self.program.spline.motion(self._data, CLOSURE_PLACES)
+            by_motion = self.program.closure.slopes(around.derivatives, self._durations)
+            by_local = np.einsum("spka,spkaK->sK", by_motion, around.slopes)
             found.append(self.program.spline.scattered(by_local)[None])
         return np.concatenate(found)
 
