@@ -17,7 +17,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment.obstacles.convex_piece import ConvexPiece, ObstacleMotion
 
-FACETS = 24  # around what is round: a turn of 15° from each to the next
+FACETS = 24  # around what is round, a multiple of four: a turn of 15° from each to the next
 SHARP = np.cos(np.deg2rad(20.0))  # of the angle between two faces: those of what is round meet at less
 PLANES_ALIKE = 5  # decimals to which the planes of triangles of one face agree
 THIN = 1e-4  # [m] the half thickness that a flat piece is given
@@ -71,22 +71,17 @@ class Surface:
         return Surface(self.name, kept, np.array(edges).reshape(-1, 2, 3), self.motion)
 
 
-def surface_of(piece: ConvexPiece, facets: int = FACETS) -> Surface:
-    """Return the surface of a convex piece.
-
-    Args:
-        piece: In the world.
-        facets: How many there are around what is round, a multiple of four.
-    """
-    points = (piece.points[:, None] + _rounding(piece, facets)).reshape(-1, 3)
+def surface_of(piece: ConvexPiece) -> Surface:
+    """Return the surface of a convex piece, in the world."""
+    points = (piece.points[:, None] + _rounding(piece)).reshape(-1, 3)
     faces = _faces(points)
     return Surface(piece.name, faces, _sharp_edges(faces), piece.motion)
 
 
-def flattening(piece: ConvexPiece, facets: int = FACETS) -> float:
+def flattening(piece: ConvexPiece) -> float:
     """Return how far [m] the surface lies inside the piece at most, where it is round."""
     _, sizes, rank = _axes(piece.rounding)
-    return float(sizes[0]) * (1.0 - _depth(rank, facets)) if rank else 0.0
+    return float(sizes[0]) * (1.0 - _depth(rank)) if rank else 0.0
 
 
 def _axes(rounding: Array) -> tuple[Array, Array, int]:
@@ -95,10 +90,10 @@ def _axes(rounding: Array) -> tuple[Array, Array, int]:
     return axes, sizes, int(np.sum(sizes > TINY))
 
 
-def _rounding(piece: ConvexPiece, facets: int) -> Array:
+def _rounding(piece: ConvexPiece) -> Array:
     """Points on the ellipsoid that rounds a piece [m], (n, 3)."""
     axes, sizes, rank = _axes(piece.rounding)
-    directions = _directions(rank, facets)
+    directions = _directions(rank)
     if rank == 3:  # the equator is where a tube along the piece is widest
         along = np.linalg.svd(piece.points - piece.points.mean(axis=0))[2][0]
         pole = (axes.T @ along) / sizes
@@ -108,32 +103,28 @@ def _rounding(piece: ConvexPiece, facets: int) -> Array:
 
 
 @cache
-def _directions(dimensions: int, facets: int) -> Array:
+def _directions(dimensions: int) -> Array:
     """Unit vectors of a space of so many dimensions, evenly around, (n, dimensions)."""
-    turn = 2.0 * np.pi * np.arange(facets) / facets
+    turn = 2.0 * np.pi * np.arange(FACETS) / FACETS
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     if dimensions < 2:
         return np.array([[1.0], [-1.0]]) if dimensions else np.zeros((1, 0))
     if dimensions == 2:
         return circle
-    rings = [np.column_stack([c * circle, np.full(facets, s)]) for c, s in _latitudes(facets)]
+    latitudes = np.pi * (np.arange(1, FACETS // 2) / (FACETS // 2) - 0.5)  # of rings, the poles left out
+    levels = zip(np.cos(latitudes), np.sin(latitudes), strict=True)
+    rings = [np.column_stack([c * circle, np.full(FACETS, s)]) for c, s in levels]
     return np.concatenate([*rings, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
 
 
-def _latitudes(facets: int) -> Array:
-    """The cosines and sines of the latitudes of rings, poles left out, (facets / 2 - 1, 2)."""
-    latitude = np.pi * (np.arange(1, facets // 2) / (facets // 2) - 0.5)
-    return np.stack([np.cos(latitude), np.sin(latitude)], axis=-1)
-
-
 @cache
-def _depth(dimensions: int, facets: int) -> float:
+def _depth(dimensions: int) -> float:
     """How far the hull of such unit vectors reaches everywhere."""
     from scipy.spatial import ConvexHull
 
     if dimensions < 2:
         return 1.0
-    return float(-ConvexHull(_directions(dimensions, facets)).equations[:, -1].max())
+    return float(-ConvexHull(_directions(dimensions)).equations[:, -1].max())
 
 
 def _faces(points: Array) -> tuple[Array, ...]:
