@@ -113,7 +113,7 @@ class Pieces:
 
     def holding(self, point: Array) -> ConvexPiece | None:
         """Return a piece that a point [m] (3,) lies in; None where it lies in none."""
-        _, pieces = self.near(point[None], 0.0, TINY) if self.pieces else (None, np.zeros(0, dtype=np.intp))
+        _, pieces = self.near(point[None], 0.0, TINY)
         count = len(pieces)
         found = self.separated(pieces, np.tile(point, (count, 1)), np.zeros((count, 3, 3)))
         inside = pieces[found.gaps < 0.0]
@@ -239,10 +239,8 @@ class _Pairs:
         tried = normals[:, None] + PARTS[:, None] * (turns[:, None] @ across)
         tried /= np.linalg.norm(tried, axis=-1, keepdims=True)
         gaps = self.gaps(tried)
-        best = np.argmax(gaps, axis=1)[:, None]
-        return np.take_along_axis(tried, best[..., None], axis=1)[:, 0], np.take_along_axis(gaps, best, 1)[
-            :, 0
-        ]
+        rows, best = np.arange(len(gaps)), np.argmax(gaps, axis=1)
+        return tried[rows, best], gaps[rows, best]
 
     def _nearby(self, normals: Array, across: Array) -> _Model:
         """The gaps near normals, of turns along two directions across each, (m, 2, 3)."""
@@ -289,8 +287,7 @@ class _Model:
         turns = self._candidates
         planes = (self.values[:, None] + turns @ np.swapaxes(self.slopes, 1, 2)).min(axis=-1)
         gaps = planes - 0.5 * np.sum(turns @ self.bend * turns, axis=-1)
-        best = np.argmax(gaps, axis=1)
-        return np.asarray(np.take_along_axis(turns, best[:, None, None], axis=1)[:, 0])
+        return np.asarray(turns[np.arange(len(gaps)), np.argmax(gaps, axis=1)])
 
     @property
     def _candidates(self) -> Array:
@@ -340,7 +337,7 @@ def _best_of(piece: ConvexPiece, centres: Array, shapes: Array) -> Array:
     candidates = np.concatenate([piece.normals_toward(centres), units(offsets)], axis=1)
     roundings = np.broadcast_to(piece.rounding, (len(centres), 3, 3))
     best = np.argmax(_Pairs(offsets, roundings, shapes).gaps(candidates), axis=1)
-    return np.asarray(np.take_along_axis(candidates, best[:, None, None], axis=1)[:, 0])
+    return np.asarray(candidates[np.arange(len(best)), best])
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
