@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from aerobat.arrays import Array
@@ -52,23 +50,20 @@ def environment_parameters(environment: Environment, vehicles: int) -> Environme
     return EnvironmentParameters(np.full(vehicles, environment.gravity), components(wind))
 
 
-def controller_parameters(
-    controller: Controller, fleet: Fleet, environment: Environment, ops: Any = np
-) -> ControllerModel:
+def controller_parameters(controller: Controller, fleet: Fleet, environment: Environment) -> ControllerModel:
     """Nominal models with leaves (vehicles,).
 
     Args:
         controller: the settings.
         fleet: the nominal vehicles.
         environment: what they are taken to fly in.
-        ops: of the arithmetic of the settings' numbers; see `Controller.gains`.
     """
     rows = matrix_components(np.swapaxes(fleet.mixer, 1, 2))
     return ControllerModel(
         airframe_parameters(fleet),
         environment_parameters(environment, len(fleet)),
         Mixer(*rows, *components(fleet.collective_range)),
-        controller.gains(max_bandwidth(fleet, environment), ops),
+        controller.gains(max_bandwidth(fleet, environment)),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from aerobat.control.law import Seen
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import ReferencePoint, reference_moment
-from aerobat.kernels.ops import Axes, Ops, Scalar, Vector
+from aerobat.kernels.ops import Axes, Ops, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, to_body
 from aerobat.kernels.vectors import add, add_scaled, cross, dot, norm, scale, subtract, transform
 
@@ -24,11 +24,7 @@ def axes_along(ops: Ops, thrust: Vector, reference: ReferencePoint) -> Axes:
     b2 = scale(1.0 / ops.maximum(size, _SHORTEST), aside)
     b1 = cross(b2, b3)
     determined = (norm(ops, thrust) > _SHORTEST) & (size > _SHORTEST)
-    return (
-        _either(ops, determined, b1, first),
-        _either(ops, determined, b2, second),
-        _either(ops, determined, b3, third),
-    )
+    return select_tree(ops, determined, (b1, b2, b3), (first, second, third))
 
 
 def rotation_error(body_axes: Axes, desired: Axes) -> Vector:
@@ -69,8 +65,3 @@ def moment_for(
 def collective(model: ControllerModel, body_axes: Axes, thrust: Vector) -> Scalar:
     """Return the collective thrust [N] that gives a specific thrust's part along the body's third axis."""
     return model.airframe.mass_properties.mass * dot(thrust, body_axes[2])
-
-
-def _either(ops: Ops, condition: Scalar, a: Vector, b: Vector) -> Vector:
-    x, y, z = (ops.select(condition, p, q) for p, q in zip(a, b, strict=True))
-    return x, y, z
