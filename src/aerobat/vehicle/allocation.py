@@ -8,9 +8,8 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.states import Wrench
+from aerobat.vehicle.hover import collective_ranges
 from aerobat.vehicle.vehicle import Vehicle
-
-_SLACK = 1e-12  # a rotor with a smaller share of the collective thrust bears none of it
 
 
 @lru_cache(maxsize=128)
@@ -40,7 +39,5 @@ def rotor_thrusts(vehicle: Vehicle, wrench: Wrench) -> Array:
 @lru_cache(maxsize=128)
 def collective_range(vehicle: Vehicle) -> tuple[float, float]:
     """The least and the most collective thrust [N] that the rotors can hold without any moment."""
-    direction = mixer(vehicle)[:, 0]
-    moving = np.abs(direction) > _SLACK
-    ends = np.sort([vehicle.min_thrusts[moving], vehicle.max_thrusts[moving]] / direction[moving], axis=0)
-    return float(ends[0].max()), float(ends[1].min())
+    low, high = collective_ranges(mixer(vehicle)[:, 0], vehicle.min_thrusts, vehicle.max_thrusts).tolist()
+    return low, high
