@@ -35,8 +35,7 @@ class Entry:
     @property
     def certified(self) -> bool:
         """True if there is a plan, proven to stay within the vehicle's limits."""
-        certificate = None if self.plan is None else self.plan.certificate
-        return certificate is not None and certificate.certified
+        return self.plan is not None and self.plan.certified
 
 
 @validated
@@ -96,7 +95,10 @@ def compare(
         executor: Any of `concurrent.futures` that plans instead, as a `dask.distributed` client's.
     """
     problem, vehicle = as_problem(problem), as_vehicle(vehicle)
-    compared = all_planners() if planners is None else [_named(each) for each in planners]
+    if planners is None:
+        compared = [(name, cls()) for name, cls in registered_planners().items()]
+    else:
+        compared = [_named(each) for each in planners]
     if not compared:
         raise SpecError("planners must be one planner or more; leave them out for all")
     begin = begin or (lambda name: None)
@@ -143,22 +145,16 @@ def _entries(
         planning: What plans.
     """
     if planning.is_here:
-        return [_begun(task, each, progress, begin) for each in planners]
+        here = []
+        for each in planners:
+            begin(each[0])
+            here.append(_timed_entry(task, each, progress))
+        return here
     entries = {}
     for named, entry in planning.results(_timed_entry, task, planners):
         begin(entry.planner)
         entries[named] = entry
     return [entries[named] for named in planners]
-
-
-def _begun(
-    task: _ComparisonTask,
-    named: tuple[str, Planner],
-    progress: Callable[[Attempt], None] | None,
-    begin: Callable[[str], None],
-) -> Entry:
-    begin(named[0])
-    return _timed_entry(task, named, progress)
 
 
 def _timed_entry(
@@ -173,11 +169,6 @@ def _named(planner: tuple[str, Planner] | str) -> tuple[str, Planner]:
     if isinstance(planner, str):
         return planner, as_planner(planner)
     return planner[0], as_planner(planner[1])
-
-
-def all_planners() -> tuple[tuple[str, Planner], ...]:
-    """Every registered planner with its defaults."""
-    return tuple((name, cls()) for name, cls in registered_planners().items())
 
 
 def _improved(
