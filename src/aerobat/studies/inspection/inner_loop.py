@@ -22,7 +22,7 @@ from aerobat.kernels import rate_loop
 from aerobat.kernels.rate_loop import RateLoopModel, RateSetpoint, rate_gains
 from aerobat.simulation import Flight
 from aerobat.simulation.law_controller import DERIVATIVE, GYRO
-from aerobat.studies.inspection.fault import Fault
+from aerobat.studies.inspection.result import Fault
 from aerobat.studies.inspection.rotors import lag_fault
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet

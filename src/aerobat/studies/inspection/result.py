@@ -13,7 +13,6 @@ from aerobat.arrays import Array
 from aerobat.declaration import by_value, short
 from aerobat.simulation.outcome import length
 from aerobat.studies.inspection.alignment import Alignment
-from aerobat.studies.inspection.fault import Fault
 
 NEGLIGIBLE = 0.005  # [m] of error at most that calls for no cause: millimetres remain in the best flights
 _SHOWN = 5e-4  # [m] that is more than nothing in a line
@@ -61,6 +60,18 @@ UNOBSERVED = (  # of a log that does not tell what an observer saw, in the place
     "delay, or an observer whose state the log does not hold,",
     "log that state, which tells them apart; then shorten `computation_delay`, or see `motion_capture`",
 )
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault that a log shows of a flight controller's inner loop, or of rotors, whatever it cost."""
+
+    cause: str  # of CAUSES
+    evidence: str  # a sentence with its numbers
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return self.evidence
 
 
 @dataclass(frozen=True)

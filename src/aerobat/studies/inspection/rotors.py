@@ -12,7 +12,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.simulation import Flight
 from aerobat.studies.inspection.disturbances import CommandDelay
-from aerobat.studies.inspection.fault import Fault
+from aerobat.studies.inspection.result import Fault
 from aerobat.vehicle import Vehicle
 
 _LAG_OFF = 0.4  # [-] by which rotors are slower than planned for: twice what a lab's spread makes of four
