@@ -123,11 +123,8 @@ def _needed(scores: Score, gate: Gate, side: Side) -> Array:
     if not passages:
         raise unknown_name("gate", gate.name, [passage.gate for passage in scores.passages])
     width, height = (
-        np.max([np.nan_to_num(sizes, nan=np.inf) for sizes in each], axis=0)
-        for each in (
-            [passage.needed_width for passage in passages],
-            [passage.needed_height for passage in passages],
-        )
+        np.max(np.nan_to_num([getattr(passage, field) for passage in passages], nan=np.inf), axis=0)
+        for field in ("needed_width", "needed_height")
     )
     own_width, own_height = gate.opening.size
     if side == "width":
