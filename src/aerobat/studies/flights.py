@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from aerobat.control import ControlLaw, Controller
 from aerobat.engines import choose
@@ -25,6 +26,7 @@ TOGETHER = 10  # chunks at most that a worker is handed at once: a quarter of a 
 # with 2.5 % at most, all of them together with 4 % where 95 % succeed, with 0.6 % where 94 % do; where 98 %
 # succeed, 340 flights are flown on average, and 3 of 1000 plans stay undecided
 LOOKS = (100, 200, 400, 800)
+Flights = Annotated[int, Field(ge=1, le=10**6, description="whole number from 1 to a million")]
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,11 @@ def fly_trials(task: FlightTask, progress: Callable[[int, int], None] | None = N
             if trials.proven or trials.refuted:
                 break
     return trials
+
+
+def passed(scores: Score) -> Share:
+    """Return the share of flights that pass."""
+    return Share.where(scores.succeeded)
 
 
 def _score_chunk(tasks: tuple[FlightTask, ...], part: tuple[int, range]) -> Score:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from aerobat.arrays import Mask
 from aerobat.environment import Dispersion
 
 CONFIDENCE = 0.95  # of the intervals
@@ -17,6 +18,11 @@ class Share:
 
     count: int
     of: int
+
+    @classmethod
+    def where(cls, holds: Mask) -> Share:
+        """The share of flights of which something holds, (flights,)."""
+        return cls(int(holds.sum()), len(holds))
 
     @property
     def fraction(self) -> float:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 
 from aerobat.arrays import Array
 from aerobat.control import Controller
@@ -16,19 +14,17 @@ from aerobat.declaration import Label, Positive, Seed, by_value, short, unknown_
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
 from aerobat.evaluation import Score
+from aerobat.evaluation.opening import Probability
 from aerobat.planning import Plan, Planner, as_planner, plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.outcome import length
 from aerobat.studies.error_causes.cause import Cause, Trial, together
-from aerobat.studies.flights import FlightTask, cut, fly_scores
+from aerobat.studies.flights import Flights, FlightTask, cut, fly_scores
 from aerobat.studies.share import Share
 from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
-Flights = Annotated[int, Field(ge=1, le=10**6, description="whole number from 1 to a million")]
 NONE, ALL = "none", "all together"
-Level = Annotated[float, Field(ge=0.0, le=1.0)]
-Confidence = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
 @validated
@@ -162,13 +158,13 @@ class TrialResult:
     @property
     def cleared(self) -> Share:
         """The share of flights whose body went through all gates and touched no frame, whatever its tilt."""
-        return Share(int((self.clearance >= 0.0).sum()), len(self.scores))
+        return Share.where(self.clearance >= 0.0)
 
     @validated
     def cleared_opening(self, width: Positive, height: Positive) -> Share:
         """The share of flights whose body would have cleared gates of that opening [m]."""
         fits = (self._worst("needed_width") <= width) & (self._worst("needed_height") <= height)
-        return Share(int(fits.sum()), len(self.scores))
+        return Share.where(fits)
 
     def _worst(self, field: str, sign: float = 1.0) -> Array:
         """The largest of a field of the passages, times a sign; infinite where it is not known."""
@@ -213,7 +209,7 @@ class ErrorCauses:
         raise unknown_name("cause", cause, [result.cause for result in self.results])
 
     @validated
-    def cost(self, cause: Label, confidence: Confidence = 0.95) -> Cost:
+    def cost(self, cause: Label, confidence: Probability = 0.95) -> Cost:
         """The cost of a cause in position error [m], flight by flight against none.
 
         Raises SpecError where there is no such cause.

@@ -10,11 +10,10 @@ from itertools import product
 from math import floor, isfinite, isnan, nan, prod
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field as Bounds
 
 from aerobat.declaration import (
     NonNegative,
@@ -32,7 +31,7 @@ from aerobat.errors import SpecError
 from aerobat.planning import Planner, as_planner
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, ProbedTask, least_reserve, probe
-from aerobat.studies.flights import FlightTask, fly_scores
+from aerobat.studies.flights import Flights, FlightTask, fly_scores, passed
 from aerobat.studies.kept import KeptParts, fingerprint, names_of_parts
 from aerobat.studies.lens import Lens, Scenario, lens
 from aerobat.studies.share import Share
@@ -43,7 +42,6 @@ MAX_CELLS = 10_000  # of a map: hours, where most are refused
 DIGITS = 12  # that values of a range are rounded to: steps of 0.1 add up to 0.3
 ROUNDING = 1e-9  # of a step
 MAX_AXES = 2
-Flights = Annotated[int, Bounds(ge=1, le=10**6, description="whole number from 1 to a million")]
 
 
 @dataclass(frozen=True)
@@ -298,13 +296,13 @@ def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Lens, ...]:
 
 def _cell(task: ProbedTask, values: tuple[float, ...]) -> Cell:
     found = probe(task, values)
-    plan, passed = found.plan, None
+    plan, share = found.plan, None
     if plan is not None and found.is_planned and task.scenario.conditions is not None:
         varied = task.varied(values)
         assert varied.conditions is not None, "a field of conditions is varied, not whether there are any"
         flown = FlightTask(plan, varied.vehicle, varied.conditions, task.seed, varied.vehicle.controller)
         (scores,) = fly_scores(Pool(), (flown,), task.flights)
-        passed = Share(int(scores.succeeded.sum()), len(scores))
+        share = passed(scores)
     return Cell(
         values=values,
         feasibility=found.feasibility,
@@ -312,5 +310,5 @@ def _cell(task: ProbedTask, values: tuple[float, ...]) -> Cell:
         limits=found.limits,
         reserve=None if plan is None else least_reserve(plan),
         sentence=found.sentence,
-        passed=passed,
+        passed=share,
     )

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from math import ceil, log
-from typing import Annotated
-
-from pydantic import Field
 
 from aerobat.control import named_controller
 from aerobat.declaration import Seed, validated
@@ -16,7 +13,7 @@ from aerobat.errors import SpecError
 from aerobat.evaluation.opening import Probability
 from aerobat.planning import Attempt, Planner, as_planner
 from aerobat.problem import Problem, as_problem
-from aerobat.studies.flights import cut
+from aerobat.studies.flights import Flights, cut
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.task import PassingTask
 from aerobat.studies.passing.tightening import Tightening
@@ -26,7 +23,6 @@ from aerobat.vehicle import Vehicle, as_vehicle
 
 # fresh flights that are expected to fail at the probability asked: two thirds as many failures are a proof
 PROVING_FAILURES = 50
-Flights = Annotated[int, Field(ge=1, le=10**6, description="whole number from 1 to a million")]
 
 
 @validated

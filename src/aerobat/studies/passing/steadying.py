@@ -14,8 +14,9 @@ from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
 from aerobat.planning import Attempt, Plan, Planner, as_planner
+from aerobat.studies.flights import passed
 from aerobat.studies.passing.spread import narrowed
-from aerobat.studies.passing.task import PassingTask, Variant, going_on, passed
+from aerobat.studies.passing.task import PassingTask, Variant, going_on
 from aerobat.studies.share import Trials
 from aerobat.studies.workers import pool
 

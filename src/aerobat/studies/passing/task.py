@@ -14,7 +14,7 @@ from aerobat.optimization.deadline import processor, within_time
 from aerobat.planning import Attempt, Plan, Planner, plan
 from aerobat.planning.planners import planner_with_reserve
 from aerobat.problem import Problem
-from aerobat.studies.flights import FlightTask, fly_scores, joined
+from aerobat.studies.flights import FlightTask, fly_scores, joined, passed
 from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool
 from aerobat.vehicle import Vehicle
@@ -115,8 +115,3 @@ def going_on(planner: Any, start: Plan, reserve: float) -> Planner:
     """The refinement from a plan on, with the settings of the planner that found it."""
     kept = {name: getattr(planner, name) for name in KEPT if hasattr(planner, name)}
     return planner_with_reserve(REFINING, reserve, start=start, **kept)
-
-
-def passed(scores: Score) -> Share:
-    """Return the share of flights that pass."""
-    return Share(int(scores.succeeded.sum()), len(scores))

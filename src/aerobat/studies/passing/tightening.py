@@ -11,10 +11,11 @@ from aerobat.evaluation import Score
 from aerobat.optimization.deadline import processor
 from aerobat.planning.tube import Tube
 from aerobat.problem import Problem
+from aerobat.studies.flights import passed
 from aerobat.studies.passing.causes import standing_in_the_way
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, firmer, narrowed, spread_of
-from aerobat.studies.passing.task import VARIANTS, PassingTask, Variant, passed
+from aerobat.studies.passing.task import VARIANTS, PassingTask, Variant
 from aerobat.studies.share import Share, percent
 
 STEP = 0.02  # of every limit's range, between reserves that are tried

@@ -108,7 +108,7 @@ class Sweep:
     def passed(self, passage: Label) -> Share:
         """The share of flights that passed a gate as they should. Raises SpecError for an unknown name."""
         self._gate(passage)
-        return Share(int((self.table[f"{passage}_outcome"] == PASSED).sum()), len(self))
+        return Share.where(self.table[f"{passage}_outcome"] == PASSED)
 
     @validated
     def smallest_opening(
@@ -148,7 +148,7 @@ class Sweep:
     @validated
     def within(self, column: Label, limit: Number) -> Share:
         """The share of flights in which a number of the table is at most `limit`."""
-        return Share(int((self._errors(column) <= limit).sum()), len(self))
+        return Share.where(self._errors(column) <= limit)
 
     def _errors(self, column: str) -> Array:
         """A column of numbers, infinite where there was no passage."""
