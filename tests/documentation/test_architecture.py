@@ -51,7 +51,6 @@ HANDED_ON = (
     "init",
     "of_flight",
     "_of_flight",
-    "one_of_many",
     "__getitem__",
 )
 WINDOW = """

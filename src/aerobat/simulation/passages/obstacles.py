@@ -20,7 +20,7 @@ from aerobat.arrays import Array, Indices
 from aerobat.declaration import by_value
 from aerobat.environment.obstacles import Pieces
 from aerobat.simulation.outcome import FlightFailure, Outcome
-from aerobat.simulation.passages.passage import one_of_many
+from aerobat.simulation.passages.passage import PerFlight
 from aerobat.vehicle import Ellipsoid
 
 STRETCH = 32  # rows that share a box
@@ -31,16 +31,12 @@ NEVER = np.iinfo(np.intp).max  # the row of a contact that there is not
 
 @by_value
 @dataclass(frozen=True, eq=False)
-class NearestObstacle:
+class NearestObstacle(PerFlight):
     """The obstacle that a flight comes nearest to before it touches any, else the first that it touches."""
 
     obstacle: str  # its name; empty: unknown
     clearance: float  # [m] between body and obstacle; negative: they touch
     time: float  # [s] when that was
-
-    def of_flight(self, k: int) -> NearestObstacle:
-        """One flight's of many, in plain numbers."""
-        return one_of_many(self, k, shared=0)
 
     @property
     def failure(self) -> FlightFailure | None:

@@ -12,10 +12,10 @@ plane, from when it comes into the plane until it has left it, is to lie within 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from functools import partial
 from math import degrees
-from typing import Any, TypeVar
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,28 +34,22 @@ from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.vehicle import Ellipsoid
 
-T = TypeVar("T")
-
 PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is looked for
 
 
-def one_of_many(found: T, k: int, shared: int) -> T:
-    """Return one flight's part of what was found of many, in plain numbers.
+@dataclass(frozen=True, eq=False)
+class PerFlight:
+    """A finding of one flight, or of many: then fields that they do not share are arrays (flights,)."""
 
-    Args:
-        found: A dataclass, whose fields are arrays (flights,) but for the first ones.
-        k: Which flight.
-        shared: The number of first fields, which all flights share.
-    """
-    many: Any = found
-    values = [getattr(many, field.name) for field in fields(many)]
-    one: T = type(many)(*values[:shared], *(value[k].item() for value in values[shared:]))
-    return one
+    def of_flight(self, k: int) -> Self:
+        """One flight's of many, in plain numbers."""
+        arrays = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return replace(self, **{name: array[k].item() for name, array in arrays.items()})
 
 
 @by_value
 @dataclass(frozen=True, eq=False)
-class Passage:
+class Passage(PerFlight):
     """A gate's plane crossed in its direction, next to the planned instant; NaN where it was not.
 
     Of many flights, the fields but the first two are arrays (flights,).
@@ -82,10 +76,6 @@ class Passage:
     backward_time: float  # [s] of a crossing against the direction about then; infinite where there is none
     max_distance: float  # [m] beyond the plane about then, negative: before it
     min_distance: float  # [m] likewise
-
-    def of_flight(self, k: int) -> Passage:
-        """One flight's of many, in plain numbers."""
-        return one_of_many(self, k, shared=2)
 
     @property
     def failure(self) -> FlightFailure | None:

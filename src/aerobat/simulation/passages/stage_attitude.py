@@ -13,7 +13,7 @@ from aerobat.declaration import by_value
 from aerobat.engines.pytree import components
 from aerobat.kernels.gates.pointing import Direction, Pointing
 from aerobat.simulation.outcome import FlightFailure, Outcome
-from aerobat.simulation.passages.passage import PASSAGE_WINDOW, one_of_many
+from aerobat.simulation.passages.passage import PASSAGE_WINDOW, PerFlight
 
 
 @by_value
@@ -30,7 +30,7 @@ class PlannedAttitude:
 
 @by_value
 @dataclass(frozen=True, eq=False)
-class StageAttitude:
+class StageAttitude(PerFlight):
     """The thrust axis where it comes nearest to a stage's next to the planned instant; NaN where unknown.
 
     Of many flights, the fields but the first three are arrays (flights,).
@@ -42,10 +42,6 @@ class StageAttitude:
     time: float  # [s]
     angle_deg: float  # between the thrust axis and the planned one
     planned: float  # [s] when it was planned; NaN where the flight had ended before
-
-    def of_flight(self, k: int) -> StageAttitude:
-        """One flight's of many, in plain numbers."""
-        return one_of_many(self, k, shared=3)
 
     @property
     def failure(self) -> FlightFailure | None:

@@ -13,7 +13,7 @@ from aerobat.engines.pytree import components
 from aerobat.kernels.gates.approach import Approach, Target
 from aerobat.problem.planned_passage import PlannedWaypoint
 from aerobat.simulation.outcome import FlightFailure, Outcome
-from aerobat.simulation.passages.passage import PASSAGE_WINDOW, one_of_many
+from aerobat.simulation.passages.passage import PASSAGE_WINDOW, PerFlight
 
 # [m] beyond the radius that is no miss: paths of least time touch the ball, and no flight is its path
 GRAZING = 1e-3
@@ -21,7 +21,7 @@ GRAZING = 1e-3
 
 @by_value
 @dataclass(frozen=True, eq=False)
-class WaypointPassage:
+class WaypointPassage(PerFlight):
     """The nearest approach to a waypoint next to the planned instant; NaN where there is none.
 
     Of many flights, the fields but the first three are arrays (flights,).
@@ -34,10 +34,6 @@ class WaypointPassage:
     miss: float  # [m] from the waypoint there
     speed: float  # [m/s]
     planned: float  # [s] when it was to be met; NaN where the flight had ended before
-
-    def of_flight(self, k: int) -> WaypointPassage:
-        """One flight's of many, in plain numbers."""
-        return one_of_many(self, k, shared=3)
 
     @property
     def failure(self) -> FlightFailure | None:
