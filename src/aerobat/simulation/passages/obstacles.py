@@ -133,15 +133,10 @@ class _NearestSearch:
         encounters = encounters._replace(first=encounters.first * STRETCH)
         middle = np.full(len(encounters.flight), STRETCH // 2)
         bounds, _ = self._separated(encounters, middle, exact_within=-inf)
-        only_best = True
-        while True:
-            rows, ticks = self._nearer(encounters, bounds)
-            if not len(rows):
-                break
-            if only_best:
-                rows, ticks = self._best_of_flights(encounters, bounds, rows, ticks)
-                only_best = False
+        rows, ticks = self._best_of_flights(encounters, bounds, *self._nearer(encounters, bounds))
+        while len(rows):
             bounds[rows] = np.maximum(bounds[rows], self._look_at(encounters.of(rows), ticks))
+            rows, ticks = self._nearer(encounters, bounds)
         return self._piece, self._clearance, np.minimum(self._row, self._last)
 
     @property
