@@ -147,15 +147,11 @@ def _controller(
         # a filter faster than the rotors takes their lag's misfit for a disturbance, and unsettles the loop
         times = flights.all(max(settings.disturbance_filter, slowest)), flights.all(delay / rate)
         observer = (LoopPart(DisturbanceObserver(period), DisturbanceParameters(model, *times)),)
-    inner = inner_loop(config.law, model)
-    if period == 1 and delay == 0:
-        return (*observer, LoopPart(controller, ControllerParameters(model, ())), *inner)
-    source = ReferenceSource(flights.trajectory, nominal, environment, rate, every=period, delay=delay / rate)
-    if delay == 0:
-        return (*observer, LoopPart(controller, ControllerParameters(model, ()), source), *inner)
-    return (
-        *observer,
-        LoopPart(controller, ControllerParameters(model, flights.all(delay / rate)), source),
-        LoopPart(ComputationDelay(), (), DelayTicks(period, delay)),
-        *inner,
-    )
+    source = None
+    if period > 1 or delay > 0:
+        source = ReferenceSource(
+            flights.trajectory, nominal, environment, rate, every=period, delay=delay / rate
+        )
+    parameters = ControllerParameters(model, flights.all(delay / rate) if delay else ())
+    waiting = (LoopPart(ComputationDelay(), (), DelayTicks(period, delay)),) if delay else ()
+    return (*observer, LoopPart(controller, parameters, source), *waiting, *inner_loop(config.law, model))
