@@ -78,8 +78,7 @@ class RotorPyRun:
             "wind": np.zeros(3),
             "rotor_speeds": self._speeds(motion.thrusts),
         }
-        multirotor = _import_rotorpy("multirotor").Multirotor
-        self._vehicle = multirotor(
+        self._vehicle = _import_multirotor().Multirotor(
             parameters, self._state, "cmd_motor_speeds", integrator_kwargs={"rtol": 1e-7, "atol": 1e-9}
         )
 
@@ -177,7 +176,7 @@ def _parameters_of(airframe: Airframe) -> dict[str, Any]:
 
 def _parameters(name: str) -> dict[str, Any]:
     """RotorPy's own parameters. Raises SpecError for a vehicle that it does not have."""
-    _import_rotorpy("multirotor")
+    _import_multirotor()
     try:
         parameters: dict[str, Any] = import_module(f"rotorpy.vehicles.{name}_params").quad_params
     except (ImportError, AttributeError):
@@ -185,5 +184,5 @@ def _parameters(name: str) -> dict[str, Any]:
     return parameters
 
 
-def _import_rotorpy(module: str) -> Any:
-    return import_extra(f"rotorpy.vehicles.{module}", "the plant rotorpy needs RotorPy", "rotorpy")
+def _import_multirotor() -> Any:
+    return import_extra("rotorpy.vehicles.multirotor", "the plant rotorpy needs RotorPy", "rotorpy")
