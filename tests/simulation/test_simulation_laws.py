@@ -16,7 +16,7 @@ from aerobat.kernels import motors, rigid_body
 from aerobat.kernels.motors import Airframe, VehicleState, advance
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, RotorWrench
 from aerobat.simulation.bodies import bodies, body_states
-from aerobat.simulation.components import RigidBodyPlant
+from aerobat.simulation.components import rigid_body_steps
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, load_vehicle
 from aerobat.vehicle.fleet import Fleet
@@ -161,7 +161,7 @@ def test_body_and_rotors_together_are_of_order_four() -> None:
 def test_a_period_of_two_milliseconds_is_integrated_to_micrometres() -> None:
     airframe = airframe_of(load_vehicle("agile-quad"))
     finest, usual = (
-        after_commands(airframe, RigidBodyPlant.for_rate(500.0).substeps * refinement, periods=500)
+        after_commands(airframe, rigid_body_steps(1.0 / 500.0) * refinement, periods=500)
         for refinement in (8, 1)
     )
     np.testing.assert_allclose(usual.position, finest.position, rtol=0, atol=1e-6)

@@ -26,6 +26,11 @@ from aerobat.simulation.loop import Component, Controlling, Estimate, Signals
 MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
 
 
+def rigid_body_steps(duration: float) -> int:
+    """The number of steps of RK4 in which a rigid body is advanced by a duration [s]."""
+    return max(1, math.ceil(duration / MAX_STEP - 1e-9))
+
+
 @dataclass(frozen=True)
 class StateObserver(Component):
     """The true state, as if it were known."""
@@ -207,11 +212,6 @@ class RigidBodyPlant(Component):
 
     substeps: int
     feedthrough: bool = False
-
-    @classmethod
-    def for_rate(cls, rate: float) -> RigidBodyPlant:
-        """The plant for so many ticks a second."""
-        return cls(max(1, math.ceil(1.0 / rate / MAX_STEP - 1e-9)))
 
     def init(
         self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals

@@ -60,8 +60,7 @@ def fly(
         gates = () if isinstance(plan, Trajectory) else plan.problem.gates
         return _flown_outside(setup, gates, " on ".join(outside))
     stride = setup.log_stride
-    engine = setup.engine()
-    loop = setup.compile(engine)
+    loop = setup.compile()
     logged = logged_ticks(len(setup.times), stride)
     is_logged = np.zeros(len(setup.times), dtype=bool)
     is_logged[logged] = True
@@ -75,7 +74,7 @@ def fly(
         rows.append(chunk if kept.all() else tree_map(partial(np.compress, kept, axis=1), chunk))
         setpoints.append(setpoint_rows(setup.reference.setpoint(begin, end), ticks[kept] - begin))
     log = rows[0] if len(rows) == 1 else tree_stack(rows, lambda parts: np.concatenate(parts, axis=-1))
-    return _flight(setup, log, setup.times[logged], setpoints, engine.name)
+    return _flight(setup, log, setup.times[logged], setpoints, setup.engine().name)
 
 
 def _flown_outside(setup: FlightSetup, gates: tuple[Gate, ...], name: str) -> Flight:

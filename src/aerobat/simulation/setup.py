@@ -19,7 +19,7 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.rigid_body import Body
-from aerobat.simulation.components import PlantParameters, RigidBodyPlant, log_row
+from aerobat.simulation.components import PlantParameters, RigidBodyPlant, log_row, rigid_body_steps
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.loop import Component, Log, LoopInput, LoopParameters, compose
 from aerobat.simulation.reference_source import BLOCK, ReferenceSource
@@ -86,7 +86,7 @@ def plant_part(
     """
     airframe = airframe_parameters(fleet, effectiveness)
     return LoopPart(
-        RigidBodyPlant.for_rate(rate),
+        RigidBodyPlant(rigid_body_steps(1.0 / rate)),
         PlantParameters(airframe, environment_parameters(environment, len(fleet))),
     )
 
@@ -139,9 +139,9 @@ class FlightSetup(LoopSetup):
         """The engine asked for, or the fastest for so many copies of the vehicles."""
         return choose(self.config.engine, copies * len(self.fleet), len(self.times))
 
-    def compile(self, engine: Engine | None = None, log: Log = log_row) -> CompiledLoop:
+    def compile(self, log: Log = log_row) -> CompiledLoop:
         """The loop, ready for `init`, `step` and `scan`; its rows are what `log` takes of the signals."""
-        return self.compile_for(engine or self.engine(), self.first_tick, log)
+        return self.compile_for(self.engine(), self.first_tick, log)
 
     @cached_property
     def first_tick(self) -> LoopInput:

@@ -7,7 +7,6 @@ are asked, and the plant what the firmware commands.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import ceil
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -28,13 +27,13 @@ from aerobat.kernels.rigid_body import EnvironmentParameters, specific_force
 from aerobat.kernels.vectors import ZERO
 from aerobat.problem.gate import Gate
 from aerobat.simulation.components import (
-    MAX_STEP,
     LogRow,
     PlantParameters,
     RateLoop,
     commands_in_effect,
     gyro,
     log_row,
+    rigid_body_steps,
     rotor_commands,
     setpoint_in_effect,
     with_ceiling,
@@ -46,8 +45,6 @@ from aerobat.simulation.outcome import Contact
 from aerobat.simulation.plants.plant import Actuation, Plant, PlantRun, PlantScene
 from aerobat.simulation.setup import FlightSetup, LoopPart
 from aerobat.vehicle.ellipsoid import Ellipsoid
-
-ROUNDING = 1e-9  # of a step
 
 
 @dataclass(frozen=True)
@@ -122,7 +119,7 @@ class RigidBodyRun:
         environment = EnvironmentParameters(self._gravity, actuation.wind)
         rotors = self._airframe.rotors._replace(max_thrust=actuation.ceilings)
         airframe = self._airframe._replace(rotors=rotors)
-        steps = max(1, ceil(duration / MAX_STEP - ROUNDING))
+        steps = rigid_body_steps(duration)
         for _ in range(steps):
             self.motion = motors.advance(
                 FloatOps, airframe, environment, self.motion, actuation.commands, duration / steps
