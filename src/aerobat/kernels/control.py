@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from aerobat.kernels import motors
 from aerobat.kernels.allocation import Mixer, desaturate, mix, within_limits
@@ -22,7 +22,7 @@ from aerobat.kernels.control_loops import (
     thrust_demand,
 )
 from aerobat.kernels.motors import Airframe
-from aerobat.kernels.ops import Axes, Ops, PerRotor, Scalar, Vector
+from aerobat.kernels.ops import Axes, Ops, PerRotor, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, RotorWrench
 from aerobat.kernels.vectors import ZERO, add, dot, norm, subtract
@@ -144,20 +144,21 @@ def track_attitude(
     return ControllerState(state.outer, integral, thrusts, commands)
 
 
-class Commanding(Protocol):
-    """The state of any controller, as far as it tells of the rotors."""
+@runtime_checkable
+class Controlling(Protocol):
+    """The part of a controller's state that others see, whichever controller it is."""
 
     @property
     def thrusts(self) -> PerRotor:
-        """The thrusts that the rotors give [N], by the nominal model."""
+        """The thrusts [N] that the rotors give, by the nominal model."""
 
     @property
     def commands(self) -> Commands:
-        """The last ones."""
+        """The last commands."""
 
 
 def predicted(
-    ops: Ops, model: ControllerModel, state: Commanding, body: Body, elapsed: Scalar, delay: Scalar
+    ops: Ops, model: ControllerModel, state: Controlling, body: Body, elapsed: Scalar, delay: Scalar
 ) -> Body:
     """The body when new commands take effect, `delay` [s] from now, by the nominal model (Smith's predictor).
 
@@ -215,7 +216,7 @@ def rotor_commands(
     feasible = within_limits(rotors, desired)
     if flags.prioritize_tilt:
         desaturated = desaturate(ops, rotors, model.mixer, load)
-        desired = tuple(ops.select(feasible, f, g) for f, g in zip(desired, desaturated, strict=True))
+        desired = select_tree(ops, feasible, desired, desaturated)
     if flags.motor_lag_compensation:
         fraction = 1.0 - ops.exp(-period / model.gains.lead_time_constant)
         desired = _leading(thrusts, desired, mix(model.mixer, ahead), decay_factors, fraction)

@@ -11,7 +11,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.kernels import control, motors, rate_loop
 from aerobat.kernels.battery import BatteryState
-from aerobat.kernels.control import Commands, ControllerModel, ControllerState, FeatureFlags
+from aerobat.kernels.control import Commands, ControllerModel, ControllerState, Controlling, FeatureFlags
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.imu import ImuState
 from aerobat.kernels.motors import Airframe, VehicleState
@@ -21,7 +21,7 @@ from aerobat.kernels.rate_loop import RateLoopModel, RateLoopState, RateSetpoint
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
 from aerobat.kernels.vectors import subtract
 from aerobat.kernels.wind import WindState
-from aerobat.simulation.loop import Component, Controlling, Estimate, Signals
+from aerobat.simulation.loop import Component, Estimate, Signals
 
 MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
 

@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
+from typing import NamedTuple, Protocol, TypeAlias, TypeVar
 
 from aerobat.engines.engine import Init, Step
 from aerobat.engines.pytree import Tree
-from aerobat.kernels.control import Commands
+from aerobat.kernels.control import Controlling
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.motors import VehicleState
-from aerobat.kernels.ops import Ops, PerRotor, Scalar, select_tree
+from aerobat.kernels.ops import Ops, Scalar, select_tree
 from aerobat.kernels.rigid_body import Body
 
 State = TypeVar("State")
@@ -41,19 +41,6 @@ class Estimate(NamedTuple):
 
     body: Body
     own: Tree = ()  # what the observer goes on from; () where it sees the true state
-
-
-@runtime_checkable
-class Controlling(Protocol):
-    """The part of a controller's state that other components see."""
-
-    @property
-    def thrusts(self) -> PerRotor:
-        """The thrusts [N] that the rotors give, by the nominal model."""
-
-    @property
-    def commands(self) -> Commands:
-        """The last commands."""
 
 
 @dataclass(frozen=True)

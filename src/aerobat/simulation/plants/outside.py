@@ -18,7 +18,7 @@ from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.engines.pytree import tree_map, tree_stack
 from aerobat.errors import SpecError
 from aerobat.kernels import motors
-from aerobat.kernels.control import Commands
+from aerobat.kernels.control import Commands, Controlling
 from aerobat.kernels.imu import ImuState
 from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.ops import Ops, Vector
@@ -40,7 +40,7 @@ from aerobat.simulation.components import (
     with_wind,
 )
 from aerobat.simulation.flight_controller import AutopilotRun, Sensed
-from aerobat.simulation.loop import Component, Controlling, LoopInput, Signals, compose
+from aerobat.simulation.loop import Component, LoopInput, Signals, compose
 from aerobat.simulation.outcome import Contact
 from aerobat.simulation.plants.plant import Actuation, Plant, PlantRun, PlantScene
 from aerobat.simulation.setup import FlightSetup, LoopPart
