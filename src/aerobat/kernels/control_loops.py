@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from aerobat.kernels import flatness
-from aerobat.kernels.ops import Axes, Matrix, Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.ops import Axes, Matrix, Ops, Quaternion, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, conjugate, multiply, smallest_rotation, to_body, to_world
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties
 from aerobat.kernels.vectors import (
@@ -15,6 +15,7 @@ from aerobat.kernels.vectors import (
     clamp_norm,
     cross,
     dot,
+    low_passed,
     norm,
     scale,
     subtract,
@@ -91,8 +92,7 @@ def step_position_loop(
     integral = clamp_norm(ops, add_scaled(state.integral, elapsed, error), gains.max_integral)
     acceleration = _feedback_acceleration(ops, gains, integral, body, reference)
     difference = scale(1.0 / elapsed, subtract(acceleration, state.acceleration))
-    fraction = elapsed / (gains.jerk_filter + elapsed)
-    jerk = add_scaled(state.jerk, fraction, subtract(difference, state.jerk))
+    jerk = low_passed(state.jerk, difference, gains.jerk_filter, elapsed)
     return PositionLoopState(integral, acceleration, jerk)
 
 
@@ -173,12 +173,7 @@ def attitude_command(
     determined = size > _MIN_THRUST
     shrink = 1.0 / ops.maximum(size, _MIN_THRUST)
     b1, _, nominal = axes(reference.q_world_body)
-    x, y, z = nominal
-    b3 = (
-        ops.select(determined, f[0] * shrink, x),
-        ops.select(determined, f[1] * shrink, y),
-        ops.select(determined, f[2] * shrink, z),
-    )
+    b3 = select_tree(ops, determined, scale(shrink, f), nominal)
     q = multiply(smallest_rotation(ops, nominal, b3, b1), reference.q_world_body)
     swing = cross(b3, scale(shrink, add(demand.rate, outer.jerk)))
     return AttitudeCommand(f, q, add_scaled(swing, dot(nominal, reference.omega), b3))

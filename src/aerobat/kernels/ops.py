@@ -15,6 +15,7 @@ Matrix: TypeAlias = tuple[Vector, Vector, Vector]  # rows
 Axes: TypeAlias = tuple[Vector, Vector, Vector]  # b1, b2, b3 in the world
 PerRotor: TypeAlias = tuple[Scalar, ...]
 T = TypeVar("T")
+TINY = 1e-300  # beside a divisor: keeps 0/0 away and changes no other quotient
 
 
 class Ops(Protocol):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from functools import reduce
 
-from aerobat.kernels.ops import Axes, Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.ops import Axes, Ops, Quaternion, Scalar, Vector, select_tree
 from aerobat.kernels.vectors import add, add_scaled, cross, dot, norm, scale
 
 # the arc tangent is x + x³ P(x²)/Q(x²) for |x| ≤ tan(π/8), highest power first (Cephes library, S. Moshier)
@@ -132,10 +132,5 @@ def smallest_rotation(ops: Ops, a: Vector, b: Vector, normal: Vector) -> Quatern
     square = dot(h, h)
     opposite = square < 1e-24
     shrink = 1.0 / ops.sqrt(ops.select(opposite, 1.0, square))
-    x, y, z = cross(a, h)
-    return (
-        ops.select(opposite, 0.0, 0.5 * square * shrink),
-        ops.select(opposite, normal[0], x * shrink),
-        ops.select(opposite, normal[1], y * shrink),
-        ops.select(opposite, normal[2], z * shrink),
-    )
+    x, y, z = scale(shrink, cross(a, h))
+    return select_tree(ops, opposite, (0.0, *normal), (0.5 * square * shrink, x, y, z))

@@ -15,9 +15,18 @@ from typing import NamedTuple
 from aerobat.kernels.allocation import Mixer, mix
 from aerobat.kernels.control import Commands
 from aerobat.kernels.motors import Airframe
-from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, clip, magnitude
+from aerobat.kernels.ops import TINY, Ops, PerRotor, Scalar, Vector, clip, magnitude
 from aerobat.kernels.rigid_body import RotorWrench
-from aerobat.kernels.vectors import ZERO, add, add_scaled, clip_components, scale, subtract, transform
+from aerobat.kernels.vectors import (
+    ZERO,
+    add,
+    add_scaled,
+    clip_components,
+    low_passed,
+    scale,
+    subtract,
+    transform,
+)
 
 _FREQUENCY = 75.0  # [rad/s] of the poles in roll and pitch, which the filters' delays let pass, at most
 # [s/rad] of all the moment of roll or pitch, that an error of its rate asks for at most: more of it saturates
@@ -31,7 +40,6 @@ _INTEGRAL = 8.0  # [1/s] integral gain over the proportional one, at most
 _INTEGRAL_SHARE = 0.125  # [-] of a proportional gain, which that ratio is at most: the loop stays damped
 _SHORTEST_LAG = 0.01  # [s] of rotors: faster ones leave the loop's own delays
 _MAX_INTEGRAL = 0.25  # [rad] of the rate error, per axis
-_TINY = 1e-300  # keeps 0/0 away and changes no other quotient
 
 
 class RateSetpoint(NamedTuple):
@@ -111,9 +119,9 @@ def step(
         gyro: the measured rate [rad/s], body.
         elapsed: since the last tick [s].
     """
-    filtered = _low_passed(state.gyro, gyro, model.gyro_filter, elapsed)
+    filtered = low_passed(state.gyro, gyro, model.gyro_filter, elapsed)
     slope = scale(1.0 / elapsed, subtract(filtered, state.gyro))
-    derivative = _low_passed(state.derivative, slope, model.derivative_filter, elapsed)
+    derivative = low_passed(state.derivative, slope, model.derivative_filter, elapsed)
     error = subtract(setpoint.omega, filtered)
     integral = clip_components(ops, add_scaled(state.integral, elapsed, error), _MAX_INTEGRAL)
     gains = rate_gains(ops, model.airframe)
@@ -131,17 +139,13 @@ def times(a: Vector, b: Vector) -> Vector:
     return a[0] * b[0], a[1] * b[1], a[2] * b[2]
 
 
-def _low_passed(before: Vector, now: Vector, time_constant: Scalar, elapsed: Scalar) -> Vector:
-    return add_scaled(before, elapsed / (time_constant + elapsed), subtract(now, before))
-
-
 def _mixed(ops: Ops, model: RateLoopModel, load: RotorWrench) -> Commands:
     """Commands within limits: moments are scaled to fit, then the collective thrust is moved to suit them."""
     rotors = model.airframe.rotors
     turning = mix(model.mixer, load._replace(thrust=0.0))
     high, low = reduce(ops.minimum, rotors.max_thrust), reduce(ops.maximum, rotors.min_thrust)
     spread = reduce(ops.maximum, turning) - reduce(ops.minimum, turning)
-    fraction = ops.minimum(1.0, (high - low) / (spread + _TINY))
+    fraction = ops.minimum(1.0, (high - low) / (spread + TINY))
     turning = tuple(fraction * f for f in turning)
     level = load.thrust / len(turning)
     moved = clip(ops, level, low - reduce(ops.minimum, turning), high - reduce(ops.maximum, turning))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from aerobat.kernels.ops import Matrix, Ops, Scalar, Vector, clip
+from aerobat.kernels.ops import TINY, Matrix, Ops, Scalar, Vector, clip
 
 ZERO: Vector = (0.0, 0.0, 0.0)
-_TINY = 1e-300  # keeps 0/0 away and changes no other quotient
 
 
 def add(a: Vector, b: Vector) -> Vector:
@@ -48,6 +47,11 @@ def transform(m: Matrix, a: Vector) -> Vector:
     return dot(m[0], a), dot(m[1], a), dot(m[2], a)
 
 
+def low_passed(before: Vector, now: Vector, time_constant: Scalar, elapsed: Scalar) -> Vector:
+    """What a first-order low-pass makes of `now`, `elapsed` [s] after it made `before`."""
+    return add_scaled(before, elapsed / (time_constant + elapsed), subtract(now, before))
+
+
 def clip_components(ops: Ops, a: Vector, limit: Scalar) -> Vector:
     """`a` with each component held within [−limit, limit]."""
     return clip(ops, a[0], -limit, limit), clip(ops, a[1], -limit, limit), clip(ops, a[2], -limit, limit)
@@ -55,4 +59,4 @@ def clip_components(ops: Ops, a: Vector, limit: Scalar) -> Vector:
 
 def clamp_norm(ops: Ops, a: Vector, longest: Scalar) -> Vector:
     """`a`, shortened to the length `longest` where it is longer; its direction is kept."""
-    return scale(longest / (ops.maximum(norm(ops, a), longest) + _TINY), a)
+    return scale(longest / (ops.maximum(norm(ops, a), longest) + TINY), a)

@@ -18,6 +18,7 @@ from aerobat.kernels.vectors import (
     add,
     add_scaled,
     clamp_norm,
+    low_passed,
     scale,
     subtract,
     transform,
@@ -87,15 +88,14 @@ class Indi(ControlLaw):
         self, ops: Ops, model: ControllerModel, state: Increments, seen: Seen, elapsed: Scalar
     ) -> Increments:
         """Return what is measured, a tick later."""
-        fraction = elapsed / (self.filter_time + elapsed)
         turned = scale(1.0 / elapsed, subtract(seen.body.omega_body, state.omega))
         turned = select_tree(ops, state.has_omega > 0.5, turned, state.angular_acceleration)
         moment = motors.wrench(model.airframe.rotors, seen.thrusts).moment_body
         error = subtract(seen.reference.position, seen.body.position)
         return Increments(
             seen.body.omega_body,
-            add_scaled(state.angular_acceleration, fraction, subtract(turned, state.angular_acceleration)),
-            add_scaled(state.moment, fraction, subtract(moment, state.moment)),
+            low_passed(state.angular_acceleration, turned, self.filter_time, elapsed),
+            low_passed(state.moment, moment, self.filter_time, elapsed),
             clamp_norm(ops, add_scaled(state.integral, elapsed, error), self.max_integral),
             1.0,
         )

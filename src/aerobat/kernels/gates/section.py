@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector, clip, magnitude
+from aerobat.kernels.ops import TINY, Ops, Quaternion, Scalar, Vector, clip, magnitude
 from aerobat.kernels.quaternions import axes, normalize, to_body
 from aerobat.kernels.vectors import dot, norm
 
-_TINY = 1e-300  # keeps 0/0 away and changes no other quotient
 _ROUNDING = 1e-9  # [m] from the middle, where neither side is the nearer; of a rise that is none
 
 
@@ -87,7 +86,7 @@ def section(
         beside,
         shear_along,
         shear_beside,
-        ops.sqrt(ops.maximum(dot(a, a) - reach_sq * shear_along * shear_along, _TINY)),
+        ops.sqrt(ops.maximum(dot(a, a) - reach_sq * shear_along * shear_along, TINY)),
         dot(a, b) - reach_sq * shear_along * shear_beside,
     )
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from aerobat.kernels.control_loops import AttitudeCommand, AttitudeError, Gains
-from aerobat.kernels.ops import Axes, Ops, Scalar, magnitude
+from aerobat.kernels.ops import TINY, Axes, Ops, Scalar, magnitude
 from aerobat.kernels.quaternions import conjugate, multiply, to_body
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import subtract
@@ -21,7 +21,6 @@ from aerobat.kernels.vectors import subtract
 _STOPPING = 0.7  # [-] of the angular acceleration that a hovering vehicle has, which is counted on
 _MAX_YAW_RATE = 4.0  # [rad/s] for an error of yaw: rotors that lag cannot tilt a body that spins faster
 _OPPOSITE = 1e-6  # [-] cosine of half a tilt, below which yaw means nothing
-_TINY = 1e-300  # keeps 0/0 away and changes no other quotient
 
 
 class Authority(NamedTuple):
@@ -54,7 +53,7 @@ def slope_limited_error(
     s = ops.select(turned, z / ops.maximum(upright, _OPPOSITE), 0.0)  # and the sine
     tilt = _answered(ops, gains, ops.sqrt(x * x + y * y), authority.tilt, authority.lag)
     yaw = _answered(ops, gains, magnitude(ops, s), authority.yaw, authority.lag)
-    yaw = ops.minimum(yaw, _MAX_YAW_RATE * gains.damping / (gains.stiffness * magnitude(ops, s) + _TINY))
+    yaw = ops.minimum(yaw, _MAX_YAW_RATE * gains.damping / (gains.stiffness * magnitude(ops, s) + TINY))
     level = ops.maximum(2.0 * upright * upright - 1.0, 0.0)  # the cosine of the tilt; yaw waits for it
     omega = to_body(body_axes, attitude.omega)
     rotation = tilt * (c * x - s * y), tilt * (c * y + s * x), level * level * yaw * s
@@ -73,5 +72,5 @@ def _answered(ops: Ops, gains: Gains, half: Scalar, acceleration: Scalar, lag: S
     """
     a = _STOPPING * acceleration
     # (√(a² τ² + 4 a s) − a τ) / s, without the difference
-    slope = 4.0 * a / (a * lag + ops.sqrt(a * a * lag * lag + 4.0 * a * half) + _TINY)
-    return ops.minimum(1.0, slope * gains.damping / (gains.stiffness + _TINY))
+    slope = 4.0 * a / (a * lag + ops.sqrt(a * a * lag * lag + 4.0 * a * half) + TINY)
+    return ops.minimum(1.0, slope * gains.damping / (gains.stiffness + TINY))

@@ -16,7 +16,7 @@ from aerobat.kernels.control_loops import (
     step_position_loop,
     thrust_demand,
 )
-from aerobat.kernels.ops import Ops, Scalar, Vector, clip, magnitude, select_tree
+from aerobat.kernels.ops import TINY, Ops, Scalar, Vector, clip, magnitude, select_tree
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.vectors import add, dot, norm, subtract
 from aerobat.simulation.autopilot.attitude_law import Authority, slope_limited_error
@@ -24,7 +24,6 @@ from aerobat.simulation.loop import Component, Signals
 
 _MIN_LIFT = 0.2  # [-] of gravity: towards a point it never thrusts less upwards, so that it stays upright
 _MAX_SIDEWAYS = 1.0  # [-] of gravity: nor more than this to a side
-_TINY = 1e-300  # keeps 0/0 away and changes no other quotient
 
 
 class AutopilotModel(NamedTuple):
@@ -91,7 +90,7 @@ def _turning_thrust(ops: Ops, model: ControllerModel, b3: Vector, attitude: Atti
     direction, the less is needed.
     """
     f = attitude.specific_thrust
-    cosine = dot(f, b3) / (norm(ops, f) + _TINY)
+    cosine = dot(f, b3) / (norm(ops, f) + TINY)
     weight = model.airframe.mass_properties.mass * model.environment.gravity
     return weight * ops.sqrt(ops.maximum(0.5 - 0.5 * cosine, 0.0))
 

@@ -14,7 +14,7 @@ from aerobat.kernels.ekf import EkfParameters, EkfState
 from aerobat.kernels.imu import ImuState
 from aerobat.kernels.ops import Ops, Scalar, select_tree
 from aerobat.kernels.rigid_body import Pose
-from aerobat.kernels.vectors import ZERO, add_scaled, scale, subtract
+from aerobat.kernels.vectors import ZERO, add_scaled, low_passed, scale, subtract
 from aerobat.simulation.components import Disturbance
 from aerobat.simulation.conditions.sensors import MocapState, MotionCaptureSensor
 from aerobat.simulation.loop import Component, Estimate, Signals
@@ -68,10 +68,9 @@ class DisturbanceObserver(Component):
         omega = observer.body.omega_body
         turned = scale(1.0 / elapsed, subtract(omega, state.omega_body))
         fraction = elapsed / (parameters.time_constant + elapsed)
-        force = subtract(subtract(felt, specific_force), state.force)
         angular = subtract(subtract(turned, nominal.omega_body), state.angular_acceleration)
         return Disturbance(
-            add_scaled(state.force, fraction, force),
+            low_passed(state.force, subtract(felt, specific_force), parameters.time_constant, elapsed),
             add_scaled(state.angular_acceleration, state.has_omega * fraction, angular),
             omega,
             1.0,
