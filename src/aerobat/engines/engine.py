@@ -94,30 +94,6 @@ class Compile(Protocol):
         """
 
 
-class _ToldAtEveryTick(CompiledLoop):
-    """A loop that knows nothing of what is `Held` or `Coded`: it is told the numbers at every tick."""
-
-    def __init__(self, loop: CompiledLoop) -> None:
-        self._loop = loop
-
-    def init(self, inputs: Tree) -> Tree:
-        """See `CompiledLoop.init`."""
-        return self._loop.init(expanded(inputs))
-
-    def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
-        """See `CompiledLoop.scan`."""
-        return self._loop.scan(carry, expanded(inputs), log_stride)
-
-
-def told_at_every_tick(compile_loop: Compile) -> Compile:
-    """The way to a loop whose inputs may be `Held` or `Coded`, of one to a loop whose inputs may not."""
-
-    def compiled(init: Init, step: Step, parameters: Tree, inputs: Tree) -> CompiledLoop:
-        return _ToldAtEveryTick(compile_loop(init, step, parameters, expanded(inputs)))
-
-    return compiled
-
-
 @dataclass(frozen=True)
 class Engine:
     """One way to run kernels. All give the same numbers to rounding."""
@@ -132,10 +108,12 @@ def logged_ticks(ticks: int, log_stride: int) -> NDArray[np.intp]:
     return logged if logged[-1] == ticks - 1 else np.append(logged, ticks - 1)
 
 
-def run_whole(engine: Engine, init: Init, step: Step, parameters: Tree, inputs: Tree) -> Tree:
-    """The rows of all ticks of a loop that is run once, from its start to its end."""
+def run_whole(
+    engine: Engine, init: Init, step: Step, parameters: Tree, inputs: Tree, log_stride: int = 1
+) -> Tree:
+    """The rows of the logged ticks of a loop that is run once, from its start to its end."""
     loop = engine.compile(init, step, parameters, first_row(inputs))
-    return loop.scan(loop.init(first_row(inputs)), inputs)[1]
+    return loop.scan(loop.init(first_row(inputs)), inputs, log_stride)[1]
 
 
 def first_row(inputs: Tree) -> Tree:

@@ -13,10 +13,10 @@ from aerobat.engines.engine import (
     Engine,
     Init,
     Step,
+    expanded,
     logged_ticks,
     read_only,
     tick_count,
-    told_at_every_tick,
 )
 from aerobat.engines.pytree import Tree, tree_map, tree_rows, tree_stack
 
@@ -64,7 +64,7 @@ class FloatLoop(CompiledLoop):
 
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
-        chunk = tree_map(lambda leaf: np.asarray(leaf)[None], inputs)
+        chunk = tree_map(lambda leaf: np.asarray(leaf)[None], expanded(inputs))
         carries = [
             self._init(FloatOps, parameters, next(_ticks(chunk, vehicle)))
             for vehicle, parameters in enumerate(self._parameters)
@@ -73,6 +73,7 @@ class FloatLoop(CompiledLoop):
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
         """See `CompiledLoop.scan`."""
+        inputs = expanded(inputs)
         logged = set(logged_ticks(tick_count(inputs), log_stride).tolist())
         carries, series = [], []
         for vehicle, state in enumerate(tree_rows(carry, _floats)):
@@ -103,4 +104,4 @@ def _stacked(carries: list[Tree]) -> Tree:
     return tree_stack(carries, lambda values: read_only(np.array(values)))
 
 
-FLOATS = Engine("floats", told_at_every_tick(FloatLoop))
+FLOATS = Engine("floats", FloatLoop)

@@ -17,10 +17,10 @@ from aerobat.engines.engine import (
     Engine,
     Init,
     Step,
+    expanded,
     logged_ticks,
     read_only,
     tick_count,
-    told_at_every_tick,
 )
 from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
@@ -51,7 +51,7 @@ class JaxLoop(CompiledLoop):
         inputs: Tree,
         precision: Literal["float64", "float32"] = "float64",
     ) -> None:
-        self._loop = trace_loop(init, step, parameters, inputs)
+        self._loop = trace_loop(init, step, parameters, expanded(inputs))
         self._program = _Program(str(self._loop), self._loop)
         self._precision = precision
         with jax.enable_x64(precision == "float64"):
@@ -60,11 +60,12 @@ class JaxLoop(CompiledLoop):
     def init(self, inputs: Tree) -> Tree:
         """See `CompiledLoop.init`."""
         with jax.enable_x64(self._precision == "float64"):
-            row = tuple(jnp.asarray(leaf, self._precision) for leaf in tree_leaves(inputs))
+            row = tuple(jnp.asarray(leaf, self._precision) for leaf in tree_leaves(expanded(inputs)))
             return self._carry(_initialized(self._program, self._parameters, row))
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
         """See `CompiledLoop.scan`."""
+        inputs = expanded(inputs)
         logged = logged_ticks(tick_count(inputs), log_stride)
         with jax.enable_x64(self._precision == "float64"):
             state = tuple(map(jnp.asarray, tree_leaves(carry)))
@@ -152,5 +153,5 @@ def _row(output: Any, rows: int) -> Array:
     return series if series.dtype == bool else series.astype(np.float64)
 
 
-ENGINE = Engine("jax", told_at_every_tick(JaxLoop))
-SINGLE = Engine("jax-float32", told_at_every_tick(partial(JaxLoop, precision="float32")))
+ENGINE = Engine("jax", JaxLoop)
+SINGLE = Engine("jax-float32", partial(JaxLoop, precision="float32"))

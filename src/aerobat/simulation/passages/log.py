@@ -11,8 +11,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.engines import choose
-from aerobat.engines.engine import Init, Step, first_row
+from aerobat.engines import choose, run_whole
+from aerobat.engines.engine import Init, Step
 from aerobat.engines.pytree import Tree, components, tree_leaves, tree_map, tree_stack
 from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.snapshot import Snapshot
@@ -68,8 +68,7 @@ def scan_log(kernel: PlaceKernel, places: Sequence[Tree], rows: Snapshot) -> lis
     for numbers in alike.values():
         parameters = tree_stack([places[k] for k in numbers], partial(np.array, dtype=np.float64))
         engine = choose("auto", len(numbers), len(rows.time))
-        loop = engine.compile(*_functions(kernel), parameters, first_row(row))
-        _, states = loop.scan(loop.init(first_row(row)), row, len(rows.time))
+        states = run_whole(engine, *_functions(kernel), parameters, row, log_stride=len(rows.time))
         for i, k in enumerate(numbers):
             found[k] = tree_map(itemgetter((slice(i, i + 1), -1)), states)
     return [found[k] for k in range(len(places))]
