@@ -68,10 +68,6 @@ class Trace:
         """A new symbol."""
         return Symbol(self, self._number("input", (), name, logical))
 
-    def vector(self, name: str) -> tuple[Symbol, Symbol, Symbol]:
-        """Three new symbols, a vector's components."""
-        return self.input(f"{name} x"), self.input(f"{name} y"), self.input(f"{name} z")
-
     def symbol(self, value: Any) -> Symbol:
         """A symbol as it is; a number as a constant."""
         if isinstance(value, Symbol):

@@ -53,7 +53,7 @@ class _Codegen:
             self._load_parameters(lane)
             self._load_inputs(INTEGER(0), lane)
             self._compute(loop.initialization)
-            self._store_block("next carry", self._wide(loop.first_carry), lane)
+            self._store_carry(self._wide(loop.first_carry), lane)
         self._builder.ret_void()
 
     def emit_scan(self) -> None:
@@ -70,7 +70,7 @@ class _Codegen:
             with self._counting(INTEGER(0), self._arguments["ticks"], 1) as tick:
                 self._tick(carry, tick, lane)
             after = [b.load(slot, typ=slot.allocated_type) for slot in carry.values()]
-            self._store_block("next carry", after, lane)
+            self._store_carry(after, lane)
         b.ret_void()
 
     def _blocks(self) -> AbstractContextManager[Any]:
@@ -155,10 +155,10 @@ class _Codegen:
                 address = self._address("outputs", row, len(outputs), column, lane)
                 b.store(self._as_number(value), address, align=8)
 
-    def _store_block(self, array: str, values: Sequence[Any], lane: Any) -> None:
-        """Wide values into an array (blocks, values, width), true and false as 1 and 0."""
+    def _store_carry(self, values: Sequence[Any], lane: Any) -> None:
+        """Wide values into the next carry, true and false as 1 and 0."""
         for column, value in enumerate(values):
-            address = self._block_address(array, len(values), column, lane)
+            address = self._block_address("next carry", len(values), column, lane)
             self._builder.store(self._as_number(value), address, align=8)
 
     def _compute(self, numbers: Iterable[int]) -> None:
