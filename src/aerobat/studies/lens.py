@@ -69,11 +69,6 @@ class Lens:
             return "°"
         return unit_of(tuple(key for key in self.keys if isinstance(key, str)))
 
-    @property
-    def label(self) -> str:
-        """The name with the unit."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
-
     def get(self, whole: Any) -> Any:
         """Return the field's value; a vector where one number stands for all of its entries."""
         if self._is_angle:

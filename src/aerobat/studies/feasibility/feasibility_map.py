@@ -267,12 +267,9 @@ def _name(values: tuple[float, ...]) -> str:
 
 def _asked(axes: Sequence[Axis], task: ProbedTask) -> dict[str, Any]:
     """All that the answers of cells depend on, beside their values."""
-    scenario = task.scenario
+    parts = vars(task.scenario).items()  # the problem, the vehicle and so on
     return {
-        "problem": fingerprint(to_table(scenario.problem)),
-        "vehicle": fingerprint(to_table(scenario.vehicle)),
-        "planner": None if scenario.planner is None else fingerprint(to_table(scenario.planner)),
-        "conditions": None if scenario.conditions is None else fingerprint(to_table(scenario.conditions)),
+        **{name: None if part is None else fingerprint(to_table(part)) for name, part in parts},
         "fields": [axis.name for axis in axes],
         "time limit": task.time_limit,
         "flights": [task.flights.stop, task.seed],
