@@ -18,10 +18,6 @@ from aerobat.arrays import Array
 TINY = 1e-12  # [m] beside lengths that divide
 
 
-def _not_rounded() -> Array:
-    return np.zeros((3, 3))
-
-
 @dataclass(frozen=True, eq=False)
 class ObstacleMotion:
     """The motion of an obstacle from where its file has it: straight from row to row, without turning."""
@@ -90,7 +86,7 @@ class ConvexPiece:
     """The hull of points, each rounded by the ellipsoid of all L y with |y| ≤ 1, in the world at first."""
 
     points: Array  # [m] (V, 3)
-    rounding: Array = field(default_factory=_not_rounded)  # L [m], (3, 3)
+    rounding: Array = field(default_factory=lambda: np.zeros((3, 3)))  # L [m], (3, 3)
     name: str = "obstacle"  # of what it is a piece of
     motion: ObstacleMotion | None = None  # away from where it is here
 

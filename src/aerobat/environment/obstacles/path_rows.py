@@ -19,8 +19,10 @@ def rows_of_path(value: Any) -> Array:
     if isinstance(value, str):
         lines = read_named_file(value, MAX_FILE).decode(errors="replace").splitlines()
         cells = [line.split(",") for line in lines if line.strip() and not line.lstrip().startswith("#")]
+        if cells and cells[0][0].strip() == "t":  # a header
+            del cells[0]
         try:
-            value = [[float(cell) for cell in row] for row in cells[_is_header(cells) :]]
+            value = [[float(cell) for cell in row] for row in cells]
         except ValueError:
             raise FieldError("", f": {value} has a row that is not four numbers; mend it") from None
     count = len(value) if hasattr(value, "__len__") else 1
@@ -28,10 +30,6 @@ def rows_of_path(value: Any) -> Array:
     if count and (len(rows) < 2 or not (np.diff(rows[:, 0]) > 0.0).all()):
         raise FieldError("", "must be two rows or more of t, x, y, z, the time rising from row to row")
     return rows
-
-
-def _is_header(cells: list[list[str]]) -> bool:
-    return bool(cells) and [cell.strip() for cell in cells[0]][:1] == ["t"]
 
 
 PathRows = Annotated[

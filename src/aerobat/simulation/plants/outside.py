@@ -143,7 +143,9 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
         name = autopilot.kind if plant is None and autopilot else plant.kind if plant else ""
         raise SpecError(f"plant: {name} flies one vehicle at a time, not {len(setup.fleet)}")
     parameters: PlantParameters = setup.parts[-1].parameters
-    inner = setup.parts[:-1] if autopilot is None else _without_rate_loop(setup.parts[:-1])
+    inner = setup.parts[:-1]
+    if autopilot is not None:
+        inner = tuple(part for part in inner if not isinstance(part.component, RateLoop))
     parts = (LoopPart(OutsidePlant()), *inner, LoopPart(Actuator(), parameters))
     inside = replace(setup, parts=parts)
     motion = VehicleState(
@@ -186,10 +188,6 @@ def _begun(plant: Plant, scene: PlantScene, motion: VehicleState) -> PlantRun:
     else:
         return cast(PlantRun, run)
     raise placed(SpecError(f"plant '{plant.kind}' {wrong}"), plant.begin)
-
-
-def _without_rate_loop(parts: tuple[LoopPart, ...]) -> tuple[LoopPart, ...]:
-    return tuple(part for part in parts if not isinstance(part.component, RateLoop))
 
 
 class _Firmware:
