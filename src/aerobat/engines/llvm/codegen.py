@@ -219,9 +219,10 @@ class _Codegen:
             column = next(columns[shared])
             if shared:
                 address = self._address("shared parameters", INTEGER(0), counts[shared], column, None)
+                self._unloaded[number] = (address, NUMBER, 8)
             else:
                 address = self._block_address("parameters", counts[shared], column, lane)
-            self._unloaded[number] = (address, self._type(shared), 8)
+                self._unloaded[number] = (address, self._wide_type(NUMBER), 8)
 
     def _load_inputs(self, tick: Any, lane: Any) -> None:
         """One tick's inputs, to be loaded where they are needed first."""
@@ -254,9 +255,6 @@ class _Codegen:
             block = self._arguments[f"{array} rows"]
             row = b.fptosi(b.load(address, typ=NUMBER, align=8), INTEGER)
         return array, b.add(b.mul(lane, block), b.mul(row, INTEGER(layout.width)))
-
-    def _type(self, shared: bool) -> Any:
-        return NUMBER if shared else self._wide_type(NUMBER)
 
     def _address(self, array: str, row: Any, columns: int, column: int, lane: Any | None) -> Any:
         """Of array[row, column], or of array[row, column, lane]."""

@@ -166,8 +166,4 @@ def _extreme(
 
 def _wider(ops: Ops, condition: Scalar, a: Swath, b: Swath) -> Swath:
     """Of all extremes the farther, `a`'s only where the condition holds."""
-    return tuple(_farther(ops, condition, p, q) for p, q in zip(a, b, strict=True))
-
-
-def _farther(ops: Ops, condition: Scalar, a: Extreme, b: Extreme) -> Extreme:
-    return select_tree(ops, condition & (a.reach > b.reach), a, b)
+    return tuple(select_tree(ops, condition & (p.reach > q.reach), p, q) for p, q in zip(a, b, strict=True))
