@@ -19,12 +19,6 @@ from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import ZERO, dot, subtract
 
 
-class MetricsInput(NamedTuple):
-    """The instant of a tick."""
-
-    time: Scalar  # [s]
-
-
 class Ground(NamedTuple):
     """The ground as flights hit it: a slow vehicle that comes down near it has landed."""
 
@@ -83,7 +77,7 @@ def step(
     body: Body,
     reference: tuple[Vector, Quaternion],
     actuation: tuple[PerRotor, PerRotor, Scalar],
-    inputs: MetricsInput,
+    time: Scalar,
 ) -> RunningMetrics:
     """Metrics one tick later.
 
@@ -94,7 +88,7 @@ def step(
         body: the true state.
         reference: position [m] and attitude that are tracked.
         actuation: thrusts and commands of the rotors [N], and true where limits changed the commands.
-        inputs: the instant.
+        time: of the tick [s].
     """
     position, q_world_body = reference
     thrusts, commands, saturated = actuation
@@ -107,14 +101,14 @@ def step(
     ended = (metrics.flying > 0.5) & (going < 0.5)
     below = counted & (body.position[2] < lowest_height(ops, parameters.ground, body.velocity))
     is_off = counted & (square > parameters.path_radius_sq)
-    now = Snapshot(inputs.time, *body[:3])
+    now = Snapshot(time, *body[:3])
     snapshots, both = (metrics.last, now), (metrics.ticks > 0.5, counted)
     return RunningMetrics(
         flying=going,
         is_finite=ops.select(ended & (counts < 0.5), 0.0, metrics.is_finite),
-        stop=ops.select(ended, ops.select(counted, inputs.time, metrics.last.time), metrics.stop),
-        ground_time=ops.minimum(metrics.ground_time, ops.select(below, inputs.time, inf)),
-        off_path_time=ops.minimum(metrics.off_path_time, ops.select(is_off, inputs.time, inf)),
+        stop=ops.select(ended, ops.select(counted, time, metrics.last.time), metrics.stop),
+        ground_time=ops.minimum(metrics.ground_time, ops.select(below, time, inf)),
+        off_path_time=ops.minimum(metrics.off_path_time, ops.select(is_off, time, inf)),
         ticks=metrics.ticks + counts,
         max_square=ops.select(counted, ops.maximum(metrics.max_square, square), metrics.max_square),
         sum_square=metrics.sum_square + ops.select(counted, square, 0.0),

@@ -21,7 +21,6 @@ from aerobat.kernels.gates.section import BoundingEllipsoid
 from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector
 from aerobat.kernels.running_metrics import (
     Ground,
-    MetricsInput,
     MetricsParameters,
     RunningMetrics,
     lowest_height,
@@ -54,9 +53,7 @@ class Criteria(NamedTuple):
 class MetricsMonitor(Component):
     """The loop's component that adds up a flight's metrics."""
 
-    def init(
-        self, ops: Ops, parameters: MetricsParameters, inputs: MetricsInput, signals: Signals
-    ) -> RunningMetrics:
+    def init(self, ops: Ops, parameters: MetricsParameters, time: Scalar, signals: Signals) -> RunningMetrics:
         """See `Component.init`."""
         return running_metrics.init(parameters)
 
@@ -65,14 +62,14 @@ class MetricsMonitor(Component):
         ops: Ops,
         parameters: MetricsParameters,
         metrics: RunningMetrics,
-        inputs: MetricsInput,
+        time: Scalar,
         signals: Signals,
     ) -> RunningMetrics:
         """See `Component.step`."""
         motion, commands = signals.plant, rotor_commands(signals)
         reference = (signals.reference.position, signals.reference.q_world_body)
         actuation = (motion.thrusts, commands.thrusts, commands.saturated)
-        return running_metrics.step(ops, parameters, metrics, motion.body, reference, actuation, inputs)
+        return running_metrics.step(ops, parameters, metrics, motion.body, reference, actuation, time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +79,9 @@ class MetricsSource:
     times: Array
     per_vehicle: bool = False
 
-    def chunk(self, begin: int, end: int) -> MetricsInput:
+    def chunk(self, begin: int, end: int) -> Array:
         """See `Source.chunk`."""
-        return MetricsInput(self.times[begin:end])
+        return self.times[begin:end]
 
 
 def metrics_row(signals: Signals) -> RunningMetrics:
