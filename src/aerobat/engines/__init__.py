@@ -10,13 +10,13 @@ from aerobat.engines.engine import CompiledLoop, Engine, logged_ticks, run_whole
 from aerobat.engines.floats import FLOATS
 from aerobat.errors import BackendMissing, SpecError
 
-ENGINE_NAMES = ("floats", "compiled", "jax", "jax-float32")
 _PLACES = {  # each imported when it is chosen
     "floats": ("floats", "FLOATS"),
     "compiled": ("llvm", "ENGINE"),
     "jax": ("jax", "ENGINE"),
     "jax-float32": ("jax", "SINGLE"),
 }
+ENGINE_NAMES = tuple(_PLACES)
 _TRACING = 300  # vehicle-ticks that floats fly in the time that it takes to trace
 
 __all__ = [
