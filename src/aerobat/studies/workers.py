@@ -136,10 +136,7 @@ class Pool:
 
     def close(self) -> None:
         """End the pool's own processes, and what an executor has not begun."""
-        for future in self._pending:
-            future.cancel()
-        self._started = None
-        self._own.close()
+        self.__exit__(None, None, None)
 
     def __enter__(self) -> Pool:
         return self
@@ -147,6 +144,7 @@ class Pool:
     def __exit__(self, *error: Any) -> None:
         for future in self._pending:
             future.cancel()
+        self._started = None
         self._own.__exit__(*error)
 
     def _submit(
