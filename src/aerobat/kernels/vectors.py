@@ -48,7 +48,7 @@ def transform(m: Matrix, a: Vector) -> Vector:
 
 
 def low_passed(before: Vector, now: Vector, time_constant: Scalar, elapsed: Scalar) -> Vector:
-    """What a first-order low-pass makes of `now`, `elapsed` [s] after it made `before`."""
+    """The output of a first-order low-pass of `now`, `elapsed` [s] after its output was `before`."""
     return add_scaled(before, elapsed / (time_constant + elapsed), subtract(now, before))
 
 
