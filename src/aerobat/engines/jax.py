@@ -126,7 +126,7 @@ def _scanned(
         return program.filled(loop.next_carry, values, like), program.filled(loop.outputs, values, like)
 
     def stretch(state: State, ends: tuple[Any, Any]) -> tuple[State, Values]:
-        """From after a tick that is logged through the next one."""
+        """Run the ticks after one logged tick, up to and including the next."""
         state = jax.lax.fori_loop(*ends, tick, state)
         return state, state[1]
 

@@ -67,7 +67,7 @@ class ErrorsOverTime:
 
     @classmethod
     def of(cls, times: Array, sums: RunningMetrics | PoseRow) -> ErrorsOverTime:
-        """The errors behind their sums as they stood at those times [s], leaves (flights, T)."""
+        """Compute the errors from their running sums at those times [s], leaves (flights, T)."""
         ticks = np.diff(sums.ticks, axis=1, prepend=0.0)
         latest = np.maximum.accumulate(np.where(ticks > 0.0, np.arange(len(times)), 0), axis=1)
 

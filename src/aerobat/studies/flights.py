@@ -100,7 +100,7 @@ def _score_chunk(tasks: tuple[FlightTask, ...], part: tuple[int, range]) -> Scor
 
 
 def joined(parts: list[Any]) -> Any:
-    """Join scores of some flights to those of all: their arrays behind one another, whatever holds them."""
+    """Join scores of consecutive flights into one: arrays are concatenated, in tuples and dataclasses too."""
     first = parts[0]
     if isinstance(first, np.ndarray):
         return np.concatenate(parts)

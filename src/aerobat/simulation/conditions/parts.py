@@ -82,7 +82,7 @@ class DispersedFlights:
         return self.draws.columns["effectiveness"]
 
     def slow_period(self, rate: float = SLOW) -> int:
-        """The ticks of a step at so many a second, or of the next faster one."""
+        """The number of ticks in a step of a component that steps at `rate` [1/s], or somewhat faster."""
         return max(1, int(self.rate / rate + WHOLE))
 
 

@@ -59,7 +59,7 @@ class Axis:
 
     @classmethod
     def of(cls, name: str, values: object) -> Axis:
-        """The axis of any numbers in a row. Raises SpecError for what are none, or not each once."""
+        """Return the axis of a sequence of numbers. Raises SpecError unless they are finite and differ."""
         try:
             row = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError):
@@ -76,7 +76,7 @@ class Axis:
 
     @classmethod
     def parse(cls, text: str) -> Axis:
-        """The axis of a text, FIRST:LAST:STEP or values between commas behind a name and an equals sign."""
+        """Read an axis from a text: NAME=FIRST:LAST:STEP, or NAME= and values separated by commas."""
         name, separator, numbers = text.partition("=")
         name = name.strip()
         if not separator or not name or not numbers.strip():
@@ -100,7 +100,7 @@ def _number(text: str, whole: str) -> float:
 
 
 def _range(name: str, first: float, last: float, step: float) -> tuple[float, ...]:
-    """The values from the first by steps to the last, itself where a step ends there."""
+    """The values from the first to the last in equal steps, the last included where a step ends there."""
     if step == 0.0:
         raise SpecError(f"the step of {name} is 0; give another, or one value, as {name}={first:g}")
     count = floor((last - first) / step + ROUNDING) + 1
@@ -142,7 +142,7 @@ class Cell:
 
     @classmethod
     def of(cls, values: tuple[float, ...], arrays: Mapping[str, NDArray[Any]] | None) -> Cell | None:
-        """The cell of these values that a file keeps; None of anything else."""
+        """Read the cell of these values from the arrays of a file; None where the file holds no cell."""
         if arrays is None or set(arrays) != {"numbers", "passed", "words"}:
             return None
         duration, reserve = (None if isnan(number) else number for number in arrays["numbers"].tolist())

@@ -182,13 +182,13 @@ class _Search:
 
     @property
     def _used(self) -> float:
-        """How much of it the last plan makes use of."""
+        """How much of the quantity the last plan uses."""
         assert self.planned is not None, "there is a plan"
         assert self.planned[1].plan is not None
         return self.quantity.used(self.planned[1].plan)
 
     def _gap(self, value: float) -> float:
-        """The largest distance to a refusal that will do."""
+        """The largest distance between the answer and the refusal below it at which the search ends."""
         return self.tolerance * max(value - self.quantity.floor(self.scenario), self.quantity.least_size)
 
     def _climb(self, value: float) -> Generator[float, Probe, None]:

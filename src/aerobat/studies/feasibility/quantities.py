@@ -22,7 +22,7 @@ class NeededQuantity(ABC):
 
     name: ClassVar[str]
     unit: ClassVar[str] = ""
-    least_size: ClassVar[float] = 0.0  # above the floor: of less no part is told apart
+    least_size: ClassVar[float] = 0.0  # above the floor: steps and tolerances count smaller sizes as this one
     unasked: ClassVar[bool] = True  # whether it is sought where nobody names quantities
 
     @abstractmethod
@@ -34,11 +34,11 @@ class NeededQuantity(ABC):
         """Return the scenario with so much of it. Raises SpecError where that contradicts the rest."""
 
     def floor(self, scenario: Scenario) -> float:
-        """Return a value below which nothing needs to be tried, from which it is counted too."""
+        """Return the lowest value worth trying, from which growth and tolerance are measured."""
         return 0.0
 
     def used(self, plan: Plan) -> float:
-        """Return how much a plan makes use of; infinite where it does not tell."""
+        """Return how much of the quantity a plan uses; infinite where the plan does not tell."""
         return inf
 
 

@@ -1,4 +1,4 @@
-"""Accelerations by which a logged vehicle left what its controller would have had it do, each of one cause.
+"""Accelerations of a logged vehicle that its controller did not ask for, split by their causes.
 
 The error is e = p − p_ref; the position loop's own answer to the error is F(e) = −(k_p e + k_v e' + k_i ∫e).
 Thus
@@ -78,7 +78,7 @@ class Disturbances:
 
 
 def disturbances(flight: Flight, vehicle: Vehicle, loop: PositionLoop) -> Disturbances:
-    """All that moved a flight's vehicle, nominally `vehicle`, other than its position loop would have."""
+    """Return the accelerations that the position loop of the nominal `vehicle` does not explain, by cause."""
     true = loop.feedback(
         flight.times,
         flight.position - flight.setpoint_position,

@@ -31,7 +31,7 @@ TIGHTENING_TIME = 5.0
 
 @dataclass(frozen=True, eq=False)
 class _Flown:
-    """A round, with what tells how to go on from it."""
+    """A round with the scores of its flights and its variant, from which the search goes on."""
 
     round: Round
     scores: Score

@@ -59,7 +59,7 @@ class Chunk:
 
     @classmethod
     def of(cls, arrays: Mapping[str, NDArray[Any]] | None, count: int) -> Chunk | None:
-        """The chunk of so many flights that a file keeps; None of anything else."""
+        """Read a chunk of so many flights from the arrays of a file; None where it holds no such chunk."""
         if arrays is None:
             return None
         try:
