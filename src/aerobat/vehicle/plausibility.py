@@ -5,7 +5,7 @@ Nothing is refused here. Each threshold is beyond what is built, and its reason 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import hypot, log, sqrt
 
@@ -43,9 +43,9 @@ class _Check:
     """A length or a time of a rotor, how large it is at most, and what it is most often."""
 
     field: str
-    value: Callable[[Rotor], float]
-    most: Callable[[Rotor], float]
-    typical: Callable[[Rotor], float]
+    value: float
+    most: float
+    typical: float
     unit: str
     units: Units
 
@@ -76,16 +76,27 @@ def _of_dead_rotors(vehicle: Vehicle) -> Iterator[str]:
 
 def _of_rotors(rotors: Sequence[Rotor]) -> Iterator[str]:
     """Findings of the first rotor that has any, of each kind: the others most often share it."""
-    for check in _CHECKS:
-        for i, rotor in enumerate(rotors):
-            value, most = check.value(rotor), check.most(rotor)
-            if value > most:
-                remedy = _remedy(value, (0.0, most), check.typical(rotor), check.units)
+    for checks in zip(*map(_checks, rotors), strict=True):
+        for i, check in enumerate(checks):
+            if check.value > check.most:
+                remedy = _remedy(check.value, (0.0, check.most), check.typical, check.units)
                 yield (
-                    f"rotors[{i}].{check.field} is {value:.4g} {check.unit}, where {most:.3g} would be "
-                    f"a lot; {remedy}"
+                    f"rotors[{i}].{check.field} is {check.value:.4g} {check.unit}, where {check.most:.3g} "
+                    f"would be a lot; {remedy}"
                 )
                 break
+
+
+def _checks(rotor: Rotor) -> tuple[_Check, ...]:
+    """All that is looked at of one rotor."""
+    arm, radius = _arm(rotor), rotor.radius
+    torque, most_torque = rotor.torque_coefficient, MAX_TORQUE_PER_RADIUS * radius
+    return (
+        _Check("position_body", arm, MAX_ARM, TYPICAL_ARM, "m from the centre", LENGTHS),
+        _Check("lag", rotor.lag, MAX_LAG, TYPICAL_LAG, "s", TIMES),
+        _Check("radius", radius, MAX_RADIUS_PER_ARM * arm, TYPICAL_RADIUS_PER_ARM * arm, "m", LENGTHS),
+        _Check("torque_coefficient", torque, most_torque, TYPICAL_TORQUE_PER_RADIUS * radius, "m", LENGTHS),
+    )
 
 
 def _of_inertia(vehicle: Vehicle) -> Iterator[str]:
@@ -127,25 +138,3 @@ def _remedy(value: float, limits: tuple[float, float], typical: float, units: Un
 def _arm(rotor: Rotor) -> float:
     """The distance [m] of a rotor from the centre of mass."""
     return hypot(*rotor.position_body.tolist())
-
-
-_CHECKS = (
-    _Check("position_body", _arm, lambda _: MAX_ARM, lambda _: TYPICAL_ARM, "m from the centre", LENGTHS),
-    _Check("lag", lambda rotor: rotor.lag, lambda _: MAX_LAG, lambda _: TYPICAL_LAG, "s", TIMES),
-    _Check(
-        "radius",
-        lambda rotor: rotor.radius,
-        lambda rotor: MAX_RADIUS_PER_ARM * _arm(rotor),
-        lambda rotor: TYPICAL_RADIUS_PER_ARM * _arm(rotor),
-        "m",
-        LENGTHS,
-    ),
-    _Check(
-        "torque_coefficient",
-        lambda rotor: rotor.torque_coefficient,
-        lambda rotor: MAX_TORQUE_PER_RADIUS * rotor.radius,
-        lambda rotor: TYPICAL_TORQUE_PER_RADIUS * rotor.radius,
-        "m",
-        LENGTHS,
-    ),
-)
