@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from aerobat.control import Controller
+from aerobat.control import Controller, named_controller
 from aerobat.evaluation.score import Score, score
 from aerobat.planning import Miqp, Plan, plan
 from aerobat.problem import load_problem
 from aerobat.simulation import Flight, fly
 from aerobat.vehicle import Vehicle, load_vehicle
-from aerobat.vehicle.controller import named_controller
 
 MANEUVERS = ("flip-roll", "flip-roll-translation", "flip-pitch", "half-flip")  # in the order of Section II
 HEXAROTOR = "hexarotor"  # what the paper flies

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import aerobat as ab
+from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
-from aerobat.vehicle.controller import named_controller
 from shared_plans import shared_plan
 
 LAB = load_dispersion("lab")

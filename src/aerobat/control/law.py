@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple, TypeVar, cast, dataclass_transform
 
 from pydantic import Field
@@ -20,7 +21,6 @@ from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.ops import Ops, PerRotor, Scalar
 from aerobat.kernels.rigid_body import Body, RotorWrench
 from aerobat.vehicle.controller import CONTROLLERS, Controller
-from aerobat.vehicle.controller import named_controller as named_settings
 
 L = TypeVar("L", bound="ControlLaw")
 
@@ -100,8 +100,10 @@ def named_controller(name: str, own: Controller = CONTROLLERS["full"]) -> Contro
 
     Raises SpecError, with the closest name, for a name that nothing has.
     """
+    if name == "full":
+        return own
     if name in CONTROLLERS:
-        return named_settings(name, own)
+        return replace(own, disturbance_filter=0.0, **CONTROLLERS[name].feature_flags._asdict())
     if name not in tuple(CONTROL_LAWS):
         raise unknown_name("controller", name, (*CONTROLLERS, *CONTROL_LAWS))
     law = CONTROL_LAWS[name]

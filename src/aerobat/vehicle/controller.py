@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from aerobat.declaration import NonNegative, declared, unknown_name
+from aerobat.declaration import NonNegative, declared
 from aerobat.kernels.control import FeatureFlags
 from aerobat.kernels.control_loops import Gains
 from aerobat.kernels.ops import Scalar
@@ -89,15 +88,3 @@ class Controller:
 
 
 CONTROLLERS: Mapping[str, Controller] = MappingProxyType({"full": Controller(), "paper": Controller.paper()})
-
-
-def named_controller(name: str, own: Controller = CONTROLLERS["full"]) -> Controller:
-    """A vehicle's `own` controller, by the name full; by paper, the paper's law at its gains.
-
-    Raises SpecError for a name that CONTROLLERS has not.
-    """
-    if name not in CONTROLLERS:
-        raise unknown_name("controller", name, CONTROLLERS)
-    if name == "full":
-        return own
-    return replace(own, disturbance_filter=0.0, **CONTROLLERS[name].feature_flags._asdict())
