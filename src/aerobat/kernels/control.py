@@ -17,6 +17,7 @@ from aerobat.kernels.control_loops import (
     feedback_moment,
     init_position_loop,
     integrate_attitude_error,
+    moment_and_change,
     reference_moment,
     step_position_loop,
     thrust_demand,
@@ -25,7 +26,7 @@ from aerobat.kernels.motors import Airframe
 from aerobat.kernels.ops import Axes, Ops, PerRotor, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, RotorWrench
-from aerobat.kernels.vectors import ZERO, add, dot, norm, subtract
+from aerobat.kernels.vectors import ZERO, add, dot, norm
 
 _MIN_PART = 0.3  # [-] of the commanded specific thrust, kept where the vehicle points away from it
 
@@ -132,10 +133,8 @@ def track_attitude(
     integral = integrate_attitude_error(ops, model.gains, state.attitude_integral, error, counted)
     moment, change = feedback_moment(model.gains, mass_properties.inertia, error, integral), ZERO
     if flags.moment_feedforward:
-        now, then = (
-            reference_moment(mass_properties.inertia, body_axes, each) for each in (rates, rates.ahead)
-        )
-        moment, change = add(moment, now), subtract(then, now)
+        now, change = moment_and_change(mass_properties.inertia, body_axes, rates)
+        moment = add(moment, now)
     load = RotorWrench(pursuit.thrust, moment)
     ahead = RotorWrench(mass_properties.mass * rates.ahead.thrust_change, change)
     decay_factors = motors.decay_factors(ops, rotors, elapsed)

@@ -208,3 +208,9 @@ def reference_moment(inertia: Matrix, body_axes: Axes, rates: ReferencePoint | L
     """The moment that the reference asks [N·m], J ω' + ω × Jω, with its rates in the body's own axes."""
     omega, omega_dot = to_body(body_axes, rates.omega), to_body(body_axes, rates.omega_dot)
     return flatness.moment(inertia, omega, omega_dot)
+
+
+def moment_and_change(inertia: Matrix, body_axes: Axes, reference: ReferencePoint) -> tuple[Vector, Vector]:
+    """The moment that the reference asks [N·m], and its change until the controller's next step."""
+    now, then = (reference_moment(inertia, body_axes, each) for each in (reference, reference.ahead))
+    return now, subtract(then, now)

@@ -14,12 +14,11 @@ from aerobat.engines.pytree import tree_leaves
 from aerobat.errors import SpecError
 from aerobat.kernels import control, motors
 from aerobat.kernels.control import Commands, ControllerModel, FeatureFlags
-from aerobat.kernels.control_loops import ReferencePoint, reference_moment
+from aerobat.kernels.control_loops import ReferencePoint, moment_and_change
 from aerobat.kernels.ops import Ops, PerRotor
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rate_loop import RateLoopModel
 from aerobat.kernels.rigid_body import RotorWrench
-from aerobat.kernels.vectors import subtract
 from aerobat.simulation.components import ControllerParameters, RateLoop, TrackingController, told
 from aerobat.simulation.loop import Component, Signals
 from aerobat.simulation.setup import LoopPart
@@ -76,7 +75,9 @@ class LawController(Component):
         own, load = self._checked(answer)
         if len(tree_leaves(own)) != len(tree_leaves(state.own)):
             raise _wrong(self.law.step, f"returned the state {shown(own)}, of another shape than before")
-        loads = load, _change_ahead(model, axes(body.q_world_body), reference)
+        mass_properties = model.airframe.mass_properties
+        _, change = moment_and_change(mass_properties.inertia, axes(body.q_world_body), reference)
+        loads = load, RotorWrench(mass_properties.mass * reference.ahead.thrust_change, change)
         commands = control.rotor_commands(ops, self.flags, model, loads, thrusts, decay_factors, elapsed)
         return LawState(own, thrusts, commands)
 
@@ -96,13 +97,6 @@ def _wrong(method: Any, complaint: str) -> SpecError:
     """Return the error of a law's method, with its file and line."""
     law = f"controller '{method.__self__.kind}'"
     return placed(SpecError(f"{law}: {method.__name__}() {complaint}"), method)
-
-
-def _change_ahead(model: Any, body_axes: Any, reference: ReferencePoint) -> RotorWrench:
-    """The change that the reference makes of force and moment until the controller's next step."""
-    inertia, mass = model.airframe.mass_properties.inertia, model.airframe.mass_properties.mass
-    now, then = (reference_moment(inertia, body_axes, each) for each in (reference, reference.ahead))
-    return RotorWrench(mass * reference.ahead.thrust_change, subtract(then, now))
 
 
 def flown_by(law: ControlLaw | None, settings: Controller, period: int = 1) -> Component:

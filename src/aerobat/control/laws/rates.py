@@ -13,7 +13,7 @@ from aerobat.kernels.control_loops import (
     attitude_command,
     attitude_error,
     init_position_loop,
-    reference_moment,
+    moment_and_change,
     step_position_loop,
     thrust_demand,
 )
@@ -111,7 +111,5 @@ class Rates(ControlLaw):
     ) -> Vector:
         """Return the reference's moment over the inertia [rad/s²], so many steps of the controller ahead."""
         properties = model.airframe.mass_properties
-        now, then = (
-            reference_moment(properties.inertia, body_axes, each) for each in (reference, reference.ahead)
-        )
-        return transform(properties.inverse_inertia, add_scaled(now, steps, subtract(then, now)))
+        now, change = moment_and_change(properties.inertia, body_axes, reference)
+        return transform(properties.inverse_inertia, add_scaled(now, steps, change))
