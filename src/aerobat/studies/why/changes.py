@@ -100,46 +100,37 @@ def _with_stronger_rotors(task: Request) -> Request:
 def _of_stages(task: Request) -> Iterator[Change]:
     stages = task.problem.stages(task.max_specific_thrust).stages
     if any(stage.at != "free" for stage in stages):
-        yield Change("with its stages at any time", partial(_with_stages, at_any_time))
+        yield Change("with its stages at any time", partial(_with_stages, _at_any_time))
     if any(condition.min_thrust > 0.0 for stage in stages for condition in stage.conditions):
-        yield Change("with half the thrust that its stages ask", partial(_with_stages, with_half_the_thrust))
+        yield Change("with half the thrust that its stages ask", partial(_with_stages, _with_half_the_thrust))
 
 
 def _with_stages(ease: Callable[[Stage], Stage], task: Request) -> Request:
-    return replace(task, problem=eased(task.problem, task.max_specific_thrust, ease))
-
-
-def eased(problem: Problem, max_specific_thrust: float, ease: Callable[[Stage], Stage]) -> Problem:
-    """The problem with every stage eased, spelled out as stages.
-
-    Args:
-        problem: Whose maneuver says them.
-        max_specific_thrust: Of the vehicle [m/s²], by which stages ask.
-        ease: A stage that asks less than another.
-    """
-    sequence = problem.maneuver.stage_sequence(problem.gates, max_specific_thrust)
+    """The request with every stage of its maneuver eased, and the maneuver spelled out as stages."""
+    problem = task.problem
+    sequence = problem.maneuver.stage_sequence(problem.gates, task.max_specific_thrust)
     stages = tuple(map(ease, sequence.stages))
     maneuver = CustomManeuver(stages, sequence.path_constraints, sequence.ordered)
-    return replace(problem, maneuver=maneuver)
+    return replace(task, problem=replace(problem, maneuver=maneuver))
 
 
-def at_any_time(stage: Stage) -> Stage:
+def _at_any_time(stage: Stage) -> Stage:
     """The stage without a window or an instant."""
     return replace(stage, at="free", interval_offset=0)
 
 
-def with_half_the_thrust(stage: Stage) -> Stage:
+def _with_half_the_thrust(stage: Stage) -> Stage:
     """The stage with half of each thrust that it asks at least."""
     attitude = stage.attitude
     return replace(
         stage,
-        conditions=tuple(map(_with_half_the_thrust, stage.conditions)),
+        conditions=tuple(map(_at_half_the_thrust, stage.conditions)),
         min_upright_thrust=None if stage.min_upright_thrust is None else HALF * stage.min_upright_thrust,
         attitude=None if attitude is None else replace(attitude, min_thrust=HALF * attitude.min_thrust),
     )
 
 
-def _with_half_the_thrust(condition: Condition) -> Condition:
+def _at_half_the_thrust(condition: Condition) -> Condition:
     if condition.min_thrust <= 0.0:
         return condition
     lower = HALF * condition.lower if condition.lower > 0.0 else condition.lower
