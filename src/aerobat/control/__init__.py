@@ -8,10 +8,9 @@ from aerobat.control.law import (
     controller,
     named_controller,
 )
-from aerobat.vehicle.controller import CONTROLLERS, Controller
+from aerobat.vehicle.controller import Controller
 
 __all__ = [
-    "CONTROLLERS",
     "CONTROL_LAWS",
     "ControlLaw",
     "Controller",

@@ -20,8 +20,9 @@ from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.ops import Ops, PerRotor, Scalar
 from aerobat.kernels.rigid_body import Body, RotorWrench
-from aerobat.vehicle.controller import CONTROLLERS, Controller
+from aerobat.vehicle.controller import Controller
 
+CONTROLLERS = ("full", "paper")  # the names of the tracking controller: as a vehicle has it, and the paper's
 L = TypeVar("L", bound="ControlLaw")
 
 
@@ -95,15 +96,18 @@ def controller(name: Label) -> Callable[[type[L]], type[L]]:
     return register
 
 
-def named_controller(name: str, own: Controller = CONTROLLERS["full"]) -> Controller | ControlLaw:
+def named_controller(
+    name: str,
+    own: Controller = Controller(),  # noqa: B008 - frozen
+) -> Controller | ControlLaw:
     """Return the controller of a name: full or paper, at the gains of `own`, or a law with its own gains.
 
     Raises SpecError, with the closest name, for a name that nothing has.
     """
     if name == "full":
         return own
-    if name in CONTROLLERS:
-        return replace(own, disturbance_filter=0.0, **CONTROLLERS[name].feature_flags._asdict())
+    if name == "paper":
+        return replace(own, disturbance_filter=0.0, **Controller.paper().feature_flags._asdict())
     if name not in tuple(CONTROL_LAWS):
         raise unknown_name("controller", name, (*CONTROLLERS, *CONTROL_LAWS))
     law = CONTROL_LAWS[name]

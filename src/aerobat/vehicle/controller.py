@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -85,6 +84,3 @@ class Controller:
             max_attitude_integral=setting.max_attitude_integral * like,
             lead_time_constant=max(setting.lead_time_constant, _SMALLEST) * like,
         )
-
-
-CONTROLLERS: Mapping[str, Controller] = MappingProxyType({"full": Controller(), "paper": Controller.paper()})
