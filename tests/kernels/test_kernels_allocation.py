@@ -16,7 +16,6 @@ from aerobat.states import Wrench
 from aerobat.vehicle import (
     Rotor,
     Vehicle,
-    collective_range,
     load_vehicle,
     mixer,
     rotor_thrusts,
@@ -35,6 +34,11 @@ from random_vehicles import (
     without_yaw,
 )
 from suites import examples
+
+
+def collective_range(vehicle: Vehicle) -> tuple[float, float]:
+    low, high = Fleet.of([vehicle]).collective_range[0].tolist()
+    return low, high
 
 
 def parameters(vehicle: Vehicle, count: int) -> tuple[Rotors, Mixer]:

@@ -1,7 +1,6 @@
 """Vehicles, their rotors, and the effect of the rotors on the body."""
 
 from aerobat.vehicle.allocation import (
-    collective_range,
     mixer,
     rotor_thrusts,
     wrench,
@@ -17,7 +16,6 @@ __all__ = [
     "Rotor",
     "Vehicle",
     "as_vehicle",
-    "collective_range",
     "implausibilities",
     "load_vehicle",
     "mixer",

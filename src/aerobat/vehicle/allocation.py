@@ -8,7 +8,6 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.states import Wrench
-from aerobat.vehicle.hover import collective_ranges
 from aerobat.vehicle.vehicle import Vehicle
 
 
@@ -34,10 +33,3 @@ def rotor_thrusts(vehicle: Vehicle, wrench: Wrench) -> Array:
     inverse = mixer(vehicle)
     collective = np.asarray(wrench.thrust, dtype=float)[..., None] * inverse[:, 0]
     return np.asarray(collective + np.asarray(wrench.moment_body, dtype=float) @ inverse[:, 1:].T)
-
-
-@lru_cache(maxsize=128)
-def collective_range(vehicle: Vehicle) -> tuple[float, float]:
-    """The least and the most collective thrust [N] that the rotors can hold without any moment."""
-    low, high = collective_ranges(mixer(vehicle)[:, 0], vehicle.min_thrusts, vehicle.max_thrusts).tolist()
-    return low, high

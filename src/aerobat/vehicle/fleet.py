@@ -9,8 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.vehicle.hover import collective_ranges, mixing_matrix
+from aerobat.vehicle.hover import mixing_matrix
 from aerobat.vehicle.vehicle import Vehicle
+
+_SLACK = 1e-12  # a rotor with a smaller fraction of the collective thrust bears none of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,4 +87,10 @@ class Fleet:
     @cached_property
     def collective_range(self) -> Array:
         """Least and most collective thrust [N] that can be held without any moment, (vehicles, 2)."""
-        return collective_ranges(self.mixer[..., 0], self.min_thrusts, self.max_thrusts)
+        fractions = self.mixer[..., 0]
+        bears = np.abs(fractions) > _SLACK
+        divisor = np.where(bears, fractions, 1.0)
+        ends = np.sort([self.min_thrusts / divisor, self.max_thrusts / divisor], axis=0)
+        low = np.where(bears, ends[0], -np.inf).max(axis=-1)
+        high = np.where(bears, ends[1], np.inf).min(axis=-1)
+        return np.stack([low, high], axis=-1)

@@ -14,7 +14,6 @@ from aerobat.arrays import Array
 
 ROUNDING = 1e-9  # [-] a fraction of the weight that is none
 MIN_FRACTION = 1e-3  # [-] of the weight; a rotor that can bear no more has no room to steer
-_SLACK = 1e-12  # [-] a rotor with a smaller fraction of the collective thrust bears none of it
 
 
 def mixing_matrix(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> Array:
@@ -38,22 +37,6 @@ def mixing_matrix(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> 
         if smallest > MIN_FRACTION:
             inverses[at][:, 0] = balanced
     return inverses
-
-
-def collective_ranges(fractions: Array, min_thrusts: Array, max_thrusts: Array) -> Array:
-    """Least and most collective thrust [N] that rotors (..., n) can hold without any moment, (..., 2).
-
-    Args:
-        fractions: of the collective thrust that each rotor bears, the first column of a mixer, (..., n).
-        min_thrusts: [N], (..., n).
-        max_thrusts: [N], (..., n).
-    """
-    bears = np.abs(fractions) > _SLACK
-    divisor = np.where(bears, fractions, 1.0)
-    ends = np.sort([min_thrusts / divisor, max_thrusts / divisor], axis=0)
-    low = np.where(bears, ends[0], -np.inf).max(axis=-1)
-    high = np.where(bears, ends[1], np.inf).min(axis=-1)
-    return np.stack([low, high], axis=-1)
 
 
 def overloaded(fractions: Array, min_thrusts: Array, max_thrusts: Array) -> Array:
