@@ -22,16 +22,14 @@ from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.simulation import Outcome
 from aerobat.simulation.metrics import Criteria, metrics_of_log
 from aerobat.simulation.passages import (
-    PASSAGE_WINDOW,
     Passage,
     WaypointPassage,
-    bounding_ellipsoid,
-    gate_places,
     log_rows,
     passages,
     passages_in_log,
     waypoint_passages,
 )
+from aerobat.simulation.passages.passage import PASSAGE_WINDOW, bounding_ellipsoid, gate_places
 from aerobat.simulation.passages.waypoint import GRAZING
 from gate_motions import CRUISE, SPEED
 from polyline_judge import gate_progress

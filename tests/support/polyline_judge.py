@@ -19,7 +19,7 @@ from aerobat.kernels.gates.section import extent, gap, section
 from aerobat.kernels.gates.snapshot import Snapshot, between
 from aerobat.kernels.gates.swath import Swath, swept_between
 from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
-from aerobat.simulation.passages import PASSAGE_WINDOW, bounding_ellipsoid, gate_places
+from aerobat.simulation.passages.passage import PASSAGE_WINDOW, bounding_ellipsoid, gate_places
 from aerobat.vehicle import Ellipsoid
 
 T = TypeVar("T")
