@@ -13,11 +13,10 @@ from aerobat.certification import Certificate, Envelope, certify
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import POSITIVE, VehicleOptions, limiting
 from aerobat.cli.runs.record import default_vehicle
-from aerobat.cli.runs.saved_plans import between_rows, named_vehicle
+from aerobat.cli.runs.saved_plans import assumed_of_path, named_vehicle, read_source
 from aerobat.cli.terminal import print_json
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.interchange import read_plan
 from aerobat.planning import Plan, with_explanation
 from aerobat.planning.task import Task
 from aerobat.reporting.facts import Fact, Facts
@@ -71,7 +70,7 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
         `aerobat plan` or `aerobat fly` wrote.
     """
     chosen = None if options.vehicle is None else named_vehicle(options.vehicle)
-    found = read_plan(plan, options.rate)
+    found, facts = read_source(plan, options.rate)
     trajectory = found.trajectory if isinstance(found, Plan) else found
     if options.heading is not None:
         trajectory = replace(trajectory, heading=radians(options.heading))
@@ -89,7 +88,8 @@ def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = Ch
     explained = _explained(found, trajectory, vehicle) if isinstance(found, Plan) else None
     beside, assumed = Facts(evidence(explained)), list[str]()
     if not isinstance(found, Plan):
-        assumed = [*_assumed(options, vehicle, environment), *between_rows(plan, options.rate)]
+        beyond = ("no wind", "no limits, stages or gates of a problem")
+        assumed = [*assumed_of_path(options, vehicle, environment), *beyond, *facts]
     if options.json:
         print_json(to_json(plain(certificate) | plain(beside) | ({"assumed": assumed} if assumed else {})))
         return _judgement(certificate)
@@ -113,10 +113,3 @@ def _explained(plan: Plan, trajectory: Trajectory, vehicle: Vehicle) -> Plan | N
         return with_explanation(plan)
     except SpecError:  # the vehicle cannot hover, say
         return None
-
-
-def _assumed(options: CheckOptions, vehicle: Vehicle, environment: Environment) -> list[str]:
-    """All that a path leaves open and no option says."""
-    facts = [] if options.vehicle else [f"the vehicle {vehicle.name}"]
-    facts += [f"gravity {environment.gravity:g} m/s²", "no wind", "no limits, stages or gates of a problem"]
-    return facts

@@ -10,12 +10,10 @@ from cyclopts import Parameter
 
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import POSITIVE, RunOptions, output
+from aerobat.cli.runs.saved_plans import whole_plan
 from aerobat.cli.terminal import print_json, say
-from aerobat.errors import SpecError
-from aerobat.interchange import read_plan
 from aerobat.interchange.exports import FORMATS
 from aerobat.interchange.exports import export as export_plan
-from aerobat.planning import Plan
 from aerobat.reporting.plain_data import to_json
 
 
@@ -55,9 +53,7 @@ def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -
     plan
         A .plan file, or a folder that `aerobat plan` or `aerobat fly` wrote.
     """
-    found = read_plan(plan)
-    if not isinstance(found, Plan):
-        raise SpecError(f"{plan} holds a path alone; give it to `aerobat fly`, and export what that writes")
+    found = whole_plan(plan, "give it to `aerobat fly`, and export what that writes")
     form = FORMATS[options.to]
     default = Path("out") / f"{plan.resolve().stem}{form.suffix or '.' + options.to}"
     made = export_plan(found, options.out or default, options.to, options.rate)

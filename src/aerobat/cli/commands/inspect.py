@@ -11,11 +11,9 @@ from cyclopts import Parameter
 
 from aerobat.cli.options import VehicleOptions, output
 from aerobat.cli.runs.folder import FLIGHT, INSPECTION
-from aerobat.cli.runs.saved_plans import named_vehicle
+from aerobat.cli.runs.saved_plans import named_vehicle, whole_plan
 from aerobat.cli.terminal import print_json
-from aerobat.errors import SpecError
-from aerobat.interchange import read_flight_log, read_plan
-from aerobat.planning import Plan
+from aerobat.interchange import read_flight_log
 from aerobat.reporting.inspection import inspection_figure
 from aerobat.reporting.page import png
 from aerobat.reporting.plain_data import to_json
@@ -54,11 +52,7 @@ def inspect(log: Path, options: Annotated[InspectOptions, Parameter(name="*")] =
     """
     file = log / FLIGHT if os.path.isdir(log) else log
     flight = None if file.suffix.lower() == CSV else load_flight(file)
-    plan = read_plan(options.plan or file.parent)
-    if not isinstance(plan, Plan):
-        raise SpecError(
-            f"{options.plan or file.parent} holds a path alone; give the flight's .plan file as --plan"
-        )
+    plan = whole_plan(options.plan or file.parent, "give the flight's .plan file as --plan")
     vehicle = None if options.vehicle is None else named_vehicle(options.vehicle)
     if flight is None:
         flight = read_flight_log(file, plan, vehicle)

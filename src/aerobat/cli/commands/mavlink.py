@@ -12,11 +12,9 @@ from aerobat.arrays import Array
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.interrupts import REPORTED
 from aerobat.cli.link_options import MavlinkOptions, MavlinkVehicleOptions
-from aerobat.cli.runs.saved_plans import named_vehicle
+from aerobat.cli.runs.saved_plans import named_vehicle, whole_plan
 from aerobat.cli.terminal import print_json, say
 from aerobat.environment import Environment
-from aerobat.errors import SpecError
-from aerobat.interchange import read_plan
 from aerobat.planning import Plan
 from aerobat.reporting.plain_data import plain, to_json
 from aerobat.simulation.autopilot import recoveries
@@ -44,9 +42,7 @@ def mavlink(
     plan
         A .plan file, or a run's folder.
     """
-    found = read_plan(plan)
-    if not isinstance(found, Plan):
-        raise SpecError(f"{plan} holds a path alone; give a .plan file, which is certified for its vehicle")
+    found = whole_plan(plan, "give a .plan file, which is certified for its vehicle")
     from aerobat.links.clock import WallClock
     from aerobat.links.mavlink.autopilot_link import COMPONENT, SYSTEM
     from aerobat.links.mavlink.client import Client, ClientSettings, run

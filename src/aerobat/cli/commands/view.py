@@ -13,7 +13,7 @@ from aerobat.cli.options import POSITIVE, PlanningOptions, VehicleOptions, outpu
 from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import FLIGHT, REPLAY
 from aerobat.cli.runs.record import RECORD, USUAL_CONDITIONS, RunRecord, read_record
-from aerobat.cli.runs.saved_plans import named_vehicle
+from aerobat.cli.runs.saved_plans import named_vehicle, whole_plan
 from aerobat.cli.tasks import planned
 from aerobat.cli.terminal import open_in_browser, print_json
 from aerobat.control import named_controller
@@ -144,17 +144,15 @@ def view(
         raise SpecError(
             "what shall be shown is missing; name a run's folder, a plan or a flight, or give --live"
         )
-    run = _read(source)
+    shown, plan = _read(source)
     vehicle = None if options.vehicle is None else named_vehicle(options.vehicle)
-    replay = replay_of(run.shown, run.plan, vehicle)
+    replay = replay_of(shown, plan, vehicle)
     page = options.html or (None if options.video else _default_page(source))
     if page is not None:
         require_replaceable(page)
     if options.video is not None:
         with showing(Progress("pictures drawn")) as progress:
-            write_video(
-                run.shown, options.video, run.plan, vehicle, options.speed, progress.counting("in all")
-            )
+            write_video(shown, options.video, plan, vehicle, options.speed, progress.counting("in all"))
     if page is not None:
         save_replay(replay, page)
     if options.json:
@@ -168,31 +166,21 @@ def view(
         open_in_browser(opened)
 
 
-@dataclass(frozen=True)
-class _Source:
-    """What is looked at, and the plan of a flight."""
-
-    shown: Plan | Flight
-    plan: Plan | None = None
-
-
-def _read(source: Path) -> _Source:
-    """The flight of a folder with its plan, the plan where there is no flight, or what one file holds."""
+def _read(source: Path) -> tuple[Plan | Flight, Plan | None]:
+    """Return the flight or the plan in a folder or file, and the plan of a flight where it is known."""
     if source.suffix == ".npz" and _holds_flight(source):
         flight = load_flight(source)
-        return _Source(flight, _plan_beside(source, flight))
+        return flight, _plan_beside(source, flight)
     if not os.path.exists(source):  # of a name that is too long, Path raises
         raise SpecError(f"{source}: there is no such file or folder; `aerobat fly PROBLEM` writes one")
-    found = read_plan(source)
-    if not isinstance(found, Plan):
-        raise SpecError(f"{source} holds a path alone; give it to `aerobat fly`, and view what that writes")
+    found = whole_plan(source, "give it to `aerobat fly`, and view what that writes")
     if os.path.isdir(source) and (source / FLIGHT).exists():
-        return _Source(load_flight(source / FLIGHT), found)
+        return load_flight(source / FLIGHT), found
     if os.path.isdir(source) and (source / RECORD).exists():
         record = read_record(source)
         if record.command == "sweep":
-            return _Source(_first_flights(found, record), found)
-    return _Source(found)
+            return _first_flights(found, record), found
+    return found, None
 
 
 def _first_flights(plan: Plan, record: RunRecord) -> Flight:

@@ -8,9 +8,10 @@ from dataclasses import replace
 from math import radians
 from pathlib import Path
 
-from aerobat.cli.options import PlanningOptions, is_given, offered_options, option_name
+from aerobat.cli.options import PlanningOptions, VehicleOptions, is_given, offered_options, option_name
 from aerobat.cli.runs.record import default_vehicle
 from aerobat.cli.terminal import say
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_rows
 from aerobat.interchange.robots import SUFFIXES
@@ -20,7 +21,6 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
 
 FILES = (".plan", ".csv", ".npz")
-RATE = 100.0  # [1/s] of rows without times
 MADE_BY = "file"  # in the place of a planner's name
 
 
@@ -40,15 +40,46 @@ def read_saved_plan(path: Path, options: PlanningOptions) -> Plan:
         if is_given(getattr(options, name, None)):
             flag = "--" + name.replace("_", "-")
             raise SpecError(f"{flag} plans anew, but {path} is a plan; leave it out, or name a problem")
-    found = read_plan(path, options.rate or RATE)
+    found, facts = read_source(path, options.rate or 100.0)
     if isinstance(found, Trajectory):
-        return _plan_of_path(path, found, options)
+        return _plan_of_path(path, found, facts, options)
     for name in ("rate", "heading"):
         if is_given(getattr(options, name)):
             raise SpecError(f"--{name} is for a CSV file, but {path} is a whole plan; leave it out")
     if options.vehicle is not None or found.vehicle is None:
         return found.for_vehicle(named_vehicle(options.vehicle or default_vehicle()))
     return found
+
+
+def whole_plan(path: Path, remedy: str) -> Plan:
+    """Return the plan in a file or folder. Raises SpecError, with the remedy, where it holds only a path."""
+    found = read_plan(path)
+    if not isinstance(found, Plan):
+        raise SpecError(f"{path} holds a path alone; {remedy}")
+    return found
+
+
+def read_source(path: Path, rate: float) -> tuple[Plan | Trajectory, list[str]]:
+    """Return the plan or path in a file or folder, and what reading a CSV file assumed, in words.
+
+    Args:
+        path: The file or folder.
+        rate: Rows a second [1/s] of a CSV file without times.
+    """
+    if path.suffix != ".csv" or os.path.isdir(path):
+        return read_plan(path, rate), []
+    rows = read_rows(path, rate)
+    facts = [f"without {each}, which the file holds too" for each in rows.unused]
+    error = rows.fit_error
+    if error is not None:
+        facts.append(f"a smooth path between rows (without every second row it is off by {error:.1g} m)")
+    return rows.trajectory, facts
+
+
+def assumed_of_path(options: VehicleOptions, vehicle: Vehicle, environment: Environment) -> list[str]:
+    """Return the vehicle, unless the options name it, and the gravity that a bare path is judged with."""
+    own = [] if options.vehicle else [f"the vehicle {vehicle.name}"]
+    return [*own, f"gravity {environment.gravity:g} m/s²"]
 
 
 def named_vehicle(name: str) -> Vehicle:
@@ -64,7 +95,7 @@ def named_vehicle(name: str) -> Vehicle:
     return vehicle
 
 
-def _plan_of_path(path: Path, trajectory: Trajectory, options: PlanningOptions) -> Plan:
+def _plan_of_path(path: Path, trajectory: Trajectory, facts: list[str], options: PlanningOptions) -> Plan:
     """A bare path as the plan of a line from its first point to its last; what is assumed is told."""
     vehicle = named_vehicle(options.vehicle or default_vehicle())
     if options.heading is not None:
@@ -79,23 +110,6 @@ def _plan_of_path(path: Path, trajectory: Trajectory, options: PlanningOptions) 
     plan = Plan(problem=problem, trajectory=trajectory, planner=MADE_BY, status="as it is").for_vehicle(
         vehicle
     )
-    say(f"{path} holds a path alone; assumed: {', '.join(_assumed(path, vehicle, problem, options))}")
+    assumed = assumed_of_path(options, vehicle, problem.environment)
+    say(f"{path} holds a path alone; assumed: {', '.join([*assumed, 'no wind, limits or gates', *facts])}")
     return plan
-
-
-def _assumed(path: Path, vehicle: Vehicle, problem: Problem, options: PlanningOptions) -> list[str]:
-    facts = [] if options.vehicle else [f"the vehicle {vehicle.name}"]
-    facts += [f"gravity {problem.environment.gravity:g} m/s²", "no wind, limits or gates"]
-    return facts + between_rows(path, options.rate or RATE)
-
-
-def between_rows(path: Path, rate: float) -> list[str]:
-    """Assumptions about a path in a CSV file, and what else the file holds, in words; none of other files."""
-    if path.suffix != ".csv":
-        return []
-    rows = read_rows(path, rate)
-    error = rows.fit_error
-    facts = [f"without {each}, which the file holds too" for each in rows.unused]
-    if error is not None:
-        facts.append(f"a smooth path between rows (without every second row it is off by {error:.1g} m)")
-    return facts
