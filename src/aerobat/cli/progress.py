@@ -6,7 +6,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from math import inf, isfinite
 from time import perf_counter
 from typing import TYPE_CHECKING, TypeVar
@@ -107,11 +107,6 @@ class PlanningProgress(Progress):
         last = f"; attempt {self._tried}: {self._last}" if self._tried else ""
         spent = self._clock() - self._began
         return f"planning with {self._planner} for {spent:.0f} s: {best}{last}{self._trial}"
-
-
-def planning_progress(planner: str = "") -> AbstractContextManager[PlanningProgress]:
-    """Show what planning is at in the block."""
-    return showing(PlanningProgress(planner))
 
 
 @contextmanager

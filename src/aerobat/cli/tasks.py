@@ -16,7 +16,7 @@ from aerobat.cli.options import (
     offered_options,
     option_name,
 )
-from aerobat.cli.progress import Progress, planning_progress, showing
+from aerobat.cli.progress import PlanningProgress, Progress, showing
 from aerobat.cli.runs.record import USUAL_CONDITIONS, FlightSettings, RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.cli.terminal import say
@@ -181,7 +181,7 @@ def _plan_made(record: RunRecord, explain: bool) -> Plan:
     """The plan that the run's planner finds."""
     assert record.planner is not None, "a plan that came from a file is not made"
     limit = getattr(record.planner, "time_limit", None)
-    with planning_progress(record.planner_name) as progress, within_time(limit):
+    with showing(PlanningProgress(record.planner_name)) as progress, within_time(limit):
         if record.paper:  # without a vehicle; whether this one can fly it is told all the same
             found = plan(record.problem, record.planner, progress=progress.record, vehicle=None)
             found = found.for_vehicle(record.vehicle)
@@ -220,7 +220,7 @@ def _plan_that_passes(record: RunRecord, workers: str | None) -> Plan:
         raise SpecError("--pass keeps a reserve, the paper none; leave out --pass or --paper")
     from aerobat.studies.passing import plan_to_pass
 
-    with planning_progress(record.planner_name) as progress:
+    with showing(PlanningProgress(record.planner_name)) as progress:
         return plan_to_pass(
             record.problem,
             record.planner,

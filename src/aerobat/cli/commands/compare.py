@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter, validators
 
 from aerobat.cli.options import TaskOptions, Workers, planning
-from aerobat.cli.progress import planning_progress
+from aerobat.cli.progress import PlanningProgress, showing
 from aerobat.cli.runs.folder import finish_study
 from aerobat.cli.runs.record import RunRecord
 from aerobat.cli.tasks import read_task
@@ -61,7 +61,7 @@ def comparison_of(record: RunRecord, workers: str = "1") -> Comparison:
         record: What is planned.
         workers: Who plans.
     """
-    with planning_progress() as progress:
+    with showing(PlanningProgress()) as progress:
         return compare_planners(
             record.problem,
             record.vehicle,

@@ -15,7 +15,7 @@ from aerobat.cli.terminal import say
 from aerobat.declaration import unknown_name
 from aerobat.documents import in_document
 from aerobat.errors import SpecError
-from aerobat.interchange.robots import SUFFIXES, import_vehicle, read_robot_description
+from aerobat.interchange.robots import SUFFIXES, VehicleDescription, import_vehicle, read_robot_description
 from aerobat.problem import Problem, load_problem, problem_names, problem_text
 from aerobat.reporting.facts import Fact, Facts
 from aerobat.reporting.tables import print_table, table
@@ -53,7 +53,10 @@ def show(name: str | None = None, /, *, out: Annotated[Path | None, Parameter(gr
         print()
         print_table(table(Facts([Fact("vehicles", vehicles, "vehicles")])))
     elif out is not None:
-        write_new(_text(name) if _is_vehicle(name) else problem_text(name), out)
+        text = _text(name) if _is_vehicle(name) else problem_text(name)
+        if out.exists():
+            raise SpecError(f"--out {out} is there already; name a new file")
+        write_whole(out, text)
     elif _is_vehicle(name):
         _show_vehicle(name)
     else:
@@ -75,16 +78,17 @@ def _is_vehicle(name: str) -> bool:
 
 def _show_vehicle(name: str) -> None:
     """Say what a vehicle is; of a robot that lacks something, print the file as far as it goes."""
-    if name.endswith(SUFFIXES):
-        with in_document(Path(name), "robot"):
-            found = read_robot_description(name)
-        if found.missing:
-            print(_text(name), end="")
-            return
-        vehicle = import_vehicle(name)
+    is_robot = name.endswith(SUFFIXES)
+    if is_robot and _robot(name).missing:
+        print(_text(name), end="")
     else:
-        vehicle = load_vehicle(name)
-    print_table(table(vehicle))
+        print_table(table(import_vehicle(name) if is_robot else load_vehicle(name)))
+
+
+def _robot(name: str) -> VehicleDescription:
+    """Return what a robot's file says of a vehicle. Raises SpecError, which names the file."""
+    with in_document(Path(name), "robot"):
+        return read_robot_description(name)
 
 
 def _text(name: str) -> str:
@@ -92,17 +96,9 @@ def _text(name: str) -> str:
     if not name.endswith(SUFFIXES):
         named_vehicle(name)
         return vehicle_text(name)
-    with in_document(Path(name), "robot"):
-        found = read_robot_description(name)
+    found = _robot(name)
     if found.missing:
         say(f"warning: {name} says nothing of the rotors' {', '.join(found.missing)}; add them")
     else:
         named_vehicle(name)
     return found.toml()
-
-
-def write_new(text: str, out: Path) -> None:
-    """Write a text to a file that is not there yet. Raises SpecError where there is one."""
-    if out.exists():
-        raise SpecError(f"--out {out} is there already; name a new file")
-    write_whole(out, text)

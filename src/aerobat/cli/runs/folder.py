@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,19 +68,6 @@ def is_of_a_run(name: str) -> bool:
     return name in FILES or name.endswith(".plan")
 
 
-@contextmanager
-def run_folder(folder: Path, record: RunRecord) -> Iterator[Path]:
-    """Yield an empty folder that replaces that of an earlier run as one; see `whole_folder`.
-
-    The record comes with it. Ctrl-C comes in time until that happens, and means nothing afterwards: a run is
-    interrupted or done.
-    """
-    with whole_folder(folder, is_of_a_run) as staging:
-        yield staging
-        write_record(record, staging)
-        end_interrupts()
-
-
 def written(
     record: RunRecord,
     options: OutputOptions,
@@ -90,7 +76,10 @@ def written(
     *tables: Group,
     hint: str = "",
 ) -> None:
-    """Put a run in its place as one, then say what it is.
+    """Put a run in its place as one, in place of an earlier run there, then say what it is.
+
+    Ctrl-C comes in time until the folder is in its place, and means nothing afterwards: a run is interrupted
+    or done.
 
     Args:
         record: What it takes to do it again.
@@ -102,8 +91,10 @@ def written(
     """
     folder = options.out or record.folder
     replaced = os.path.isdir(folder) and any(folder.iterdir())  # False for names that no folder can have
-    with run_folder(folder, record) as staging:
+    with whole_folder(folder, is_of_a_run) as staging:
         write(staging)
+        write_record(record, staging)
+        end_interrupts()
     if options.json:
         print_json(facts)
         return
