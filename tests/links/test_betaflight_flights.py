@@ -115,13 +115,13 @@ def test_a_firmware_that_dies_in_flight_is_a_sentence() -> None:
 
 
 def test_a_line_that_the_firmware_refuses_is_named() -> None:
-    with Firmware() as firmware, pytest.raises(SpecError, match="refuses 'set no_such_setting = 1'"):
+    with closing(Firmware()) as firmware, pytest.raises(SpecError, match="refuses 'set no_such_setting = 1'"):
         firmware.configure(("set small_angle = 180", "set no_such_setting = 1"))
 
 
 def test_settings_are_taken_as_they_are_written() -> None:
     lines = betaflight_settings(QUAD, 20.0, simulated=True)
-    with Firmware(configured(lines)) as firmware:
+    with closing(Firmware(configured(lines))) as firmware:
         firmware.exchange(b"#", lambda answer: b"\n# " in answer)
         answer = firmware.exchange(b"get p_roll\n", lambda answer: b"\n# " in answer).decode()
     line = answer[answer.index("p_roll = ") :].splitlines()[0]
@@ -158,10 +158,10 @@ def test_folders_that_killed_programs_left_are_removed_by_the_next(
     left = tmp_path / "aerobat-betaflight-left"
     left.mkdir()
     (left / "eeprom.bin").write_bytes(b"")
-    with Firmware() as living:
+    with closing(Firmware()) as living:
         for folder in tmp_path.iterdir():
             os.utime(folder, (0.0, 0.0))
-        with Firmware():
+        with closing(Firmware()):
             assert not left.exists()
         assert living.step(0.01).time > 0.0
         assert len([*tmp_path.iterdir()]) == 1

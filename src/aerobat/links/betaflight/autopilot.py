@@ -73,8 +73,8 @@ class BetaflightRun:
         vehicle: Vehicle,
         setpoint: RateSetpoint,
         peak: float,
-        more: tuple[str, ...] = (),
-        blackbox: str | None = None,
+        more: tuple[str, ...],
+        blackbox: str | None,
     ) -> None:
         rate = board_rate(vehicle, peak)
         logging = () if blackbox is None else _BLACKBOX

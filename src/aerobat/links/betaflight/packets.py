@@ -62,8 +62,8 @@ class Sticks:
         self._protocol = protocol
         self._left = [0.0] * 4
 
-    def packet(self, omega: Vector, throttle: float, armed: bool = True) -> bytes:
-        """The packet of body rates [rad/s] and a collective thrust, 0 to 1 of what all rotors give."""
+    def packet(self, omega: Vector, throttle: float) -> bytes:
+        """Return the packet, armed, of body rates [rad/s] and a thrust, 0 to 1 of what all rotors give."""
         p, q, r = omega
         wanted = (
             _CENTRE + self._scale * p,
@@ -71,7 +71,7 @@ class Sticks:
             _IDLE + _TRAVEL * throttle,
             _CENTRE - self._scale * r,
         )
-        return self._framed([self._rounded(k, pulse) for k, pulse in enumerate(wanted)], armed)
+        return self._framed([self._rounded(k, pulse) for k, pulse in enumerate(wanted)], armed=True)
 
     def idle(self, armed: bool) -> bytes:
         """The packet of centred sticks and no throttle."""

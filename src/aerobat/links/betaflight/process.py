@@ -11,11 +11,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import lru_cache, partial
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple
 
 from aerobat.errors import BackendMissing, SpecError
@@ -225,14 +224,6 @@ class Firmware:
             self._process.wait()
         self._folder.cleanup()
 
-    def __enter__(self) -> Firmware:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
 
 def _looks() -> Iterator[None]:
     """Go on for as long as an answer is waited for, however slowly a busy machine gives it."""
@@ -247,9 +238,9 @@ def configured(lines: tuple[str, ...]) -> bytes:
 
     Another program may have taken the port that was free: a second firmware gets another one.
     """
-    with suppress(FirmwareEnded), Firmware() as firmware:
+    with suppress(FirmwareEnded), closing(Firmware()) as firmware:
         return firmware.configure(lines)
-    with Firmware() as firmware:
+    with closing(Firmware()) as firmware:
         return firmware.configure(lines)
 
 
