@@ -19,10 +19,10 @@ from aerobat.links.goals import Observed, PathGoal, PathPiece, yaw_of
 from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.path_follower import PathForwarder
 from aerobat.links.rehearsal import rehearse
-from aerobat.links.report import LinkReport
+from aerobat.links.report import LinkReport, link_report
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Answer, Middleware
-from aerobat.links.ros.preparation import ManeuverRequest, Prepared, judge, prepare
+from aerobat.links.ros.preparation import ManeuverRequest, Prepared, prepare
 from aerobat.planning import Planner
 from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -149,9 +149,16 @@ class ManeuverNode:
         if self._flown is not None and self.commander.doing is not Doing.MANEUVERING:
             commander = self.commander
             assert commander.mission is not None, "maneuvers are missions"
-            late, ended = commander.mission.max_lateness, str(commander.doing)
             self._judging = self._executor.submit(
-                judge, self._flown, commander.log, commander.reason, ended, late
+                link_report,
+                self._flown.plan,
+                self._flown.stream,
+                commander.log,
+                offset=self._flown.offset,
+                aborted=commander.reason,
+                ended=str(commander.doing),
+                delay=0.0,
+                late=commander.mission.max_lateness,
             )
             self._flown = None
         if self._judging is not None and self._judging.done():

@@ -1,8 +1,7 @@
-"""Work beside a node, in a process of its own so that goals keep coming: plans, and what came of them."""
+"""Planning beside a node, in a process of its own so that goals keep coming."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,9 +9,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.errors import AerobatError, Infeasible, SpecError
 from aerobat.interchange.exports.crazyflie import Pieces, fitted_pieces
-from aerobat.links.goals import Observed
 from aerobat.links.mission import require_flyable
-from aerobat.links.report import LinkReport, link_report
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan, Planner, plan
 from aerobat.problem import Problem, at_rest
@@ -90,18 +87,3 @@ def _from_here(request: ManeuverRequest) -> tuple[Problem, Array]:
         return asked, offset
     below = request.ground - float(offset[2])
     return replace(asked, environment=replace(asked.environment, ground=below)), offset
-
-
-def judge(flown: Prepared, log: Sequence[Observed], aborted: str, ended: str, late: float) -> LinkReport:
-    """The report of a maneuver.
-
-    Args:
-        flown: what was flown.
-        log: states while it was, times since its start [s].
-        aborted: why it was given up, empty where it was not.
-        ended: what was reached.
-        late: by how much the latest goal missed its time [s].
-    """
-    return link_report(
-        flown.plan, flown.stream, log, offset=flown.offset, aborted=aborted, ended=ended, delay=0.0, late=late
-    )
