@@ -17,15 +17,12 @@ from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.links.goals import Observed, PathGoal, PositionGoal, yaw_of
 from aerobat.links.mission import Mission, Phase
-from aerobat.links.routes import goal_on, rest_to_rest
+from aerobat.links.routes import DESCENT_SPEED, SPEED, goal_on, rest_to_rest, straight_down
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-_SPEED, _ACCELERATION = 2.0, 2.0  # [m/s], [m/s²] of climbs
-_DESCENT = 1.0  # [m/s] when landing
-_BELOW = 0.3  # [m] under the ground, where the way of a landing ends, so that it is reached in motion
 _STANDING = 1.0  # [s] that goals stay there once it is reached
 _BEHIND = 0.25  # [m] that a vehicle is off its goal when it does not climb or land as it is told
 _PATIENCE = 10.0  # [s] longer than either takes, after which it is told no more
@@ -113,7 +110,7 @@ class Commander:
             raise SpecError(f"the vehicle is {self.doing} already")
         here = np.array(seen.body.position)
         self.ground = float(here[2])
-        up = rest_to_rest(here, here + height * so3.UP, _SPEED, _ACCELERATION)
+        up = rest_to_rest(here, here + height * so3.UP)
         self._there_by, self._leapt = now + _SPINNING_UP + up.duration + _PATIENCE, False
         self._go(Doing.CLIMBING, now + _SPINNING_UP, up, yaw_of(seen.body.q_world_body))
 
@@ -121,16 +118,17 @@ class Commander:
         """Come to a hover from whatever it does. Raises SpecError where it does nothing."""
         if self.doing is Doing.NOTHING:
             raise SpecError("the vehicle is left to itself; have it take off first")
-        self._give_up(now, "hold was called")
+        if self.doing is Doing.MANEUVERING and self.mission is not None:
+            self.mission.abort(now, "hold was called")
         self._brake(now, self._recent(now))
 
     def land(self, now: float) -> None:
         """Go down to the ground from a hover. Raises SpecError where it does not hover."""
         seen = self.require_hover(now)
-        here = np.array(seen.body.position) if self._way is None else self._hover_point()
-        bottom = np.array([here[0], here[1], self.ground - _BELOW])
-        yaw = yaw_of(seen.body.q_world_body) if self._way is None else self._way.yaw
-        down = rest_to_rest(here, bottom, _DESCENT, _ACCELERATION)
+        here, yaw = np.array(seen.body.position), yaw_of(seen.body.q_world_body)
+        if self._way is not None:  # from the end of the way that it hovers at
+            here, yaw = self._way.path.evaluate(self._way.path.duration), self._way.yaw
+        down = straight_down(here, self.ground)
         self._there_by, self._leapt = now + down.duration + _PATIENCE, False
         self._go(Doing.LANDING, now, down, yaw)
 
@@ -184,7 +182,7 @@ class Commander:
             self._say(f"{self.mission.phase}{reason}")
         if self.mission.phase is Phase.LAND:  # where it ends it stays
             end = self.mission.end
-            at_end = rest_to_rest(end.position, end.position, _SPEED, _ACCELERATION)
+            at_end = rest_to_rest(end.position, end.position)
             self._go(Doing.HOVERING, now, at_end, end.yaw)
             return self._on_way(now)
         if self.mission.phase is Phase.ABORTED:
@@ -202,10 +200,6 @@ class Commander:
         motion = np.array(body.position), np.array(body.velocity)
         way = Braking.of(*motion, self._vehicle, self._gravity, floor).trajectory
         self._go(Doing.BRAKING, now, way, float(nearest_heading(np.array(body.q_world_body))))
-
-    def _give_up(self, now: float, reason: str) -> None:
-        if self.doing is Doing.MANEUVERING and self.mission is not None:
-            self.mission.abort(now, reason)
 
     def _leave_unseen(self, now: float, allowed: float = _LONG) -> bool:
         """True where nothing was seen for longer than allowed [s]: the vehicle is left to itself then."""
@@ -248,8 +242,8 @@ class Commander:
             self._leave(f"the vehicle does not {order} as it is told{why}")
             return False
         end, here = self._way.path.evaluate(self._way.path.duration), np.array(self.seen.body.position)
-        speed = _SPEED if self.doing is Doing.CLIMBING else _DESCENT
-        self._go(self.doing, now, rest_to_rest(here, end, speed, _ACCELERATION), self._way.yaw)
+        speed = DESCENT_SPEED if self.doing is Doing.LANDING else SPEED
+        self._go(self.doing, now, rest_to_rest(here, end, speed), self._way.yaw)
         return True
 
     def _leave(self, reason: str) -> None:
@@ -275,10 +269,6 @@ class Commander:
         assert self._way is not None, "asked on a way only"
         path, began, yaw = self._way
         return goal_on(path, max(now + self._period - began, 0.0), yaw)
-
-    def _hover_point(self) -> Array:
-        assert self._way is not None, "it hovers at the end of a way"
-        return self._way.path.evaluate(self._way.path.duration)
 
     def _upright(self, goal: PathGoal | PositionGoal | None) -> PathGoal | None:
         return PathGoal.upright(goal, self._gravity) if isinstance(goal, PositionGoal) else goal

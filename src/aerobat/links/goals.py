@@ -38,6 +38,11 @@ class PositionGoal(NamedTuple):
     yaw: float  # [rad] of the body's x axis about the vertical, from east
     jerk: Array = _STILL  # [m/s³], (3,)
 
+    @classmethod
+    def hover(cls, position: Array, yaw: float) -> PositionGoal:
+        """Return the goal of a hover at a position [m], (3,), and a yaw [rad]."""
+        return cls(position, _STILL, _STILL, yaw)
+
 
 class PathGoal(NamedTuple):
     """A point of a path, with the attitude that it is passed in; all of it in world axes."""

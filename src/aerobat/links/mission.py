@@ -227,7 +227,7 @@ class Mission(Generic[GoalT_co]):
     def _hovering(self, now: float) -> PositionGoal | None:
         """The goal at the plan's start or end."""
         if self.phase is Phase.SETTLE:
-            return goal_on(rest_to_rest(self._start, self._start, 1.0, 1.0), 0.0, self._heading)
+            return PositionGoal.hover(self._start, self._heading)
         if self.phase is Phase.HOLD:
             return goal_on(self._after, now - self.began, self._final_yaw)
         return None

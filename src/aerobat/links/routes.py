@@ -10,13 +10,17 @@ from aerobat.arrays import Array
 from aerobat.links.goals import PositionGoal
 from aerobat.trajectory import Trajectory, minimum_effort
 
+SPEED = 2.0  # [m/s] on the way from hover to hover
+DESCENT_SPEED = 1.0  # [m/s] of a landing
 _SHORTEST = 0.2  # [s] of any route, however near its end is
 _PEAK_SPEED = 15.0 / 8.0  # [-] of the quintic from rest to rest, over its mean speed
 _PEAK_ACCELERATION = 10.0 / sqrt(3.0)  # [-] likewise, times duration squared over length
 
 
-def rest_to_rest(start: Array, goal: Array, max_speed: float, max_acceleration: float) -> Trajectory:
-    """The straight way between two hovers, of least jerk.
+def rest_to_rest(
+    start: Array, goal: Array, max_speed: float = SPEED, max_acceleration: float = 2.0
+) -> Trajectory:
+    """Return the straight way between two hovers, of least jerk.
 
     Args:
         start: from where [m], (3,).
@@ -30,6 +34,14 @@ def rest_to_rest(start: Array, goal: Array, max_speed: float, max_acceleration: 
     ends = np.zeros((2, 3, 3))
     ends[0, 0], ends[1, 0] = start, goal
     return minimum_effort(ends, [max(by_speed, by_acceleration, _SHORTEST)])
+
+
+def straight_down(start: Array, ground: float) -> Trajectory:
+    """Return the way of a landing from a hover at `start` [m], (3,), to the ground at a height [m].
+
+    It ends 0.3 m under the ground, so that the ground is reached in motion.
+    """
+    return rest_to_rest(start, np.array([start[0], start[1], ground - 0.3]), DESCENT_SPEED)
 
 
 def goal_on(route: Trajectory, time: float, yaw: float) -> PositionGoal:

@@ -12,7 +12,7 @@ from aerobat.environment import Environment
 from aerobat.links.autopilot.live_body import LiveBody
 from aerobat.links.autopilot.references import AttitudeReference, PathReference, PointReference, Route
 from aerobat.links.goals import AttitudeGoal, Mode, PathPiece, PositionGoal
-from aerobat.links.routes import rest_to_rest
+from aerobat.links.routes import rest_to_rest, straight_down
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading
 from aerobat.simulation.autopilot.loop import RATE
 from aerobat.states import BodyState
@@ -24,10 +24,6 @@ ATTITUDE_TIMEOUT = 0.1
 POINT_TIMEOUT = 0.5
 
 _CHUNK = 5  # ticks at most between looks at the ground and at the client's silence
-_SPEED = 2.0  # [m/s] of the autopilot's own routes
-_ACCELERATION = 2.0  # [m/s²] likewise
-_DESCENT = 1.0  # [m/s] when landing
-_BELOW = 0.3  # [m] under the ground, where the way of a landing ends, so that it is reached in motion
 _HARD_SPEED = 1.5  # [m/s] of a touchdown that is none
 _HARD_TILT = 0.5  # [rad] likewise
 
@@ -39,21 +35,20 @@ class SimulatedVehicle:
     on flat ground.
     """
 
-    def __init__(self, vehicle: Vehicle, environment: Environment, now: float = 0.0) -> None:
+    def __init__(self, vehicle: Vehicle, environment: Environment) -> None:
         """Put a vehicle on the ground.
 
         Args:
             vehicle: which; its controller's gains count.
             environment: where; its gravity and wind count.
-            now: the time [s].
         """
         self.vehicle, self.gravity = vehicle, environment.gravity
-        self.time = now
+        self.time = 0.0  # [s]
         self.mode = Mode.HOLD
         self.armed, self.landed, self.crashed = False, True, False
         self.told: list[str] = []  # sentences for whoever listens, who empties it
         self._body = LiveBody(vehicle, environment)
-        self._route = Route(rest_to_rest(np.zeros(3), np.zeros(3), _SPEED, _ACCELERATION), now, 0.0)
+        self._route = Route(rest_to_rest(np.zeros(3), np.zeros(3)), self.time, 0.0)
         self._then: tuple[Array, float | None] | None = None  # [m], [rad] where to go once it hovers
         self._goal: PointReference | PathReference | AttitudeReference | None = None
         self._heard = -np.inf  # [s] when the last goal came
@@ -85,7 +80,7 @@ class SimulatedVehicle:
         if not self.armed or not self.landed:
             return False
         here = self.state.position
-        self._go(Mode.TAKEOFF, rest_to_rest(here, here + height * so3.UP, _SPEED, _ACCELERATION))
+        self._go(Mode.TAKEOFF, rest_to_rest(here, here + height * so3.UP))
         return True
 
     def go_to(self, position: Array, yaw: float | None = None) -> bool:
@@ -187,10 +182,9 @@ class SimulatedVehicle:
         here = self._route.path.evaluate(self._route.path.duration)
         if self._then is not None and self.mode is Mode.HOLD:
             position, yaw = self._then
-            self._go(Mode.HOLD, rest_to_rest(here, position, _SPEED, _ACCELERATION), yaw)
+            self._go(Mode.HOLD, rest_to_rest(here, position), yaw)
         elif self.mode is Mode.LAND and here[2] > 0.0:
-            down = np.array([here[0], here[1], -_BELOW])
-            self._go(Mode.LAND, rest_to_rest(here, down, _DESCENT, _ACCELERATION))
+            self._go(Mode.LAND, straight_down(here, 0.0))
         elif self.mode is Mode.TAKEOFF:
             self.mode = Mode.HOLD
 

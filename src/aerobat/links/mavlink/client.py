@@ -192,9 +192,7 @@ class Client:
             self._check(hover)
             self._max_thrust = self._weight / hover
             body = self._observed.body
-            zero = np.zeros(3)
-            yaw = yaw_of(body.q_world_body)
-            self._ground = PositionGoal(np.array(body.position), zero, zero, yaw)
+            self._ground = PositionGoal.hover(np.array(body.position), yaw_of(body.q_world_body))
             self._say(f"connected; a message takes {1e3 * self.link.delay:.0f} ms")
             if self._announcement:
                 self._say(self._announcement)
@@ -241,7 +239,9 @@ class Client:
             self._enter(ClientStage.TAKING_OFF, now)
             self._while_taking_off(now)
         elif self._since(now) > _PATIENCE:
-            self._give_up_arming(now)
+            # a vehicle that was ordered to arm may have, and is told to land
+            has_mode = self.link.mode is Mode.OFFBOARD
+            self._refuse(now, "arm" if has_mode else "take the mode offboard", lands=has_mode)
 
     def _while_taking_off(self, now: float) -> None:
         """Have it take off where set-points do not lead it off the ground; then fly."""
@@ -254,11 +254,6 @@ class Client:
             self._refuse(now, "take off")
         elif not self._yields(now):
             self.link.take_off(_LIFT)
-
-    def _give_up_arming(self, now: float) -> None:
-        """Raise SpecError; a vehicle that was ordered to arm may have, and is told to land before."""
-        has_mode = self.link.mode is Mode.OFFBOARD
-        self._refuse(now, "arm" if has_mode else "take the mode offboard", lands=has_mode)
 
     def _refuse(self, now: float, what: str, lands: bool = True) -> None:
         """Raise SpecError, with what ails the vehicle as it says, once it is on the ground."""
