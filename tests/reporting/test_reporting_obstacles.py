@@ -9,8 +9,8 @@ import aerobat as ab
 from aerobat.environment.obstacles.surface import surface_of
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.motion.picture import MovingPicture, subject_of
-from aerobat.reporting.panels import path as path_panel
 from aerobat.reporting.panels.timelines import clearances
+from aerobat.reporting.scene import axes_box
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.obstacles import obstacle_shapes
 from obstacle_cases import open_cruise, walled_cruise
@@ -40,7 +40,7 @@ def test_the_faces_that_are_drawn_cover_what_is_seen_of_an_obstacle_once(obstacl
 
 def test_a_picture_holds_the_obstacles_beside_its_path(monkeypatch: pytest.MonkeyPatch) -> None:
     boxes = []
-    monkeypatch.setattr(path_panel, "draw_axes_box", lambda axes, box, camera: boxes.append(box))
+    monkeypatch.setattr(axes_box, "draw_axes_box", lambda axes, box, camera: boxes.append(box))
     for plan in (open_cruise(), walled_cruise()):
         report_figure(plan, plan.vehicle)
     free, walled = boxes

@@ -33,8 +33,7 @@ from aerobat.reporting.panels.keyframes import plane_of
 from aerobat.reporting.panels.path import mark_ends
 from aerobat.reporting.panels.poses import is_flat, plan_reference
 from aerobat.reporting.panels.timelines import draw_limits, fit_to_limits
-from aerobat.reporting.scene.axes_box import box_around, draw_axes_box, room_for_box
-from aerobat.reporting.scene.camera import best_view
+from aerobat.reporting.scene.axes_box import draw_box_around
 from aerobat.reporting.scene.glyphs import gate_corners, gate_shapes
 from aerobat.reporting.scene.obstacles import obstacle_shapes, surfaces_beside
 from aerobat.reporting.scene.shapes import draw_depth_sorted
@@ -215,7 +214,7 @@ class NamedPath:
 
 
 def draw_overlay(
-    axes: Axes, paths: Sequence[NamedPath], gates: Sequence[Gate], pieces: Sequence[ConvexPiece] = ()
+    axes: Axes, paths: Sequence[NamedPath], gates: Sequence[Gate], pieces: Sequence[ConvexPiece]
 ) -> None:
     """Draw paths from one start to one goal: in the vertical plane that holds them, or in space.
 
@@ -228,9 +227,8 @@ def draw_overlay(
     surfaces, points = surfaces_beside(pieces, [*(path.position for path in paths), gate_corners(gates)])
     plane = plane_of(points)
     if plane is None:
-        box = box_around(points, 0.02 * float(np.ptp(points, axis=0).max()))
-        camera = best_view(points, gates, box.corners, room_for_box(size_of(axes)))
-        draw_axes_box(axes, box, camera)
+        pad = 0.02 * float(np.ptp(points, axis=0).max())
+        _, camera = draw_box_around(axes, points, pad, points, gates)
     else:
         camera = plane.camera
         _fit_plane(axes, camera.project(points))

@@ -19,8 +19,8 @@ from aerobat.problem.gate import Gate
 from aerobat.reporting.page import AXIS, Place, house_style, panel, write
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
-from aerobat.reporting.scene.axes_box import box_around, draw_axes_box, room_for_box
-from aerobat.reporting.scene.camera import Camera, best_view
+from aerobat.reporting.scene.axes_box import draw_box_around
+from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.glyphs import (
     enlargement,
     gate_corners,
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
 SIZE = (7.2, 4.8)  # [in] of a picture
 SCENE: Place = (0.0, 0.0, 4.0, 4.5)
 LINES: tuple[Place, ...] = tuple((4.78, AXIS + 1.38 * k, 2.28, 1.0) for k in (2, 1, 0))
-CLOCK = (3.9, SIZE[1] - 0.3)  # [in] where the time stands
 GLYPH = 0.18  # of the vehicle as drawn, relative to the path's extent
 BELOW = 0.06  # by which the reference path is drawn under the actual one, likewise
 PASSED = 0.35  # opacity of the vehicle at stages that are behind it
@@ -129,13 +128,8 @@ class MovingPicture:
             self._camera = self._draw_scene()
             self._timelines = self._draw_timelines()
             self._cursors = [axes.axvline(0.0, color=INK, linewidth=1.0) for axes in self._timelines]
-            place: dict[str, Any] = {
-                "x": 3.9 / SIZE[0],
-                "y": 1.0 - 0.3 / SIZE[1],
-                "ha": "right",
-                "va": "center",
-            }
-            self._clock = self._figure.text(s="", size=NORMAL + 1, color=MUTED, **place)
+            x, y = 3.9 / SIZE[0], 1.0 - 0.3 / SIZE[1]
+            self._clock = self._figure.text(x, y, "", size=NORMAL + 1, color=MUTED, ha="right", va="center")
             for artist in (*self._cursors, self._clock):
                 artist.set_animated(True)
             self._canvas.draw()
@@ -167,11 +161,10 @@ class MovingPicture:
         points = [poses.path for poses in (subject.reference, *subject.actual)]
         reach = self._scale * span(subject.vehicle)
         self._surfaces, points_held = surfaces_beside(subject.pieces, [*points, gate_corners(subject.gates)])
-        box = box_around(points_held, 0.6 * reach)
+        box, camera = draw_box_around(
+            self._scene, points_held, 0.6 * reach, subject.reference.path, subject.gates
+        )
         self._floor = float(box.lower[2])
-        size = np.array(SCENE[2:])
-        camera = best_view(subject.reference.path, subject.gates, box.corners, room_for_box(size))
-        draw_axes_box(self._scene, box, camera)
         return camera
 
     def _draw_timelines(self) -> list[Axes]:

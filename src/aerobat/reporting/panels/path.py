@@ -13,10 +13,10 @@ from aerobat.environment.obstacles import ConvexPiece
 from aerobat.planning import PlacedStage
 from aerobat.planning.passages import as_passed
 from aerobat.problem.gate import Gate
-from aerobat.reporting.page import HEADING, legend, size_of
+from aerobat.reporting.page import HEADING, legend
 from aerobat.reporting.panels.poses import PoseHistory
-from aerobat.reporting.scene.axes_box import box_around, draw_axes_box, room_for_box
-from aerobat.reporting.scene.camera import Camera, best_view
+from aerobat.reporting.scene.axes_box import draw_box_around
+from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.glyphs import (
     direction_marks,
     drop_line,
@@ -79,9 +79,7 @@ def draw_path(
     rows, step = pose_samples(poses, reach, gates)
     paths = [each.path for each in (reference, *actual)]
     surfaces, points = surfaces_beside(pieces, [*paths, gate_corners(gates)], poses.times[rows[::GHOSTS]])
-    box = box_around(points, 0.6 * reach)
-    camera = best_view(reference.path, gates, box.corners, room_for_box(size_of(axes)))
-    draw_axes_box(axes, box, camera)
+    box, camera = draw_box_around(axes, points, 0.6 * reach, reference.path, gates)
     floor = float(box.lower[2])
     shapes = _path_shapes(reference, actual, floor) + obstacle_shapes(surfaces, camera)
     for gate in gates:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.problem.gate import Gate
 from aerobat.reporting.page import size_of
-from aerobat.reporting.scene.camera import Camera
+from aerobat.reporting.scene.camera import Camera, best_view
 from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted
 from aerobat.reporting.style import HAIR, NORMAL, PAPER, SMALL
 
@@ -53,6 +55,24 @@ class AxesBox:
     def back(self, camera: Camera) -> Array:
         """The coordinates of the sides behind the scene [m], (3,)."""
         return np.where(camera.toward > 0, self.lower, self.upper)
+
+
+def draw_box_around(
+    axes: Axes, points: Array, pad: float, path: Array, gates: Sequence[Gate]
+) -> tuple[AxesBox, Camera]:
+    """Draw the axes box around points, seen from where a path and gates are seen best; return both.
+
+    Args:
+        axes: Where to draw.
+        points: All that the box holds [m], (n, 3).
+        pad: By which it is wider [m].
+        path: Positions [m], (T, 3).
+        gates: All of which are to be seen open.
+    """
+    box = box_around(points, pad)
+    camera = best_view(path, gates, box.corners, room_for_box(size_of(axes)))
+    draw_axes_box(axes, box, camera)
+    return box, camera
 
 
 def box_around(points: Array, pad: float) -> AxesBox:
