@@ -16,7 +16,6 @@ from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
 from aerobat.reporting.panels.stages import draw_stages
-from aerobat.reporting.panels.timelines import draw_clearance
 from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle, as_vehicle
 
@@ -141,7 +140,7 @@ def _clearance_panel(
     """The clearance as planned, in the first column of the row that is left; none without obstacles."""
     panels = [panel(figure, COLUMNS[0], y, WIDTH, ROW) for y in rows]
     for axes in panels:
-        draw_clearance(axes, poses, vehicle, plan.problem.surroundings.pieces)
+        timelines.draw_clearance(axes, poses, vehicle, plan.problem.surroundings.pieces)
     return panels
 
 

@@ -60,16 +60,12 @@ def import_undocumented() -> None:
     from matplotlib import artist
 
     lister = artist.kwdoc  # lists the properties of a class for its docstrings
-    artist.kwdoc = _no_properties
+    artist.kwdoc = lambda artist: ""
     try:
         import matplotlib.backends.backend_agg
         import matplotlib.figure  # noqa: F401
     finally:
         artist.kwdoc = lister
-
-
-def _no_properties(artist: Any) -> str:
-    return ""
 
 
 @contextmanager

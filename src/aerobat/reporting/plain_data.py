@@ -12,7 +12,7 @@ import numpy as np
 
 from aerobat.declaration import shown, unknown_name, validated
 from aerobat.errors import SpecError, import_extra
-from aerobat.reporting.facts import Columns, Fact, Facts, facts
+from aerobat.reporting.facts import Columns, Facts, facts
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -82,12 +82,8 @@ def plain(value: Any) -> Any:
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple) and not isinstance(value, Facts):
         return [plain(each) for each in value]
-    return {fact.key: plain(fact.value) for fact in facts(value) if is_filed(fact)}
-
-
-def is_filed(fact: Fact) -> bool:
-    """True for a fact that stands in files."""
-    return bool(fact.key) and not isinstance(fact.value, Columns)
+    filed = (fact for fact in facts(value) if fact.key and not isinstance(fact.value, Columns))
+    return {fact.key: plain(fact.value) for fact in filed}
 
 
 def to_json(result: Any) -> str:

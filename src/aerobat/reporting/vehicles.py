@@ -50,7 +50,7 @@ def _(vehicle: Vehicle) -> Iterator[Fact]:
         bandwidth = float(max_bandwidth(fleet, environment)[0])
         told = f"up to {bandwidth:.3g} rad/s, {bandwidth / tau:.2g} Hz"
         yield Fact("attitude_loop_rad_s", bandwidth, "attitude loop", told)
-    doubts = vehicle_doubts(vehicle)
+    doubts = (*implausibilities(vehicle), *_weaknesses(vehicle))
     yield from (said("looks wrong", doubt, style="red") for doubt in doubts)
     # an array: an empty tuple would be a table without rows
     yield Fact("doubts", np.array(doubts, dtype=object), "looks wrong", "" if doubts else "nothing")
@@ -78,11 +78,6 @@ def vehicle_row(vehicle: Vehicle) -> Facts:
             Fact("description", vehicle.description, "what it is"),
         )
     )
-
-
-def vehicle_doubts(vehicle: Vehicle) -> tuple[str, ...]:
-    """Return a sentence for each value that is hardly meant, and for each that leaves little to fly by."""
-    return (*implausibilities(vehicle), *_weaknesses(vehicle))
 
 
 def _weaknesses(vehicle: Vehicle) -> Iterator[str]:

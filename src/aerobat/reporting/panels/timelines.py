@@ -79,7 +79,7 @@ def draw_position_error(axes: Axes, flight: Flight, tube: Tube | None = None) ->
     draw_series(axes, flight.times, error / size, INK)
     if tube is not None:
         _shade_tube(axes, tube, bound / size)
-    axes.set(ylabel=f"position error [{unit}]", ylim=(0.0, _top(largest / size, 0.01)))
+    axes.set(ylabel=f"position error [{unit}]", ylim=(0.0, _top(largest / size)))
 
 
 def draw_attitude_error(axes: Axes, flight: Flight, tube: Tube | None = None) -> None:
@@ -89,7 +89,7 @@ def draw_attitude_error(axes: Axes, flight: Flight, tube: Tube | None = None) ->
     draw_series(axes, flight.times, error, INK)
     if tube is not None:
         _shade_tube(axes, tube, bound)
-    axes.set(ylabel="attitude error [°]", ylim=(0.0, _top(max(error.max(), bound.max()), 0.01)))
+    axes.set(ylabel="attitude error [°]", ylim=(0.0, _top(max(error.max(), bound.max()))))
 
 
 def _shade_tube(axes: Axes, tube: Tube, bound: Array) -> None:
@@ -234,6 +234,6 @@ def finish_column(column: Sequence[Axes], title: str, stages: Sequence[PlacedSta
     heading(column[0], title)
 
 
-def _top(largest: float, floor: float) -> float:
-    """The upper end of an axis that starts at zero; what is smaller than `floor` is noise."""
-    return max(1.12 * float(largest), floor)
+def _top(largest: float) -> float:
+    """Return the upper end of an axis that starts at zero; what is smaller than 0.01 is noise."""
+    return max(1.12 * float(largest), 0.01)

@@ -22,7 +22,7 @@ FRAME = 0.12  # the thickness of a gate's bars, as a fraction of the opening's s
 EDGE_ON = 0.2  # a gate whose normal is this square to the view is seen edge-on
 MAST = 0.35  # the height of a rotor above its arm, as a fraction of the rotor's radius
 LIGHT = np.array([0.3, -0.5, 0.81])  # where light comes from in shaded pictures
-SHADES = {YELLOW: ("#8f6a12", "#f0c964")}  # darkest and lightest side of a bar
+DARK, BRIGHT = "#8f6a12", "#f0c964"  # the darkest and the lightest side of a bar
 SEEN_FROM_ABOVE: Colour = (BLUE, 0.45)
 SEEN_FROM_BELOW: Colour = ("white", 0.9)
 # forward and left, relative to its length: a barb, closed
@@ -153,7 +153,7 @@ def _shade(face: Array) -> Colour:
 
     normal = np.cross(face[1] - face[0], face[3] - face[0])
     light = abs(float(normal @ LIGHT)) / max(float(np.linalg.norm(normal)), 1e-12)
-    dark, bright = (np.array(to_rgb(c)) for c in SHADES[YELLOW])
+    dark, bright = (np.array(to_rgb(c)) for c in (DARK, BRIGHT))
     return to_hex(dark + min(light, 1.0) * (bright - dark))
 
 

@@ -59,7 +59,8 @@ def sweep_figure(sweep: Sweep) -> Figure:
     foot = max(GATE_PITCH * len(gates), AXIS + TITLES + (stacked if gates else beside))
     with house_style():
         title = f"{sweep.plan.problem.name} · {len(sweep)} flights of {sweep.vehicle.name}"
-        facts = [f"conditions {sweep.conditions}".partition(";")[0], success_sentence(sweep)]
+        success = f"{sweep.success} of the flights went well, at 95 % confidence; seed {sweep.seed}"
+        facts = [f"conditions {sweep.conditions}".partition(";")[0], success]
         figure = blank_page(foot + AXIS + TIMELINE[1] + TITLES, title, facts)
         _draw_errors(figure, sweep, foot + AXIS)
         for k, (name, each) in enumerate(gates.items()):
@@ -149,11 +150,6 @@ def _draw_distributions(figure: Figure, sweep: Sweep, left: float, bottom: float
     axes.set_yticks([0, 50, 95], ["0", "50", "95"])
     legend(axes, above=HEADING)
     heading(axes, "Errors")
-
-
-def success_sentence(sweep: Sweep) -> str:
-    """Return a sentence with the share of flights that went well, its interval and the seed."""
-    return f"{sweep.success} of the flights went well, at 95 % confidence; seed {sweep.seed}"
 
 
 def known_opening(sweep: Sweep, passage: str) -> Opening | None:

@@ -30,7 +30,6 @@ def _(tuning: Tuning) -> Iterator[Fact]:
 
 @facts.register
 def _(costs: FlightCosts) -> Iterator[Fact]:
-    yield from kept()
     yield from kept(
         cost_m=costs.cost, error_95_m=costs.error_quantile_m, failed_fraction=costs.failed_fraction
     )
