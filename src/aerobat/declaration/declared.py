@@ -14,6 +14,7 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from pydantic_core import CoreSchema, core_schema
 
 from aerobat.arrays import Array
+from aerobat.declaration.field_types import in_degrees, in_radians
 from aerobat.declaration.sentences import FieldError, UnknownKey, first_complaint, one_of, shown, unknown_key
 from aerobat.declaration.values import by_value, is_default
 from aerobat.errors import SpecError
@@ -42,9 +43,20 @@ def from_table(cls: type[T], table: Mapping[str, Any]) -> T:
         if key not in known:
             raise _unknown(str(key), known)
     values = dict(table)
+    if hasattr(cls, "expand"):
+        values = declaration.expand(values)
+    for name in _angles(cls):
+        values = in_radians(values, name)
     value = cls.__new__(cls)
-    declaration.__checked_init__(value, declaration.expand(values) if hasattr(cls, "expand") else values)
+    declaration.__checked_init__(value, values)
     return value
+
+
+def _angles(cls: Any) -> list[str]:
+    """The fields that have a shorthand in degrees."""
+    fields = {field.name for field in dataclasses.fields(cls)}
+    names = (key.removesuffix("_deg") for key in getattr(cls, "SHORTHANDS", ()) if key.endswith("_deg"))
+    return [name for name in names if name in fields]
 
 
 def _unknown(key: str, known: Sequence[str]) -> UnknownKey:
@@ -70,7 +82,12 @@ def to_table(value: Any) -> dict[str, Any]:
     kind = {"kind": value.kind} if hasattr(value, "kind") else {}
     if kind and "kind" not in vars(type(value)):
         raise SpecError(f"{type(value).__name__} has no place in a file: it is not registered")
-    return kind | (value.abbreviate(table) if hasattr(value, "abbreviate") else table)
+    if hasattr(value, "abbreviate"):
+        table = value.abbreviate(table)
+    for name in _angles(type(value)):
+        if isinstance(table.get(name), float):
+            table = in_degrees(table, name)
+    return kind | table
 
 
 def _plain(value: Any) -> Any:
@@ -98,9 +115,9 @@ def declared(cls: type[T]) -> type[T]:
     A float is a finite number, and neither text nor bool; lists become tuples, arrays are read-only. What
     must hold between fields is for `__post_init__` to say, by FieldError. Equality and hash go by content.
 
-    In files a key may stand for fields: `SHORTHANDS` then gives each such key its meaning, the class method
-    `expand(table)` replaces them by fields on reading, and the method `abbreviate(table)` does the reverse on
-    writing.
+    In files a key may stand for fields: `SHORTHANDS` then gives each such key its meaning. The key NAME_deg
+    beside a field NAME holds that angle in degrees. The class method `expand(table)` replaces other
+    shorthands by fields on reading, and the method `abbreviate(table)` does the reverse on writing.
     """
     plain_class: Any = cls  # checked by its fields even where a field of its base takes tables
     plain_class.__get_pydantic_core_schema__ = classmethod(lambda _, source, handler: handler(source))

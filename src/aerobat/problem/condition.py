@@ -19,8 +19,6 @@ from aerobat.declaration import (
     Positive,
     UnitVector,
     declared,
-    in_degrees,
-    in_radians,
     number,
     unit,
 )
@@ -199,15 +197,6 @@ class Attitude:
     tolerance: ConeAngle = 0.0  # [rad] between the thrust axis and `up`, at most
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"tolerance_deg": "[deg] `tolerance` in degrees"}
-
-    @classmethod
-    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace `tolerance_deg`."""
-        return in_radians(table, "tolerance")
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the tolerance in degrees where that says exactly the same."""
-        return in_degrees(table, "tolerance")
 
     @property
     def conditions(self) -> tuple[Condition, ...]:

@@ -22,8 +22,6 @@ from aerobat.declaration import (
     by_value,
     declared,
     from_table,
-    in_degrees,
-    in_radians,
     number,
     unit,
     unknown_name,
@@ -105,7 +103,6 @@ class Gate:
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
         """Replace the angles by `normal` and `up`, which are given instead of them or not at all."""
-        table = in_radians(table, "attitude_tolerance")
         if isinstance(table.get("wall"), bool):
             table["wall"] = Wall() if table["wall"] else None
         if "diameter" in table:
@@ -122,7 +119,6 @@ class Gate:
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
         """Write `normal` and `up` as angles where those say exactly the same."""
-        table = in_degrees(table, "attitude_tolerance")
         for key, size in zip(("width", "height"), DEFAULT_SIZE, strict=True):
             if table.get(key) == size:
                 del table[key]
@@ -300,8 +296,10 @@ def in_opening(gate: Gate, clearance: float) -> tuple[Condition, ...]:
     )
 
 
-def only_gate(gates: Sequence[Gate], maneuver: str) -> Gate:
-    """The one gate of a maneuver that passes one. Raises SpecError when there are none or several."""
+def passed_gate(gates: Sequence[Gate], name: str | None, maneuver: str) -> Gate:
+    """Return the gate of that name or, without one, the only gate. Raises SpecError where it is not there."""
+    if name is not None:
+        return named_gate(gates, name)
     if len(gates) != 1:
         has = "none" if not gates else str(len(gates))
         raise SpecError(
@@ -309,11 +307,6 @@ def only_gate(gates: Sequence[Gate], maneuver: str) -> Gate:
             "or the name of its gate"
         )
     return gates[0]
-
-
-def passed_gate(gates: Sequence[Gate], name: str | None, maneuver: str) -> Gate:
-    """The gate of that name or, without one, the only gate. Raises SpecError when there is none."""
-    return only_gate(gates, maneuver) if name is None else named_gate(gates, name)
 
 
 def named_gate(gates: Sequence[Gate], name: str) -> Gate:

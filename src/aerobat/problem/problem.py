@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import field, replace
 from functools import cached_property, lru_cache
 from itertools import permutations
+from math import radians
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -25,7 +26,7 @@ from aerobat.declaration import (
     declared,
     from_table,
     in_degrees,
-    in_radians,
+    number,
     placed,
     shown,
     to_table,
@@ -71,15 +72,6 @@ class Limits:
     max_tilt: TiltLimit = np.inf  # [rad] largest angle between the thrust axis and the vertical
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"max_tilt_deg": "[deg] `max_tilt` in degrees"}
-
-    @classmethod
-    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace `max_tilt_deg`."""
-        return in_radians(table, "max_tilt")
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the tilt in degrees where that says exactly the same."""
-        return in_degrees(table, "max_tilt")
 
     def __post_init__(self) -> None:
         """Check."""
@@ -181,14 +173,11 @@ class Problem:
                 raise SpecError("gate and gates are both given; give all gates as tables [[gates]]")
             with within_field("gate"):
                 table["gates"] = (from_table(Gate, table.pop("gate")),)
-        if "heading_deg" in table:
-            asked = table.get("heading")
-            if not isinstance(asked, Mapping):
-                return in_radians(table, "heading")
+        asked = table.get("heading")
+        if "heading_deg" in table and isinstance(asked, Mapping):
             if "start" in asked:
                 raise FieldError("heading_deg", "stands beside heading.start; drop either")
-            del table["heading"]
-            table["heading"] = {**asked} | {"start": in_radians(table, "heading")["heading"]}
+            table["heading"] = {**asked, "start": radians(number(table.pop("heading_deg"), "heading_deg"))}
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import radians
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from aerobat.declaration import Positive, declared, in_degrees, in_radians
+from aerobat.declaration import Positive, declared
 from aerobat.problem.condition import ConeAngle
 
 
@@ -22,12 +22,3 @@ class Tolerance:
     attitude: ConeAngle = radians(10.0)  # [rad] between the thrust axis and the plan's
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"attitude_deg": "[deg] `attitude` in degrees (10)"}
-
-    @classmethod
-    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace `attitude_deg`."""
-        return in_radians(table, "attitude")
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the attitude in degrees where that says exactly the same."""
-        return in_degrees(table, "attitude")

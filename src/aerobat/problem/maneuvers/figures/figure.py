@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import radians
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,8 +17,6 @@ from aerobat.declaration import (
     Positive,
     Vector3,
     declared,
-    in_degrees,
-    in_radians,
     unit,
     validated,
 )
@@ -98,15 +96,6 @@ class Figure(Maneuver):
         """Check."""
         if (self.position is None) == (self.gate is None):
             raise FieldError("position", "or gate says where the figure is entered; give one of them")
-
-    @classmethod
-    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace the angles in degrees."""
-        return in_radians(in_radians(table, "heading"), "tolerance")
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the angles in degrees where those say exactly the same."""
-        return in_degrees(in_degrees(table, "heading"), "tolerance")
 
     @validated
     def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Figure:
