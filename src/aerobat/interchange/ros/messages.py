@@ -5,7 +5,7 @@ World axes are ENU and body axes FLU, as REP 103 has them and we do. Frames are 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -18,9 +18,7 @@ from aerobat.states import BodyState
 WORLD, BODY = "world", "base_link"
 NANOSECONDS = 10**9
 LINE_STRIP, LINE_LIST, CYLINDER, TRIANGLE_LIST = 4, 5, 3, 11  # kinds of markers
-GLASS = 0.4  # opacity of what is solid
-DISC_HEIGHT = 0.01  # [m]
-BLACK = (0.1, 0.1, 0.1)
+_ORIGIN: Array = np.zeros(3)
 RosMessage: TypeAlias = Any  # of the class that a distribution generates
 
 
@@ -107,115 +105,43 @@ class Messages:
             time_from_start=self.time("Duration", time_from_start),
         )
 
-    def line(
-        self, stamp: int, name: str, points: Array, *, width: float, color: tuple[float, float, float]
-    ) -> RosMessage:
-        """A marker of a line.
-
-        Args:
-            stamp: when [ns].
-            name: what it is.
-            points: along it [m], (points, 3).
-            width: of the line [m].
-            color: red, green and blue, 0 to 1.
-        """
-        return self._marker(
-            stamp,
-            name,
-            0,
-            type=LINE_STRIP,
-            pose=self.pose(np.zeros(3), so3.IDENTITY),
-            scale=self.vector("Vector3", np.array([width, 0.0, 0.0])),
-            color=self._color(color),
-            points=[self.vector("Point", point) for point in points],
-        )
-
-    def cross(
-        self, stamp: int, name: str, number: int, *, position: Array, q: Array, ends: Array, width: float
-    ) -> RosMessage:
-        """A marker of arms from a middle.
-
-        Args:
-            stamp: when [ns].
-            name: what it belongs to.
-            number: of it there.
-            position: of the middle [m], (3,).
-            q: its attitude, (4,).
-            ends: of the arms [m], in its own axes, (arms, 3).
-            width: of the lines [m].
-        """
-        points = [self.vector("Point", point) for end in ends for point in (np.zeros(3), end)]
-        return self._marker(
-            stamp,
-            name,
-            number,
-            type=LINE_LIST,
-            pose=self.pose(position, q),
-            scale=self.vector("Vector3", np.array([width, 0.0, 0.0])),
-            color=self._color(BLACK),
-            points=points,
-        )
-
-    def disc(
+    def marker(
         self,
+        kind: int,
         stamp: int,
         name: str,
-        number: int,
+        number: int = 0,
         *,
-        position: Array,
-        q: Array,
-        radius: float,
+        scale: tuple[float, float, float],
         color: tuple[float, float, float],
+        opacity: float = 1.0,
+        points: Iterable[Array] = (),
+        position: Array = _ORIGIN,
+        q: Array = so3.IDENTITY,
     ) -> RosMessage:
-        """A marker of a flat disc.
+        """A marker for RViz.
 
         Args:
+            kind: LINE_STRIP, LINE_LIST, CYLINDER or TRIANGLE_LIST.
             stamp: when [ns].
-            name: what it belongs to.
+            name: what it is, or belongs to.
             number: of it there.
-            position: of its middle [m], (3,).
-            q: its attitude; it lies across its z axis, (4,).
-            radius: [m].
+            scale: its size [m]; of lines the width, of points that are in metres 1.
             color: red, green and blue, 0 to 1.
+            opacity: 0 to 1.
+            points: along lines, or the corners of triangles [m], in its own axes, (3,) each.
+            position: of its axes' origin [m], (3,).
+            q: its attitude, (4,).
         """
-        return self._marker(
-            stamp,
-            name,
-            number,
-            type=CYLINDER,
-            pose=self.pose(position, q),
-            scale=self.vector("Vector3", np.array([2 * radius, 2 * radius, DISC_HEIGHT])),
-            color=self._color(color),
-        )
-
-    def solid(
-        self, stamp: int, name: str, number: int, *, corners: Array, color: tuple[float, float, float]
-    ) -> RosMessage:
-        """A marker of a surface, translucent.
-
-        Args:
-            stamp: when [ns].
-            name: what it belongs to.
-            number: of it there.
-            corners: of its triangles, three each [m], (3 triangles, 3).
-            color: red, green and blue, 0 to 1.
-        """
-        return self._marker(
-            stamp,
-            name,
-            number,
-            type=TRIANGLE_LIST,
-            pose=self.pose(np.zeros(3), so3.IDENTITY),
-            scale=self.vector("Vector3", np.ones(3)),
-            color=self._color(color, GLASS),
-            points=[self.vector("Point", corner) for corner in corners],
-        )
-
-    def _marker(self, stamp: int, name: str, number: int, **given: Any) -> RosMessage:
-        return self.make(
-            "visualization_msgs/msg/Marker", header=self.header(stamp), ns=name, id=number, **given
-        )
-
-    def _color(self, color: Sequence[float], opacity: float = 1.0) -> RosMessage:
         red, green, blue = color
-        return self.make("std_msgs/msg/ColorRGBA", r=red, g=green, b=blue, a=opacity)
+        return self.make(
+            "visualization_msgs/msg/Marker",
+            header=self.header(stamp),
+            ns=name,
+            id=number,
+            type=kind,
+            pose=self.pose(position, q),
+            scale=self.vector("Vector3", np.array(scale)),
+            color=self.make("std_msgs/msg/ColorRGBA", r=red, g=green, b=blue, a=opacity),
+            points=[self.vector("Point", point) for point in points],
+        )

@@ -12,14 +12,25 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment.obstacles.surface import Surface
 from aerobat.flatness import Reference, reference
-from aerobat.interchange.ros.messages import BODY, NANOSECONDS, JointMotion, Messages, RosMessage
+from aerobat.interchange.ros.messages import (
+    BODY,
+    CYLINDER,
+    LINE_LIST,
+    LINE_STRIP,
+    NANOSECONDS,
+    TRIANGLE_LIST,
+    JointMotion,
+    Messages,
+    RosMessage,
+)
 from aerobat.interchange.solids import solid_surfaces
 from aerobat.planning import Plan
 from aerobat.states import BodyState
 
 START = 1  # [s] stamp of the plan's start: ROS takes a stamp of 0 for none
-PATH_WIDTH, FRAME_WIDTH = 0.02, 0.05  # [m]
-BLUE, ORANGE, GREY = (0.05, 0.2, 0.6), (0.85, 0.35, 0.05), (0.4, 0.4, 0.4)
+PATH, FRAME = (0.02, 0.0, 0.0), (0.05, 0.0, 0.0)  # [m] the width of lines
+BLUE, ORANGE = (0.05, 0.2, 0.6), (0.85, 0.35, 0.05)
+GREY, BLACK = (0.4, 0.4, 0.4), (0.1, 0.1, 0.1)
 KIND_OF_MARKERS = "visualization_msgs/msg/MarkerArray"
 
 
@@ -75,7 +86,7 @@ class PlanMessages:
     def lines(self, found: Reference) -> Sequence[RosMessage]:
         """Markers of the path, sampled as `found`, and of the gates and obstacles that stand still."""
         stamp, path = self._stamp(0.0), found.setpoint.flat.position + self.origin
-        line = self.messages.line(stamp, "path", path, width=PATH_WIDTH, color=GREY)
+        line = self.messages.marker(LINE_STRIP, stamp, "path", scale=PATH, color=GREY, points=path)
         return [line, *self._around(0.0, moving=False)]
 
     def _around(self, time: float, moving: bool, when: str = "") -> Iterator[RosMessage]:
@@ -85,11 +96,21 @@ class PlanMessages:
             if (gate.motion is not None) is moving:
                 outline = gate.at(time).outline
                 frame = np.concatenate([outline, outline[:1]]) + self.origin
-                yield self.messages.line(stamp, gate.name + when, frame, width=FRAME_WIDTH, color=ORANGE)
+                name = gate.name + when
+                yield self.messages.marker(LINE_STRIP, stamp, name, scale=FRAME, color=ORANGE, points=frame)
         for number, solid in enumerate(self._solids, 1):
             if (solid.motion is not None) is moving:
                 corners = solid.at(time).triangles.reshape(-1, 3) + self.origin
-                yield self.messages.solid(stamp, solid.name + when, number, corners=corners, color=GREY)
+                yield self.messages.marker(
+                    TRIANGLE_LIST,
+                    stamp,
+                    solid.name + when,
+                    number,
+                    scale=(1.0, 1.0, 1.0),
+                    color=GREY,
+                    opacity=0.4,
+                    points=corners,
+                )
 
     @cached_property
     def _solids(self) -> tuple[Surface, ...]:
@@ -125,18 +146,27 @@ class PlanMessages:
         rotors = self.plan.vehicle.rotors
         first = row * (len(rotors) + 1)
         ends = np.array([rotor.position_body for rotor in rotors])
-        arms = self.messages.cross(
-            stamp, name, first + len(rotors), position=position, q=q, ends=ends, width=PATH_WIDTH
+        arms = self.messages.marker(
+            LINE_LIST,
+            stamp,
+            name,
+            first + len(rotors),
+            scale=PATH,
+            color=BLACK,
+            points=np.stack([np.zeros_like(ends), ends], axis=1).reshape(-1, 3),
+            position=position,
+            q=q,
         )
         discs = [
-            self.messages.disc(
+            self.messages.marker(
+                CYLINDER,
                 stamp,
                 name,
                 first + number,
+                scale=(2.0 * rotor.radius, 2.0 * rotor.radius, 0.01),  # flat, across its z axis
+                color=BLUE,
                 position=position + so3.rotate(q, rotor.position_body),
                 q=q,
-                radius=rotor.radius,
-                color=BLUE,
             )
             for number, rotor in enumerate(rotors)
         ]
