@@ -162,17 +162,17 @@ def read_arrays(
     limit = max_size or MAX_ARRAYS
     try:
         content = read_whole(path, limit)
+        arrays = _unpacked(content, min(limit, SMALL_ARRAYS + MAX_EXPANSION * len(content)))
+        if arrays is not None:
+            return arrays
+        complaint = f"it is not a whole .npz file of a {what}; save it again"
     except FileNotFoundError:
-        raise SpecError(f"{what} file {path}: there is no such file; check the path") from None
+        complaint = "there is no such file; check the path"
     except SpecError as error:
-        raise SpecError(f"{what} file {path}: {error}") from None
+        complaint = str(error)
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise SpecError(f"{what} file {path}: it cannot be read ({reason})") from None
-    arrays = _unpacked(content, min(limit, SMALL_ARRAYS + MAX_EXPANSION * len(content)))
-    if arrays is None:
-        raise SpecError(f"{what} file {path}: it is not a whole .npz file of a {what}; save it again")
-    return arrays
+        complaint = f"it cannot be read ({(isinstance(error, OSError) and error.strerror) or error})"
+    raise SpecError(f"{what} file {path}: {complaint}")
 
 
 def digest_of(content: Mapping[str, NDArray[Any]]) -> str:
