@@ -74,13 +74,11 @@ class Stage:
 
     def __post_init__(self) -> None:
         """Check."""
-        check_crossing(self.gate, self.crossing_point, self.margin)
+        check_crossing(self.gate, self.crossing_point, self.margin, self.min_speed)
         if self.ball is not None and self.gate is not None:
             raise FieldError("ball", "stands beside gate, which says where; give one of them")
         if self.hold and np.isnan(self.place).any():
             raise FieldError("hold", "needs conditions that fix the position along x, y and z; add them")
-        if self.min_speed is not None and self.gate is None:
-            raise FieldError("min_speed", "needs gate, whose direction of passage is meant; name it")
         if self.min_upright_thrust is not None:
             if self.gate is None:
                 raise FieldError("min_upright_thrust", "needs gate, whose upright is meant; name it")
@@ -176,11 +174,15 @@ class Stage:
         return (Condition(Quantity.VELOCITY, gate.normal, lower=speed),) if speed > 0.0 else ()
 
 
-def check_crossing(gate: str | None, crossing_point: CrossingPoint, margin: float) -> None:
-    """Refuse a free crossing point of no gate, and a margin where it is not free. Raises FieldError."""
+def check_crossing(
+    gate: str | None, crossing_point: CrossingPoint, margin: float, min_speed: float | None
+) -> None:
+    """Refuse what needs a gate where there is none, and a margin of a centre. Raises FieldError."""
     if crossing_point == "free" and gate is None:
         raise FieldError("crossing_point", "needs gate, whose opening is meant; name it")
     check_margin(crossing_point, margin)
+    if min_speed is not None and gate is None:
+        raise FieldError("min_speed", "needs gate, whose direction of passage is meant; name it")
 
 
 def check_margin(crossing_point: CrossingPoint, margin: float) -> None:

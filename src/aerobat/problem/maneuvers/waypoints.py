@@ -53,13 +53,11 @@ class Waypoint:
 
     def __post_init__(self) -> None:
         """Check."""
-        check_crossing(self.gate, self.crossing_point, self.margin)
+        check_crossing(self.gate, self.crossing_point, self.margin, self.min_speed)
         if self.radius is not None and np.isnan(self.position).any():
             raise FieldError("radius", "needs all components of position, the centre; give them")
         if self.radius is not None and self.gate is not None:
             raise FieldError("radius", "stands beside gate, which says where; give one of them")
-        if self.min_speed is not None and self.gate is None:
-            raise FieldError("min_speed", "needs gate, whose direction of passage is meant; name it")
         if self.thrust is not None and self.up is None:
             raise FieldError("thrust", "needs up, its direction; add it")
         if self.up is not None and not np.isnan(self.acceleration).all():
