@@ -110,7 +110,7 @@ def test_an_ellipse_that_is_admitted_lies_inside_somewhere_and_one_a_hair_larger
 @examples(40)
 def test_the_frame_lies_outside_and_its_bars_leave_no_way_out(seed: int) -> None:
     opening = drawn(seed)
-    gate = replace(ab.tilted_gate((1.0, 2.0, 3.0), 0.3, 0.2, 0.5), **opening.fields)
+    gate = replace(ab.tilted_gate((1.0, 2.0, 3.0), 0.3, 0.2, 0.5), **opening.fields())
     rings = gate.outline, gate.frame(0.05)
     on_edge, outside = ((points - gate.position) @ gate.plane_axes.T for points in rings)
     np.testing.assert_allclose(opening.depth(on_edge), 0.0, atol=1e-12)
@@ -186,7 +186,7 @@ def test_a_sphere_leaves_of_a_circle_what_the_farthest_of_its_shadow_leaves(seed
 @given(seeds)
 @examples(30)
 def test_files_hold_every_opening_exactly(seed: int) -> None:
-    gate = replace(ab.tilted_gate((1.0, 2.0, 3.0)), **drawn(seed).fields)
+    gate = replace(ab.tilted_gate((1.0, 2.0, 3.0)), **drawn(seed).fields())
     table = to_table(gate)
     assert from_table(ab.Gate, table) == gate
     assert sum(key in table for key in ("width", "radius", "polygon")) == 1
@@ -308,7 +308,7 @@ def test_a_vehicle_too_large_for_a_round_or_polygonal_opening_is_refused_with_it
         (Circle(0.2), "is round, 40.00 cm wide and 40.00 cm high"),
         (Polygon(0.05 * np.array(TRIANGLE)), "is a polygon of 3 corners, 6.00 cm wide and 6.00 cm high"),
     ):
-        small = replace(problem, gates=(replace(gate, **opening.fields),))
+        small = replace(problem, gates=(replace(gate, **opening.fields()),))
         with pytest.raises(SpecError, match=f"gate .round. {size}, but the body of agile-quad takes"):
             require_openings(small, QUAD)
     require_openings(problem, QUAD)

@@ -188,8 +188,8 @@ class Gate:
         return None if self.wall is None else GateWall(self, velocity=self.velocity, path=self.path)
 
     def resized(self, across: float, up: float) -> Gate:
-        """The same gate with another size, by parts of what it is, by the lesser where it has but one."""
-        return replace(self, **self.opening.resized(across, up).fields)
+        """Return the gate, its opening scaled by `across` and `up`; any but a rectangle by the smaller."""
+        return replace(self, **self.opening.fields(across, up))
 
     def stands_in(self, other: Gate) -> bool:
         """True if a side of its opening, where its frame is, passes through the other's opening."""

@@ -29,10 +29,9 @@ class Circle(OpeningShape):
         """Points on it, the first on the left."""
         return self.radius * _directions(CIRCLE_POINTS)
 
-    @property
-    def fields(self) -> Mapping[str, Any]:
-        """The fields of a gate with this opening."""
-        return {"width": None, "height": None, "radius": self.radius, "polygon": None}
+    def fields(self, across: float = 1.0, up: float = 1.0) -> Mapping[str, Any]:
+        """See `OpeningShape`."""
+        return {"width": None, "height": None, "radius": min(across, up) * self.radius, "polygon": None}
 
     @property
     def kind(self) -> str:
@@ -92,10 +91,6 @@ class Circle(OpeningShape):
     def needed(self, reach: Array) -> Array:
         """See `OpeningShape`."""
         return np.repeat(2.0 * reach.max(axis=-1)[..., None], 2, axis=-1)
-
-    def resized(self, across: float, up: float) -> OpeningShape:
-        """See `OpeningShape`."""
-        return Circle(min(across, up) * self.radius)
 
 
 _INSCRIBED = float(np.cos(np.pi / CIRCLE_SIDES))  # [-] of a circle's radius: how far the polygon's sides are

@@ -33,10 +33,9 @@ class Polygon(OpeningShape):
         """The corners of the polygon."""
         return self.corners
 
-    @property
-    def fields(self) -> Mapping[str, Any]:
-        """The fields of a gate with this opening."""
-        return {"width": None, "height": None, "radius": None, "polygon": self.corners}
+    def fields(self, across: float = 1.0, up: float = 1.0) -> Mapping[str, Any]:
+        """See `OpeningShape`."""
+        return {"width": None, "height": None, "radius": None, "polygon": min(across, up) * self.corners}
 
     @property
     def kind(self) -> str:
@@ -115,10 +114,6 @@ class Polygon(OpeningShape):
         part = np.sum((points - first) * along, axis=-1) / np.sum(along * along, axis=-1)
         return np.asarray(first + np.clip(part, 0.0, 1.0)[..., None] * along)
 
-    def resized(self, across: float, up: float) -> OpeningShape:
-        """See `OpeningShape`."""
-        return Polygon(min(across, up) * self.corners)
-
     def _largest_inset(self, reach: Array) -> tuple[float, Array]:
         """The largest distance [m] that is left on all sides beside what is reached there, and the point.
 
@@ -145,10 +140,9 @@ class Rectangle(Polygon):
         self.width, self.height = width, height
         super().__init__(np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * [width / 2.0, height / 2.0])
 
-    @property
-    def fields(self) -> Mapping[str, Any]:
-        """The fields of a gate with this opening."""
-        return {"width": self.width, "height": self.height, "radius": None, "polygon": None}
+    def fields(self, across: float = 1.0, up: float = 1.0) -> Mapping[str, Any]:
+        """See `OpeningShape`."""
+        return {"width": across * self.width, "height": up * self.height, "radius": None, "polygon": None}
 
     @property
     def kind(self) -> str:
@@ -184,10 +178,6 @@ class Rectangle(Polygon):
         outward = np.zeros(points.shape)
         outward[..., probe] = np.where(points[..., probe] > 0.0, 1.0, -1.0)
         return outward
-
-    def resized(self, across: float, up: float) -> OpeningShape:
-        """See `OpeningShape`."""
-        return Rectangle(across * self.width, up * self.height)
 
 
 def _corners(value: Any) -> Array:

@@ -61,10 +61,12 @@ class OpeningShape(ABC):
     def edges(self) -> tuple[Edge, ...]:
         """The edges of which a frame around the opening is made."""
 
-    @property
     @abstractmethod
-    def fields(self) -> Mapping[str, Any]:
-        """The fields of a gate with this opening."""
+    def fields(self, across: float = 1.0, up: float = 1.0) -> Mapping[str, Any]:
+        """Return the fields of a gate with this opening, scaled by `across` and `up`.
+
+        Any but a rectangle is scaled by the smaller factor.
+        """
 
     @property
     @abstractmethod
@@ -94,10 +96,6 @@ class OpeningShape(ABC):
     @abstractmethod
     def nearest_on_edge(self, outward: Array, points: Array) -> Array:
         """The points of the edges with those outward normals that are next to points, (..., 2)."""
-
-    @abstractmethod
-    def resized(self, across: float, up: float) -> OpeningShape:
-        """The same with other sizes, as parts of what they are; by the lesser part where it has but one."""
 
     @abstractmethod
     def needed(self, reach: Array) -> Array:
