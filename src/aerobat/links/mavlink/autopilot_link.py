@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from math import inf, isfinite, nan
 from random import randrange
 from typing import Any
@@ -29,13 +30,16 @@ _WARNING = 4  # the severity from which on a text complains
 class AutopilotLink:
     """An autopilot at the other end of a connection."""
 
-    def __init__(self, connection: Connection, telemetry_rate: float, system: int | None = None) -> None:
+    def __init__(
+        self, connection: Connection, telemetry_rate: float, system: int | None, say: Callable[[str], None]
+    ) -> None:
         """Prepare to talk.
 
         Args:
             connection: the way to it.
             telemetry_rate: of its state, as it is asked for [1/s].
             system: its number; None for the first that is heard.
+            say: what takes sentences that it sends, and those about states that are left out.
         """
         self._connection = connection
         self._mavlink = dialect()
@@ -57,7 +61,7 @@ class AutopilotLink:
         self.parameters: dict[str, float] = {}
         self.complaints: dict[str, None] = {}  # what ails it, each once
         self._attitude: MavlinkMessage = None  # the last message of it
-        self.told: list[str] = []  # sentences for whoever listens, who empties it
+        self._say = say
         self._left_out: set[str] = set()  # why states were, each told once
 
     @property
@@ -193,7 +197,7 @@ class AutopilotLink:
             self.parameters[str(message.param_id)] = float(message.param_value)
 
     def _take_statustext(self, message: MavlinkMessage) -> None:
-        self.told.append(f"the vehicle: {message.text}")
+        self._say(f"the vehicle: {message.text}")
         if message.severity <= _WARNING:
             self.complaints[str(message.text)] = None
 
@@ -230,7 +234,7 @@ class AutopilotLink:
         """Tell once that states of a kind are left out."""
         if reason not in self._left_out:
             self._left_out.add(reason)
-            self.told.append(f"states are left out that are {reason}")
+            self._say(f"states are left out that are {reason}")
 
 
 def _of_odometry(message: MavlinkMessage, offset: float) -> Observed | None:

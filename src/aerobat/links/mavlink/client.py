@@ -90,7 +90,7 @@ class Client:
         stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
         self.mission = Mission(plan, mission, stream, PathFollower(stream, plan.vehicle, environment))
         self._plan, self._offset = plan, offset
-        self.link = AutopilotLink(connection, settings.telemetry_rate, settings.system)
+        self.link = AutopilotLink(connection, settings.telemetry_rate, settings.system, say)
         self.stage = ClientStage.CONNECTING
         self.log: list[Observed] = []  # while the plan was flown
         self.settings = settings
@@ -124,9 +124,6 @@ class Client:
         seen = self.link.receive(now)
         if self.mission.phase is Phase.MANEUVER:
             self.log += seen
-        for sentence in self.link.told:
-            self._say(sentence)
-        self.link.told.clear()
         getattr(self, f"_while_{self.stage.name.lower()}")(now)
 
     def abort(self, now: float, reason: str) -> None:
