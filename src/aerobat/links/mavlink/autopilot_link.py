@@ -20,6 +20,7 @@ SYSTEM, COMPONENT = 245, 191  # ours: a companion computer
 _AUTOPILOT = 1  # the component of an autopilot
 _GROUND_STATION = 8  # the autopilot number of who is none
 _ASK_AGAIN = 0.3  # [s] from an order to the same again, where it is not obeyed
+_INTERVAL = 1e4  # [µs] between states, as it is asked for them
 _SYNCHRONIZE = 0.1  # [s] between questions for the time
 _SYNCHRONIZATIONS = 50  # of which the quickest counts
 _MAX_AHEAD = 0.02  # [s] beside that by which states may be stamped ahead
@@ -30,20 +31,16 @@ _WARNING = 4  # the severity from which on a text complains
 class AutopilotLink:
     """An autopilot at the other end of a connection."""
 
-    def __init__(
-        self, connection: Connection, telemetry_rate: float, system: int | None, say: Callable[[str], None]
-    ) -> None:
+    def __init__(self, connection: Connection, system: int | None, say: Callable[[str], None]) -> None:
         """Prepare to talk.
 
         Args:
             connection: the way to it.
-            telemetry_rate: of its state, as it is asked for [1/s].
             system: its number; None for the first that is heard.
             say: what takes sentences that it sends, and those about states that are left out.
         """
         self._connection = connection
         self._mavlink = dialect()
-        self._interval = 1e6 / telemetry_rate
         self._wanted = system
         self._system: int | None = None  # of the autopilot, once it has answered
         self.systems: set[int] = set()  # of all autopilots that are heard
@@ -100,7 +97,7 @@ class AutopilotLink:
             if self.observed is None or now - self.observed.time > 1.0:
                 for name, every in self.dialect.states.items():
                     kind = getattr(self._mavlink, f"MAVLink_{name.lower()}_message")
-                    self.command(511, kind.id, every * self._interval)
+                    self.command(511, kind.id, every * _INTERVAL)
         return seen
 
     def ask_parameter(self, name: str) -> None:

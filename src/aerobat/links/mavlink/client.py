@@ -53,7 +53,6 @@ class ClientSettings:
     """Settings of the link."""
 
     rate: float = 200.0  # [1/s] of set-points
-    telemetry_rate: float = 100.0  # [1/s] of states, as the vehicle is asked for them
     wait: float = 10.0  # [s] for a vehicle to answer
     hover_thrust: float | None = None  # [-] where the vehicle does not say it
     system: int | None = None  # the number of the vehicle among MAVLink's systems; None for the only one
@@ -90,7 +89,7 @@ class Client:
         stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
         self.mission = Mission(plan, mission, stream, PathFollower(stream, plan.vehicle, environment))
         self._plan, self._offset = plan, offset
-        self.link = AutopilotLink(connection, settings.telemetry_rate, settings.system, say)
+        self.link = AutopilotLink(connection, settings.system, say)
         self.stage = ClientStage.CONNECTING
         self.log: list[Observed] = []  # while the plan was flown
         self.settings = settings
