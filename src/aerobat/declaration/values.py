@@ -72,10 +72,6 @@ def _names(cls: type[Any]) -> tuple[str, ...]:
     return known
 
 
-def _content(self: Any) -> tuple[Any, ...]:
-    return tuple(_comparable(getattr(self, name)) for name in _names(type(self)))
-
-
 def _comparable(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         is_float = value.dtype.kind == "f"
@@ -100,8 +96,8 @@ def _hash(self: Any) -> int:
     """The content's hash, kept where nothing can change it: vehicles and trajectories are keys of caches."""
     known: int | None = self.__dict__.get("_hash")
     if known is None:
-        known = hash((type(self).__qualname__, _content(self)))
-        parts = (getattr(self, name) for name in _names(type(self)))
+        parts = [getattr(self, name) for name in _names(type(self))]
+        known = hash((type(self).__qualname__, tuple(map(_comparable, parts))))
         if not any(isinstance(part, np.ndarray) and part.flags.writeable for part in parts):
             object.__setattr__(self, "_hash", known)
     return known

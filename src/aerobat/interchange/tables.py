@@ -38,7 +38,9 @@ def write_table(table: Mapping[str, Any], path: PathName) -> None:
     parquet = _parquet()
     from pyarrow import table as arrow_table
 
-    made = arrow_table({name: _storable(column) for name, column in columns.items()})
+    made = arrow_table(
+        {name: column.tolist() if column.dtype.kind == "U" else column for name, column in columns.items()}
+    )
     with whole_file(path) as temporary:
         parquet.write_table(made, temporary)
 
@@ -83,10 +85,6 @@ def _columns(table: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
 
 def _parquet() -> Any:
     return import_extra("pyarrow.parquet", "Parquet files need pyarrow", "aerobat[parquet]", "write CSV")
-
-
-def _storable(column: NDArray[Any]) -> Any:
-    return column.tolist() if column.dtype.kind == "U" else column
 
 
 def _from_parquet(path: Path) -> dict[str, NDArray[Any]]:

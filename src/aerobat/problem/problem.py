@@ -159,7 +159,9 @@ class Problem:
         self._check_given_ends(sequence)
         self._check_within_limits()
         self._check_clear_of_obstacles()
-        self._check_stages(sequence)
+        for stage in sequence.stages:
+            for condition in stage.where:
+                self._check_place(stage.name, condition)
         for i, condition in enumerate(sequence.path_constraints):
             self._check_ends(i, condition)
 
@@ -226,14 +228,8 @@ class Problem:
             if found is not None:
                 raise FieldError(field_name, f": it lies in {found.name}, an obstacle; move one of them")
 
-    def _check_stages(self, sequence: StageSequence) -> None:
-        """Refuse stages at places outside the limits or under ground."""
-        for stage in sequence.stages:
-            for condition in stage.where:
-                self._check_place(stage.name, condition)
-
     def _check_place(self, stage: str, condition: Condition) -> None:
-        """Refuse a condition on one axis's position that the limits leave no room for."""
+        """Refuse a condition on one axis's position that the limits, or the ground, leave no room for."""
         lower, upper = self.path_limits.of(0)
         for axis, along, low, high in zip("xyz", condition.direction.tolist(), lower, upper, strict=True):
             if abs(along) == np.linalg.norm(condition.direction):

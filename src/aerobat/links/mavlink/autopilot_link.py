@@ -212,9 +212,12 @@ class AutopilotLink:
         _, offset = min(self._times)
         if message.get_type() == "ODOMETRY":
             seen = _of_odometry(message, offset)
-        elif self._attitude is None or abs(age := _apart(message, self._attitude)) > _MAX_APART:
+        elif self._attitude is None:
             return []
         else:
+            age = 1e-3 * (message.time_boot_ms - self._attitude.time_boot_ms)
+            if abs(age) > _MAX_APART:
+                return []
             seen = _of_position(message, self._attitude, age, offset)
         if seen is None:
             self._leave_out("not finite, or their attitude is no unit quaternion")
@@ -243,11 +246,6 @@ def _of_odometry(message: MavlinkMessage, offset: float) -> Observed | None:
         swap_body((message.vx, message.vy, message.vz)),
         swap_body((message.rollspeed, message.pitchspeed, message.yawspeed)),
     )
-
-
-def _apart(position: MavlinkMessage, attitude: MavlinkMessage) -> float:
-    """The time from an attitude to a position [s]."""
-    return 1e-3 * float(position.time_boot_ms - attitude.time_boot_ms)
 
 
 def _of_position(

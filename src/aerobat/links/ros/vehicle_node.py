@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat.interchange.ros import NANOSECONDS, Messages, RosMessage
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
-from aerobat.links.goals import Mode, PathGoal, PathPiece
+from aerobat.links.goals import Mode, PathGoal
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Middleware, PacedClock
 
@@ -88,7 +88,8 @@ class VehicleNode:
         if piece is None:
             self._refuse("a goal is malformed, or its numbers are not finite")
             return
-        self._wait_for_the_next(piece)
+        if self._clock is not None:  # time waits just after the piece ends, when the next one is due
+            self._clock.wait_at(self._stamp(piece.stamp + piece.duration + self._period + _OVERLAP))
         # up to there by the goal before it: of goals that a pause of this process held up each has its time
         self.vehicle.advance(min(piece.stamp, (self._ros.time() - self.origin) / NANOSECONDS))
         if self.vehicle.time - piece.stamp > _STALE:
@@ -105,11 +106,6 @@ class VehicleNode:
             self.vehicle.follow_path(piece)
             self.vehicle.go_offboard()
             self._say("following goals")
-
-    def _wait_for_the_next(self, piece: PathPiece) -> None:
-        """Hold time up just after a piece ends, when the next one is due."""
-        if self._clock is not None:
-            self._clock.wait_at(self._stamp(piece.stamp + piece.duration + self._period + _OVERLAP))
 
     def _begins_here(self, goal: PathGoal) -> bool:
         """True for a goal by which a vehicle may begin to obey."""

@@ -146,16 +146,13 @@ class Flip(Maneuver):
         """Thrust at an angle of the turn; its sign free where it is `signed` only by the diagonals."""
         diagonal = angle_deg % 360.0 in (self.ANGLES_DEG[0], self.ANGLES_DEG[-1])
         least = -inf if diagonal and not self.signed else minimum
-        return thrust_in_plane(self._direction(angle_deg), self.turn_axis, least)
+        direction = so3.rotate(so3.about_axis(self.turn_axis, np.deg2rad(angle_deg)), UP)
+        return thrust_in_plane(direction, self.turn_axis, least)
 
     def _min_thrust(self, angle_deg: float, max_specific_thrust: float) -> float:
         """The least specific thrust [m/s²] at an angle of the turn: upside down, or sideways."""
         asked = self.min_inverted_thrust if _is_inverted(angle_deg) else self.min_lateral_thrust
         return asked or THRUST_FRACTION * max_specific_thrust
-
-    def _direction(self, angle_deg: float) -> Array:
-        """The thrust's direction at an angle of the turn, (3,)."""
-        return so3.rotate(so3.about_axis(self.turn_axis, np.deg2rad(angle_deg)), UP)
 
 
 def _is_inverted(angle_deg: float) -> bool:

@@ -72,6 +72,11 @@ class Keyframes:
     q_world_body: Array  # (k, 4)
     thrust: Array  # [m/s²] specific thrust, drag counted, (k, 3)
 
+    @property
+    def stages(self) -> list[int]:
+        """The places of the stages among the instants."""
+        return [k for k, keyframe in enumerate(self.instants) if keyframe.interval is not None]
+
     def only(self, kept: list[int]) -> Keyframes:
         """Some of them."""
         instants = tuple(self.instants[k] for k in kept)

@@ -72,7 +72,7 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
         end = "segment" if plan.dt is None else "interval"
         note = f"a stage holds at the end of {end} n" if plan.stages else "equal steps of time"
     else:
-        stages = [k for k, keyframe in enumerate(shots.instants) if keyframe.interval is not None]
+        stages = shots.stages
         width, height = size_of(axes)
         most = MOST_STAGES if height >= width else min(MOST_STAGES, int(width / FACTS_ACROSS))
         shown = sorted({round(k) for k in np.linspace(0, len(stages) - 1, most)})
@@ -87,16 +87,15 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
 
 def _is_crowded(shots: Keyframes, camera: Camera, distance: float) -> bool:
     """True where two stages come to lie nearer to each other than `distance` [m] on the picture."""
-    stages = [k for k, keyframe in enumerate(shots.instants) if keyframe.interval is not None]
-    places = camera.project(shots.position[stages])
+    places = camera.project(shots.position[shots.stages])
     apart = np.linalg.norm(places[:, None] - places, axis=-1)
-    return bool((apart[np.triu_indices(len(stages), 1)] < distance).any())
+    return bool((apart[np.triu_indices(len(places), 1)] < distance).any())
 
 
 def _apart(shots: Keyframes, camera: Camera, distance: float) -> list[int]:
     """The stages, and of the steps of time between them those that are drawn clear of all others."""
     places = camera.project(shots.position)
-    kept = [k for k, keyframe in enumerate(shots.instants) if keyframe.interval is not None]
+    kept = shots.stages
     for k in range(len(places)):
         if k not in kept and all(np.linalg.norm(places[i] - places[k]) > distance for i in kept):
             kept.append(k)
