@@ -47,20 +47,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-AROUND = 0.25  # [in] free around paths that lie in a plane
 DRAWN = ("duration_s", "ratio", "certified", "min_margin_n", "max_position_error_m")  # beside a timeline
 COLOURS = (INK, YELLOW, SKY, BLUE, MUTED)  # of planners, in their order
-PATH_VERTICES = 200  # of a drawn path
-TAIL = 1.02  # where the time axis ends, relative to the longest duration
-
-PATHS = {True: 3.2, False: 4.8}  # [in] the height of the paths' picture, where they are flat or not
-TIMELINE = 5.5  # [in] the width of a timeline
-COMPARISON_ROW = 0.85  # [in] its height
-COMPARISON_PITCH = 1.3  # [in] of a planner's row, with its name
-REASON_PITCH = 0.75  # [in] of one that has no plan
 PLACES = (6.6, 7.5, 8.25, 9.2, 10.2)  # [in] where a row's facts begin
-SENTENCE = 72  # letters to a line beside a timeline
-PARAGRAPH = 150  # letters to a line across the page
 
 
 @facts.register
@@ -109,7 +98,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     colours = [colour for colour, _ in zip(cycle(COLOURS), entries, strict=False)]
     paths = [_path(e, e.plan, colour) for e, colour in zip(entries, colours, strict=True) if e.plan]
     rows = AXIS + sum(map(_pitch, entries))
-    height = PATHS[is_flat(np.concatenate([path.position for path in paths]))]
+    height = 3.2 if is_flat(np.concatenate([path.position for path in paths])) else 4.8  # [in] of the paths
     with house_style():
         title = f"{comparison.problem.name} · planners for {comparison.vehicle.name}"
         fact = f"{len(paths)} of {len(entries)} planners found a plan"
@@ -143,12 +132,13 @@ def _drawn(comparison: Comparison, entry: Entry) -> list[Fact]:
 
 
 def _path(entry: Entry, plan: Plan, colour: str) -> NamedPath:
-    times = np.linspace(0.0, plan.duration, PATH_VERTICES)
+    times = np.linspace(0.0, plan.duration, 200)
     return NamedPath(_name(entry), colour, plan.trajectory.evaluate(times))
 
 
 def _pitch(entry: Entry) -> float:
-    return REASON_PITCH if entry.plan is None else COMPARISON_PITCH
+    """The height of a planner's row with its name [in]; less where there is no plan."""
+    return 0.75 if entry.plan is None else 1.3
 
 
 def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], top: float) -> None:
@@ -161,7 +151,7 @@ def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], t
         if entry.plan is None:
             _write_reason(figure, entry, top)
             continue
-        axes = panel(figure, COLUMNS[0], top, TIMELINE, COMPARISON_ROW)
+        axes = panel(figure, COLUMNS[0], top, 5.5, 0.85)
         _draw_thrusts(axes, entry.plan, comparison.vehicle, colour)
         heading(axes, "", _name(entry))
         _write_facts(figure, comparison, entry, top)
@@ -177,7 +167,7 @@ def _draw_thrusts(axes: Axes, plan: Plan, vehicle: Vehicle, colour: str) -> None
     limits = sorted({*vehicle.min_thrusts.tolist(), *vehicle.max_thrusts.tolist()})
     draw_limits(axes, limits)
     fit_to_limits(axes, limits, reference.rotor_thrusts)
-    axes.set(ylabel="thrust [N]", xlim=(0.0, TAIL * plan.duration))
+    axes.set(ylabel="thrust [N]", xlim=(0.0, 1.02 * plan.duration))
 
 
 def _share_scales(timelines: Sequence[Axes]) -> None:
@@ -195,13 +185,13 @@ def _write_facts(figure: Figure, comparison: Comparison, entry: Entry, bottom: f
         wrong = fact.key == "certified" and not entry.certified
         write(figure, x, bottom + 0.6, fact.said, size=TITLE, color=RED if wrong else INK)
     notes = (f"planned in {entry.planning_time:.2f} s", entry.note, entry.outcome)
-    note = fill("; ".join(filter(None, notes)), SENTENCE)
+    note = fill("; ".join(filter(None, notes)), 72)
     write(figure, PLACES[0], bottom + 0.42, note, size=SMALL, color=MUTED, va="top")
 
 
 def _write_reason(figure: Figure, entry: Entry, bottom: float) -> None:
     write(figure, COLUMNS[0], bottom + 0.4, _name(entry), size=SMALL, color=MUTED)
-    write(figure, COLUMNS[0], bottom + 0.3, fill(entry.outcome, PARAGRAPH), size=NORMAL, va="top")
+    write(figure, COLUMNS[0], bottom + 0.3, fill(entry.outcome, 150), size=NORMAL, va="top")
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,6 +236,6 @@ def _fit_plane(axes: Axes, picture: Array) -> None:
     """Fit points (n, 2) [m] into the axes, the same scale along both."""
     low, high = picture.min(axis=0), picture.max(axis=0)
     size = size_of(axes)
-    per_inch = max(float(((high - low) / (size - 2 * AROUND)).max()), 1e-3)
+    per_inch = max(float(((high - low) / (size - 0.5)).max()), 1e-3)  # a quarter of an inch free around
     (left, bottom), (right, top) = ((low + high + sign * size * per_inch) / 2 for sign in (-1.0, 1.0))
     axes.set(xlim=(left, right), ylim=(bottom, top))

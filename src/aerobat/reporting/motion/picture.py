@@ -18,6 +18,7 @@ from aerobat.planning import PlacedStage, Plan
 from aerobat.problem.gate import Gate
 from aerobat.reporting.page import AXIS, Place, house_style, panel, write
 from aerobat.reporting.panels import timelines
+from aerobat.reporting.panels.path import BELOW
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
 from aerobat.reporting.scene.axes_box import draw_box_around
 from aerobat.reporting.scene.camera import Camera
@@ -43,10 +44,6 @@ if TYPE_CHECKING:
 SIZE = (7.2, 4.8)  # [in] of a picture
 SCENE: Place = (0.0, 0.0, 4.0, 4.5)
 LINES: tuple[Place, ...] = tuple((4.78, AXIS + 1.38 * k, 2.28, 1.0) for k in (2, 1, 0))
-GLYPH = 0.18  # of the vehicle as drawn, relative to the path's extent
-BELOW = 0.06  # by which the reference path is drawn under the actual one, likewise
-PASSED = 0.35  # opacity of the vehicle at stages that are behind it
-NAMED = 6  # stages up to which their names stand above the timelines
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +174,7 @@ class MovingPicture:
             timelines.draw_attitude_error(column[1], subject.flight)
         times = subject.reference.times
         timelines.draw_rotor_thrusts(column[-1], times, subject.thrusts, subject.vehicle)
-        stages = subject.stages if len(subject.stages) <= NAMED else ()
+        stages = subject.stages if len(subject.stages) <= 6 else ()  # whose names have room
         timelines.finish_column(column, "", stages, subject.duration)
         for axes in column:
             if (legend := axes.get_legend()) is not None:
@@ -186,7 +183,7 @@ class MovingPicture:
 
     @cached_property
     def _scale(self) -> float:
-        return enlargement(self.subject.vehicle, GLYPH * self.subject.reference.extent)
+        return enlargement(self.subject.vehicle, 0.18 * self.subject.reference.extent)
 
     @cached_property
     def _standing(self) -> list[Shape]:
@@ -222,7 +219,7 @@ class MovingPicture:
         """The first vehicle at the stages until an instant, as a breath."""
         poses = self.subject.shown[0]
         rows = poses.rows([stage.time for stage in self.subject.stages if stage.time <= time])
-        shapes = [self._vehicle(poses.position[k], poses.q_world_body[k], PASSED) for k in rows]
+        shapes = [self._vehicle(poses.position[k], poses.q_world_body[k], opacity=0.35) for k in rows]
         return [shape for shapes_of_one in shapes for shape in shapes_of_one]
 
     def _vehicle(self, position: Array, q_world_body: Array, opacity: float = 1.0) -> list[Shape]:

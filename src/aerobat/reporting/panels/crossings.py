@@ -15,10 +15,7 @@ from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, PAPER, RED, SMALL, 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MARGIN = 0.15  # around an opening, of its size
 RINGS = (0.5, 0.95)  # fractions of the crossings that circles hold
-REACH = 1.35  # of the larger circle, to where its picture extends
-PALE, FEW = 0.18, 64  # the least opacity of a dot, and the crossings up to which dots are opaque
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +65,7 @@ def draw_opening(axes: Axes, crossings: Crossings) -> None:
         )
         needed.set_linestyle((0, (4, 2)))
         axes.add_patch(needed)
-    half = np.abs(outline).max(axis=0) * (1.0 + 2.0 * MARGIN)
+    half = np.abs(outline).max(axis=0) * 1.3
     off = np.nanmax(np.abs([crossings.right, crossings.up]), axis=1) if crossings.crossed.any() else half
     half = np.clip(1.05 * off, half, 2.0 * half)
     _draw_crossings(axes, crossings, half, 1.0)
@@ -82,7 +79,7 @@ def draw_scatter(axes: Axes, crossings: Crossings) -> None:
     from matplotlib.patches import Circle
 
     radii = [100.0 * radius for radius in crossings.rings]
-    half = np.full(2, REACH * max(radii[-1], 1e-2))
+    half = np.full(2, 1.35 * max(radii[-1], 1e-2))  # somewhat beyond the larger circle
     axes.axhline(0.0, color=FAINT, linewidth=0.8)
     axes.axvline(0.0, color=FAINT, linewidth=0.8)
     for radius, style in zip(radii, ("-", (0, (4, 2))), strict=True):
@@ -104,7 +101,7 @@ def _draw_crossings(axes: Axes, crossings: Crossings, half: Array, scale: float)
     """
     points = scale * np.column_stack([crossings.right, crossings.up])
     inside = crossings.crossed & (np.abs(np.nan_to_num(points)) <= half).all(axis=1)
-    opacity = max(PALE, min(1.0, np.sqrt(FEW / max(inside.sum(), 1))))
+    opacity = max(0.18, min(1.0, np.sqrt(64 / max(inside.sum(), 1))))  # of up to 64 dots full
     for where, colour, marker, size in (
         (inside & ~crossings.wrong, BLUE, "o", 8.0),
         (inside & crossings.wrong, RED, "X", 22.0),

@@ -39,11 +39,10 @@ if TYPE_CHECKING:
 
 POSES = 20  # time steps at which the vehicle is drawn, fewer where it would cover itself
 SIZE = 0.085  # of the vehicle as drawn, relative to the path's extent
-CLEAR = 1.0  # from one drawn vehicle to the next, at least, relative to the vehicle as drawn
 GHOSTS = 6  # one of so many drawn vehicles has all that moves beside it, where it is then
 MARKED = 3  # of so many gaps between drawn vehicles one has an arrowhead
 DIRECTION = 0.03  # of an arrowhead, likewise
-BELOW = 0.06  # by which a reference path is drawn under an actual one, likewise
+BELOW = 0.06  # by which a reference path is drawn under an actual one, relative to its extent
 ACTUAL_WIDTH, REFERENCE_WIDTH = 1.3, 4.0  # [pt]
 ALONE_WIDTH = 1.6  # [pt] of a reference path that nobody flew
 
@@ -112,7 +111,7 @@ def pose_samples(poses: PoseHistory, size: float, gates: Sequence[Gate]) -> tupl
     if not step:  # a flight that is over as it begins
         return [0], step
     for k in poses.rows(np.arange(poses.times[kept[0]] % step, poses.times[-1] + 1e-9, step)):
-        if np.linalg.norm(poses.position[kept] - poses.position[k], axis=-1).min() > CLEAR * size:
+        if np.linalg.norm(poses.position[kept] - poses.position[k], axis=-1).min() > size:
             kept.append(k)
     return sorted(kept), step
 

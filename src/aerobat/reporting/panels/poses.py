@@ -14,10 +14,8 @@ from aerobat.problem.gate import Gate
 from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle
 
-POSE_RATE = 250.0  # [1/s] at which a plan is shown
 VERTICES = 240  # of a drawn path
 FAR = 0.5  # of the reference path's extent: where a flight strays further, it is drawn no more
-FLATNESS_RATIO = 0.3  # height over length, below which a path is drawn across the page
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +62,12 @@ class PoseHistory:
 def is_flat(positions: Array) -> bool:
     """True if a path (T, 3) is much longer than high."""
     extents = np.ptp(positions, axis=0)
-    return bool(extents[2] < FLATNESS_RATIO * extents.max())
+    return bool(extents[2] < 0.3 * extents.max())
 
 
 def plan_reference(plan: Plan, vehicle: Vehicle) -> Reference:
     """Reference of a plan for a vehicle from start to goal, sampled for drawing."""
-    return reference(plan.trajectory, vehicle, rate=POSE_RATE, environment=plan.problem.environment)
+    return reference(plan.trajectory, vehicle, rate=250.0, environment=plan.problem.environment)
 
 
 def reference_poses(reference: Reference | Flight) -> PoseHistory:

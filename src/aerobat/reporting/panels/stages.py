@@ -29,23 +29,12 @@ from aerobat.vehicle import Vehicle
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ARROW = 1.0  # [in] the longest arrow
-STORYBOARD = 0.6  # of the usual size of arrows and vehicles, where stages follow one another
-KEY = 0.4  # [in] the longest key arrow
-KEY_HEIGHT = 0.38  # [in] of the keys above the axes
 VEHICLE = 0.6  # [in] a vehicle, about
-COLUMN = 0.62  # [in] kept free for names on either side of a tall panel, at least
-LETTER = 0.082  # [in] the width of a name's letter
-FACTS = 1.0  # [in] kept free beside what is told of a stage that is shown in a plane of its own
-FACTS_ACROSS = 1.1  # [in] from one stage to the next, where they stand side by side
 MOST_STAGES = 11  # that follow one another legibly
-ROOM = 1.15  # from one stage to the next, relative to the largest gate
-BETWEEN = 0.8  # of that way, that the longest arrow may take
 STAGE_ROW = 0.5  # [in] kept free for names at the foot of a wide panel
 # [in] from a hair line's end to the text, for each alignment of it
 GAPS = {"right": np.array([-0.04, 0.0]), "left": np.array([0.04, 0.0]), "center": np.array([0.0, -0.04])}
 COMPONENTS = np.eye(2)  # lateral, vertical
-PITCH_UP = 0.5  # [in] between names, one above the other
 KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s²] that a key may show
 
 
@@ -59,7 +48,8 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     plane = maneuver_plane(plan, shots.thrust)
     camera = plane.camera
     gates = plan.problem.gates
-    column = max(COLUMN, LETTER * max(len(keyframe.name) for keyframe in shots.instants))
+    longest_name = max(len(keyframe.name) for keyframe in shots.instants)
+    column = max(0.62, 0.082 * longest_name)  # [in] kept free for names on either side of a tall panel
     frame = camera.project(np.concatenate([shots.position, *(gate.outline for gate in gates)]))
     inches = _fit(axes, frame, VEHICLE, span(vehicle), (column, column))  # per metre
     reach = enlargement(vehicle, VEHICLE / inches) * span(vehicle)  # [m]
@@ -74,11 +64,12 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     else:
         stages = shots.stages
         width, height = size_of(axes)
-        most = MOST_STAGES if height >= width else min(MOST_STAGES, int(width / FACTS_ACROSS))
+        most = MOST_STAGES if height >= width else min(MOST_STAGES, int(width / 1.1))  # [in] side by side
         shown = sorted({round(k) for k in np.linspace(0, len(stages) - 1, most)})
         numbered = shots.only(stages).numbered().only(shown)
         shots, gates = _storyboard(axes, numbered, gates, plane)
-        scale = _draw(axes, shots, gates, plane, vehicle, (0.0, max(column, FACTS)), STORYBOARD)
+        beside = max(column, 1.0)  # [in] for what is told of each
+        scale = _draw(axes, shots, gates, plane, vehicle, (0.0, beside), shrink=0.6)
         left_out = len(stages) - len(shown)
         some = f" but for {left_out} of {len(stages)}" if left_out else ""
         note = f"in order{some}, each seen across its thrust"
@@ -110,7 +101,7 @@ def _storyboard(
     downward = bool(size[1] >= size[0])
     own = [gate for gate in gates if any(gate.name == each.gate for each in shots.instants)]
     largest = 2.0 * max((gate.opening.circumradius for gate in own), default=0.0)  # [m]
-    pitch = max(1.0, ROOM * largest)
+    pitch = max(1.0, 1.15 * largest)  # [m]
     if not downward:  # the row fills the panel
         tall = size[1] - STAGE_ROW
         pitch = max(pitch, largest * float(size[0] / max(len(shots.instants), 1) / tall))
@@ -144,7 +135,8 @@ def _draw(
     inches = _fit(axes, frame, shrink * VEHICLE, span(vehicle), columns)  # per metre
     scale = enlargement(vehicle, shrink * VEHICLE / inches)
     places, thrust = camera.project(shots.position), camera.project(shots.thrust)
-    longest = min(shrink * ARROW, BETWEEN * _least_step(places) * inches)  # [in]
+    step = float(np.linalg.norm(np.diff(places, axis=0), axis=1).min(initial=np.inf))  # [m]
+    longest = min(shrink, 0.8 * step * inches)  # [in] the longest arrow
     arrow = longest / max(float(np.abs(thrust).max()), 1e-9)  # [in] per m/s²
     tips = places + thrust * arrow / inches
     pad = 0.6 * inches * scale * span(vehicle)
@@ -159,11 +151,6 @@ def _draw(
     _draw_components(axes, places, thrust * arrow, arrow, plane)
     _draw_names(axes, shots.instants, places, thrust, 0.55 * scale * span(vehicle), columns)
     return scale
-
-
-def _least_step(places: Array) -> float:
-    """The least distance [m] from one place (k, 2) to the next."""
-    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).min(initial=np.inf))
 
 
 def _fit(axes: Axes, points: Array, pad: float, min_side: float, columns: tuple[float, float]) -> float:
@@ -198,7 +185,7 @@ def _draw_sums(axes: Axes, places: Array, sums: Array) -> None:
 def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plane: ManeuverPlane) -> None:
     """The thrust's components (k, 2) [in] as arrows from the vehicles, with keys; 1 m/s² is `unit` long."""
     size = size_of(axes)
-    key = max(KEYS[KEYS * unit <= KEY], default=KEYS[0])
+    key = max(KEYS[KEYS * unit <= 0.4], default=KEYS[0])  # [m/s²] of the longest arrow within 0.4 in
     names = (f"thrust along {plane.name}", "thrust along z")
     for part, colour, name, place in zip(COMPONENTS, (SKY, BLUE), names, (1.3, 3.05), strict=True):
         quiver = axes.quiver(
@@ -206,7 +193,7 @@ def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plan
             scale=1.0, width=0.024, headwidth=4.2, headlength=4.6, headaxislength=4.2, minlength=0, zorder=3,
         )  # fmt: skip
         axes.quiverkey(
-            quiver, 1.0 - place / size[0], 1.0 + KEY_HEIGHT / size[1], key * unit, f"{name}  {key:g} m/s²",
+            quiver, 1.0 - place / size[0], 1.0 + 0.38 / size[1], key * unit, f"{name}  {key:g} m/s²",
             labelpos="E", labelsep=0.06, labelcolor=INK, fontproperties={"size": SMALL}, coordinates="axes",
         )  # fmt: skip
 
@@ -263,7 +250,7 @@ def names_beside(places: Array, thrust: Array, size: Array, columns: tuple[float
     left = np.where(lateral == 0.0, off_centre < -1e-3 * size[0], lateral > 0.0) & (columns[0] > 0.0)
     anchors = np.where(left[:, None], [columns[0], 0.0], [size[0] - columns[1], 0.0])
     for side in (left, ~left):
-        anchors[side, 1] = spread_out(places[side, 1], PITCH_UP, 0.3, size[1] - 0.3)
+        anchors[side, 1] = spread_out(places[side, 1], 0.5, 0.3, size[1] - 0.3)
     return anchors
 
 

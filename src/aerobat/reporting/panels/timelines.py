@@ -22,24 +22,21 @@ from aerobat.vehicle import Vehicle
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ROWS = 200  # instants, at most, whose clearance is drawn
-DEEPEST = -0.25  # [m] that an overlap is shown
 NEAR, FAR = 0.5, 1e4  # [m] within which obstacles are looked for first, and at last
 SPIN_RAMPS = {1: ("#00315f", "#6fa3d4"), -1: ("#1c2b39", "#8b97a3")}  # dark to light, by the sense of turning
 LIMIT: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
 REACH = 1.0  # by how many times the limits' distance an axis extends beyond them, at most
 LENGTHS = (("m", 1.0), ("cm", 1e-2))
-FEW_ROTORS = 4  # whose names a legend has room for
 NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and by the letter
 
 
 def draw_clearance(axes: Axes, poses: PoseHistory, vehicle: Vehicle, pieces: Pieces) -> None:
     """Draw the distance of the body from the nearest obstacle over time, below zero where they overlap."""
-    rows = np.unique(np.linspace(0, len(poses.times) - 1, ROWS).round().astype(int))
+    rows = np.unique(np.linspace(0, len(poses.times) - 1, 200).round().astype(int))
     distances = clearances(poses.position[rows], poses.q_world_body[rows], vehicle, pieces, poses.times[rows])
     draw_series(axes, poses.times[rows], distances, INK)
     axes.axhline(0.0, color=FAINT, linewidth=0.8)
-    lowest = max(1.1 * float(distances.min()), DEEPEST)
+    lowest = max(1.1 * float(distances.min()), -0.25)  # of an overlap a quarter of a metre
     axes.set(ylabel="clearance [m]", ylim=(min(0.0, lowest), None))
 
 
@@ -100,9 +97,9 @@ def _shade_tube(axes: Axes, tube: Tube, bound: Array) -> None:
 
 def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicle) -> None:
     """Draw every rotor's thrust (..., T, n) [N], blue or grey by its sense of turning, and dashed limits."""
-    colours = rotor_colours(vehicle)
+    colours = rotor_colours(vehicle)  # a legend has room for the names of four
     for i, colour in enumerate(colours):
-        label = f"rotor {i}" if i == 0 or len(colours) <= FEW_ROTORS else f"{i}"
+        label = f"rotor {i}" if i == 0 or len(colours) <= 4 else f"{i}"
         draw_series(axes, times, thrusts[..., i], colour, width=1.0, label=label)
     limits = sorted({*vehicle.min_thrusts.tolist(), *vehicle.max_thrusts.tolist()})
     draw_limits(axes, limits, "limits")
