@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.viewer.document import PackedScene, packed
+from aerobat.viewer.document import packed
 from aerobat.viewer.scene import scene_of
 from browsers import open_browser
 from obstacle_cases import open_cruise, walled_cruise
 
 
-def numbers(scene: PackedScene, place: dict[str, Any]) -> np.ndarray:
-    return np.frombuffer(b64decode(scene.arrays), "<f4", place["length"], place["offset"])
+def numbers(scene: dict[str, Any], place: dict[str, Any]) -> np.ndarray:
+    return np.frombuffer(b64decode(scene["arrays"]), "<f4", place["length"], place["offset"])
 
 
 def test_a_page_has_the_triangles_and_edges_of_obstacles_and_walls() -> None:
@@ -24,7 +24,7 @@ def test_a_page_has_the_triangles_and_edges_of_obstacles_and_walls() -> None:
     names = {surface.name for surface in scene.surfaces}
     assert names == {"trunk", "sphere", "box", "the wall of gate"}
     page = packed(scene)
-    found = {key: numbers(page, place) for key, place in page.header["obstacles"].items()}
+    found = {key: numbers(page, place) for key, place in page["header"]["obstacles"].items()}
     triangles = np.concatenate([surface.triangles for surface in scene.surfaces])
     edges = np.concatenate([surface.edges for surface in scene.surfaces])
     assert found["triangles"] == pytest.approx(triangles.ravel(), abs=1e-6)
@@ -38,7 +38,7 @@ def test_a_flight_shows_the_walls_of_its_plan() -> None:
 
 
 def test_a_page_without_obstacles_draws_none() -> None:
-    assert packed(scene_of(open_cruise())).header["obstacles"]["triangles"]["length"] == 0
+    assert packed(scene_of(open_cruise()))["header"]["obstacles"]["triangles"]["length"] == 0
 
 
 @pytest.mark.browser

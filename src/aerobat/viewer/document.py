@@ -51,18 +51,10 @@ class Blob:
         return b64encode(b"".join(self.parts)).decode()
 
 
-@dataclass(frozen=True)
-class PackedScene:
-    """A scene as its page reads it."""
-
-    header: dict[str, Any]  # all but the arrays, and where they are
-    arrays: str  # Base64
-
-
-def packed(scene: Scene) -> PackedScene:
-    """The scene as its page reads it."""
+def packed(scene: Scene) -> dict[str, Any]:
+    """Return the scene as its page reads it: its arrays in Base64, and a header with all else."""
     blob = Blob()
-    return PackedScene(_header(scene, blob), str(blob))
+    return {"header": _header(scene, blob), "arrays": str(blob)}
 
 
 def document(scene: Scene, controls: Any = None) -> str:
@@ -73,8 +65,8 @@ def document(scene: Scene, controls: Any = None) -> str:
         "policy": OWN_ORIGIN if is_live else "; img-src data:",
         "style": _text("replay.css") + (_text("live.css") if is_live else ""),
         "panel": _text("live.html").replace("@@controls@@", _embedded(controls)) if is_live else "",
-        "header": _embedded(content.header),
-        "arrays": content.arrays,
+        "header": _embedded(content["header"]),
+        "arrays": content["arrays"],
         "three": _text("three.min.js"),
         "script": "\n".join(map(_text, (*SCRIPTS, "live.js") if is_live else SCRIPTS)),
     }

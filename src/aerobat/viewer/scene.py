@@ -223,15 +223,12 @@ def _facts(tracks: Sequence[Track], flight: Flight, plan: Plan | None) -> tuple[
     if plan is not None and plan.certificate is not None:
         planned.append("certified" if plan.certified else plan.certificate.why)
     failed = [track for track in tracks if track.failed]
+    went = tracks[0].sentence
     if len(tracks) > 1:
-        went = (
-            f"{len(failed)} of {len(tracks)} flights failed"
-            if failed
-            else f"all {len(tracks)} flights went well"
-        )
         worst = f"position error at most {length(float(flight.position_error[: len(tracks)].max()))}"
-        return (f"{went}, {worst}", ", ".join(planned)) if planned else (f"{went}, {worst}",)
-    return (tracks[0].sentence, ", ".join(planned)) if planned else (tracks[0].sentence,)
+        some = f"{len(failed)} of {len(tracks)} flights failed"
+        went = f"{some if failed else f'all {len(tracks)} flights went well'}, {worst}"
+    return (went, ", ".join(planned)) if planned else (went,)
 
 
 def _left_out(flight: Flight, rows: Rows, flights: int) -> Iterator[str]:

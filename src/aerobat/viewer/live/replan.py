@@ -47,7 +47,7 @@ class Answer:
 
     def record(self) -> dict[str, Any]:
         """Plain data for the page."""
-        shown = None if self.scene is None else asdict(packed(self.scene))
+        shown = None if self.scene is None else packed(self.scene)
         return {"verdict": asdict(self.verdict), "scene": shown}
 
 
