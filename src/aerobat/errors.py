@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import import_module
 from typing import Any
 
@@ -22,6 +22,14 @@ class Reason(str):
         made = super().__new__(cls, sentence)
         made.limits = tuple(dict.fromkeys(filter(None, limits)))
         return made
+
+
+def chain_of(error: BaseException) -> Iterator[BaseException]:
+    """Yield an error and those in whose handling it was raised, the latest first."""
+    following: BaseException | None = error
+    while following is not None:
+        yield following
+        following = following.__context__
 
 
 def limits_of(sentence: object) -> tuple[str, ...]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import re
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from enum import IntEnum
 
 from aerobat.cli.terminal import print_json, say
-from aerobat.errors import AerobatError, BackendMissing, Infeasible, OwnCodeError, SpecError
+from aerobat.errors import AerobatError, BackendMissing, Infeasible, OwnCodeError, SpecError, chain_of
 
 EXPLAIN = "add --explain to `aerobat plan` to try changes that would help"
 IMPORT_FLAG = "--import"
@@ -94,14 +94,6 @@ def of_plugins(error: BaseException, arguments: Sequence[str]) -> Failure | None
 
 def _field(error: AerobatError) -> str | None:
     """The field that an error is about: the outermost name of it, or the option that its sentence names."""
-    named = next((name for each in _chain(error) if (name := getattr(each, "field", ""))), None)
+    named = next((name for each in chain_of(error) if (name := getattr(each, "field", ""))), None)
     option = _FLAG.search(str(error))
     return named or (option and option[0]) or next(iter(error.limits), None)
-
-
-def _chain(error: BaseException) -> Iterator[BaseException]:
-    """The error and those in whose handling it was raised, the latest first."""
-    following: BaseException | None = error
-    while following is not None:
-        yield following
-        following = following.__context__

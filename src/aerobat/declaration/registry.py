@@ -15,9 +15,9 @@ from typing import Any, Generic, TypeVar
 
 from aerobat.declaration.declared import declared, from_table
 from aerobat.declaration.field_types import PathName
-from aerobat.declaration.sentences import FieldError, shown, unknown_name
+from aerobat.declaration.sentences import FieldError, shown, unknown_name, with_article
 from aerobat.declaration.validated import validated
-from aerobat.errors import SpecError
+from aerobat.errors import SpecError, chain_of
 
 T = TypeVar("T")
 
@@ -41,7 +41,7 @@ class Registry(Generic[T]):
     ) -> None:
         self._base = base
         self._noun = noun
-        self._one = f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+        self._one = with_article(noun)
         self._group = group
         self._modules = modules
         self._classes: dict[str, type[T]] = {}
@@ -73,10 +73,13 @@ class Registry(Generic[T]):
 
     def __getitem__(self, name: str) -> type[T]:
         """The class of that name. Raises SpecError, with the closest name, when there is none."""
-        self._import_own(name)
-        if name not in self._classes and name not in tuple(self):
+        if name not in self:
             raise unknown_name(self._noun, name, self)
         return self._classes[name]
+
+    def __contains__(self, name: str) -> bool:
+        self._import_own(name)
+        return name in self._classes or name in tuple(self)
 
     def __iter__(self) -> Iterator[str]:
         for name in self._modules:
@@ -97,9 +100,7 @@ class Registry(Generic[T]):
         if "kind" not in value:
             raise FieldError("kind", "is missing; add it")
         kind = value["kind"]
-        if isinstance(kind, str):
-            self._import_own(kind)
-        if not isinstance(kind, str) or (kind not in self._classes and kind not in tuple(self)):
+        if not isinstance(kind, str) or kind not in self:
             known = ", ".join(map(repr, self))
             own = f"your own, with --import FILE.py, or one of {known}"
             kinds = own if isinstance(kind, str) else known
@@ -213,10 +214,5 @@ def placed(error: SpecError, method: Any = None) -> SpecError:
 
 def passed_lines(error: BaseException) -> list[tuple[str, int]]:
     """Return the files and lines that an error came through, and those in whose handling it was raised."""
-    lines: list[tuple[str, int]] = []
-    following: BaseException | None = error
-    while following is not None:
-        frames = extract_tb(following.__traceback__)
-        lines += [(frame.filename, frame.lineno or 0) for frame in frames]
-        following = following.__context__
-    return lines
+    frames = (frame for each in chain_of(error) for frame in extract_tb(each.__traceback__))
+    return [(frame.filename, frame.lineno or 0) for frame in frames]

@@ -30,10 +30,10 @@ class PlannedPassage:
     def of(cls, stage: Stage, gate: Gate, time: float) -> PlannedPassage:
         """The passage that a stage of `Problem.stages` asks for, placed at a time [s]."""
         min_speed = 0.0 if any(_keeps_from(gate, each) for each in stage.conditions) else CROSSING_SPEED
-        if stage.attitude is None:
-            return cls(gate, time, gate.up, min_speed=min_speed, margin=stage.margin, lap=stage.lap)
-        asked = stage.attitude.up, gate.attitude_tolerance
-        return cls(gate, time, *asked, min_speed, stage.margin, stage.lap)
+        up, tolerance = gate.up, np.inf
+        if stage.attitude is not None:
+            up, tolerance = stage.attitude.up, gate.attitude_tolerance
+        return cls(gate, time, up, tolerance, min_speed, stage.margin, stage.lap)
 
 
 @declared
