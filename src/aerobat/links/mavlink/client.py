@@ -253,10 +253,9 @@ class Client:
 
     def _refuse(self, now: float, what: str, lands: bool = True) -> None:
         """Raise SpecError, with what ails the vehicle as it says, once it is on the ground."""
-        reason = ": " + "; ".join(self.link.complaints)
-        self._refusal = f"the vehicle does not {what}" + (
-            reason if self.link.complaints else "; its own ground station says why"
-        )
+        complaints = "; ".join(self.link.complaints)
+        reason = f": {complaints}" if complaints else "; its own ground station says why"
+        self._refusal = f"the vehicle does not {what}{reason}"
         if not lands:
             raise SpecError(self._refusal)
         self._land(now, f"the vehicle does not {what}")

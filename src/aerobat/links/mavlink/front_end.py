@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import degrees, isfinite, isnan, nan, pi
 from typing import Any
 
@@ -50,24 +50,25 @@ class FrontEnd:
             self.dialect.silence: POINT_TIMEOUT,
             **{name: float(setting.bits) for name, setting in self.dialect.settings.items()},
         }
-        self._streams: dict[int, tuple[Callable[[], MavlinkMessage], float]] = {
-            message.id: (make, interval)
-            for message, make, interval in (
-                (self._mavlink.MAVLink_heartbeat_message, self._heartbeat, 0.5),
-                (self._mavlink.MAVLink_sys_status_message, self._sys_status, 1.0),
-                (self._mavlink.MAVLink_extended_sys_state_message, self._extended_state, 0.2),
-                (self._mavlink.MAVLink_home_position_message, self._home, 1.0),
-                (self._mavlink.MAVLink_gps_raw_int_message, self._gps, 0.2),
-                (self._mavlink.MAVLink_local_position_ned_message, self._local_position, 0.02),
-                (self._mavlink.MAVLink_attitude_quaternion_message, self._attitude, 0.02),
-                (self._mavlink.MAVLink_global_position_int_message, self._global_position, 0.02),
-                (self._mavlink.MAVLink_odometry_message, self._odometry, nan),
+        # by the message's number: its name, its fields, and the interval [s], NaN until somebody asks for it
+        self._streams: dict[int, tuple[str, Callable[[], Sequence[Any]], float]] = {
+            self._kind(name).id: (name, fields, interval)
+            for name, fields, interval in (
+                ("heartbeat", self._heartbeat, 0.5),
+                ("sys_status", self._sys_status, 1.0),
+                ("extended_sys_state", self._extended_state, 0.2),
+                ("home_position", self._home, 1.0),
+                ("gps_raw_int", self._gps, 0.2),
+                ("local_position_ned", self._local_position, 0.02),
+                ("attitude_quaternion", self._attitude, 0.02),
+                ("global_position_int", self._global_position, 0.02),
+                ("odometry", self._odometry, nan),
             )
         }
         self._due = {
             identity: nan if isnan(interval) else self._began
-            for identity, (_, interval) in self._streams.items()
-        }  # [s] NaN for those that nobody has asked for
+            for identity, (_, _, interval) in self._streams.items()
+        }  # [s]
 
     def tick(self, now: float) -> None:
         """Go on to this time [s], take what has come, and send what is due."""
@@ -82,15 +83,19 @@ class FrontEnd:
             self._say(sentence)
             self._send("statustext", 4, sentence.encode()[:50])
         self.vehicle.told.clear()
-        for identity, (make, interval) in self._streams.items():
+        for identity, (name, fields, interval) in self._streams.items():
             if self._due[identity] <= now + 1e-9:
-                self._connection.send(make())
+                self._send(name, *fields())
                 self._due[identity] = max(self._due[identity] + interval, now)
 
-    def _send(self, name: str, *fields: Any) -> None:
-        self._connection.send(getattr(self._mavlink, f"MAVLink_{name}_message")(*fields))
+    def _kind(self, name: str) -> Any:
+        """The class of a message by its name in small letters."""
+        return getattr(self._mavlink, f"MAVLink_{name}_message")
 
-    # what is streamed
+    def _send(self, name: str, *fields: Any) -> None:
+        self._connection.send(self._kind(name)(*fields))
+
+    # the fields of what is streamed
 
     @property
     def _milliseconds(self) -> int:
@@ -100,19 +105,13 @@ class FrontEnd:
     def _microseconds(self) -> int:
         return round(1e6 * (self.vehicle.time - self._began))
 
-    def _heartbeat(self) -> MavlinkMessage:
+    def _heartbeat(self) -> Sequence[Any]:
         armed = ARMED if self.vehicle.armed else 0
         state = 4 if self.vehicle.armed else 3  # active, or on standby
         kinds = {4: 2, 6: 13, 8: 14}  # quadrotor, hexarotor, octorotor
         kind = kinds.get(len(self.vehicle.vehicle.rotors), 2)
-        return self._mavlink.MAVLink_heartbeat_message(
-            kind,
-            self.dialect.autopilot,
-            CUSTOM_MODE_ENABLED | armed,
-            self.dialect.custom_mode(self._mode),
-            state,
-            3,
-        )
+        mode = self.dialect.custom_mode(self._mode)
+        return kind, self.dialect.autopilot, CUSTOM_MODE_ENABLED | armed, mode, state, 3
 
     @property
     def _mode(self) -> Mode:
@@ -120,53 +119,42 @@ class FrontEnd:
         guided = self._guided and self.vehicle.mode in (Mode.HOLD, Mode.TAKEOFF)
         return Mode.OFFBOARD if guided else self.vehicle.mode
 
-    def _sys_status(self) -> MavlinkMessage:
+    def _sys_status(self) -> Sequence[Any]:
         sensors = 0x2F | 0x0C00 | 1 << 28  # gyro, accelerometer, magnetometer, GPS, control, may be armed
-        return self._mavlink.MAVLink_sys_status_message(
-            sensors, sensors, sensors, 100, 16000, -1, 100, 0, 0, 0, 0, 0, 0
-        )
+        return sensors, sensors, sensors, 100, 16000, -1, 100, 0, 0, 0, 0, 0, 0
 
-    def _extended_state(self) -> MavlinkMessage:
+    def _extended_state(self) -> Sequence[Any]:
         landed = 1 if self.vehicle.landed else {Mode.TAKEOFF: 3, Mode.LAND: 4}.get(self.vehicle.mode, 2)
-        return self._mavlink.MAVLink_extended_sys_state_message(0, landed)
+        return 0, landed
 
-    def _home(self) -> MavlinkMessage:
+    def _home(self) -> Sequence[Any]:
         latitude, longitude, altitude = to_global((0.0, 0.0, 0.0))
-        return self._mavlink.MAVLink_home_position_message(
-            latitude, longitude, round(1e3 * altitude), 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
-        )
+        upright = (1.0, 0.0, 0.0, 0.0)
+        return latitude, longitude, round(1e3 * altitude), 0.0, 0.0, 0.0, upright, 0.0, 0.0, 0.0
 
-    def _gps(self) -> MavlinkMessage:
+    def _gps(self) -> Sequence[Any]:
         latitude, longitude, altitude = to_global(self._position)
-        return self._mavlink.MAVLink_gps_raw_int_message(
-            self._microseconds, 3, latitude, longitude, round(1e3 * altitude), 100, 100, 0, 0, 12
-        )
+        return self._microseconds, 3, latitude, longitude, round(1e3 * altitude), 100, 100, 0, 0, 12
 
-    def _local_position(self) -> MavlinkMessage:
-        place, velocity = swap_world(self._position), swap_world(self._velocity)
-        return self._mavlink.MAVLink_local_position_ned_message(self._milliseconds, *place, *velocity)
+    def _local_position(self) -> Sequence[Any]:
+        return self._milliseconds, *swap_world(self._position), *swap_world(self._velocity)
 
-    def _attitude(self) -> MavlinkMessage:
+    def _attitude(self) -> Sequence[Any]:
         state = self.vehicle.state
-        q, rates = (
-            swap_attitude(tuple(state.q_world_body.tolist())),
-            swap_body(tuple(state.omega_body.tolist())),
-        )
-        return self._mavlink.MAVLink_attitude_quaternion_message(self._milliseconds, *q, *rates)
+        q = swap_attitude(tuple(state.q_world_body.tolist()))
+        return self._milliseconds, *q, *swap_body(tuple(state.omega_body.tolist()))
 
-    def _global_position(self) -> MavlinkMessage:
+    def _global_position(self) -> Sequence[Any]:
         latitude, longitude, altitude = to_global(self._position)
         velocity = (round(100 * v) for v in swap_world(self._velocity))
         heights = round(1e3 * altitude), round(1e3 * self._position[2])
-        return self._mavlink.MAVLink_global_position_int_message(
-            self._milliseconds, latitude, longitude, *heights, *velocity, self._heading
-        )
+        return self._milliseconds, latitude, longitude, *heights, *velocity, self._heading
 
-    def _odometry(self) -> MavlinkMessage:
+    def _odometry(self) -> Sequence[Any]:
         state = self.vehicle.state
         velocity = so3.unrotate(state.q_world_body, state.velocity)
         unknown = (nan, *(0.0,) * 20)
-        return self._mavlink.MAVLink_odometry_message(
+        return (
             self._microseconds,
             1,
             12,
@@ -281,32 +269,24 @@ class FrontEnd:
     def _set_interval(self, identity: int, microseconds: float) -> bool:
         if identity not in self._streams:
             return False
-        make, _ = self._streams[identity]
-        self._streams[identity] = (make, nan if microseconds < 0 else max(1e-6 * microseconds, 0.004))
+        name, fields, _ = self._streams[identity]
+        interval = nan if microseconds < 0 else max(1e-6 * microseconds, 0.004)
+        self._streams[identity] = name, fields, interval
         self._due[identity] = self.vehicle.time if microseconds >= 0 else nan
         return True
 
     def _give_message(self, identity: int) -> bool:
-        if identity == self._mavlink.MAVLink_autopilot_version_message.id:
+        if identity == self._kind("autopilot_version").id:
             capabilities = 64 | 128 | 8192 | 16384  # set-points in three ways, MAVLink 2
+            none = (0,) * 8
             self._send(
-                "autopilot_version",
-                capabilities,
-                self.dialect.firmware,
-                0,
-                0,
-                0,
-                (0,) * 8,
-                (0,) * 8,
-                (0,) * 8,
-                0,
-                0,
-                1,
+                "autopilot_version", capabilities, self.dialect.firmware, 0, 0, 0, none, none, none, 0, 0, 1
             )
             return True
         if identity not in self._streams:
             return False
-        self._connection.send(self._streams[identity][0]())
+        name, fields, _ = self._streams[identity]
+        self._send(name, *fields())
         return True
 
     def _take_set_position_target_local_ned(self, message: MavlinkMessage) -> None:
