@@ -235,7 +235,7 @@ def test_a_pilot_who_takes_over_is_not_interfered_with(name: str, pilots: int) -
     sky = over_a_link(name=name)
     sky.run_into_the_plan(0.05)
     sky.front_end._heartbeat = lambda: None  # type: ignore[method-assign]
-    beat = sky.front_end._mavlink.MAVLink_heartbeat_message(2, 12, 129, pilots, 4, 3)
+    beat = dialect().MAVLink_heartbeat_message(2, 12, 129, pilots, 4, 3)
     sent: list[str] = []
     sky.client.link._take_heartbeat(beat)
     sky.cable.send = lambda message: sent.append(message.get_type())  # type: ignore[method-assign]

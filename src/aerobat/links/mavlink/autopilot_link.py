@@ -12,7 +12,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.links.goals import AttitudeGoal, Mode, Observed, PositionGoal, observed
-from aerobat.links.mavlink.connection import Connection, MavlinkMessage, dialect
+from aerobat.links.mavlink.connection import Connection, MavlinkMessage, message_class
 from aerobat.links.mavlink.dialects import ARMED, CUSTOM_MODE_ENABLED, PX4, Dialect, dialect_of
 from aerobat.links.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
 
@@ -40,7 +40,6 @@ class AutopilotLink:
             say: what takes sentences that it sends, and those about states that are left out.
         """
         self._connection = connection
-        self._mavlink = dialect()
         self._wanted = system
         self._system: int | None = None  # of the autopilot, once it has answered
         self.systems: set[int] = set()  # of all autopilots that are heard
@@ -96,8 +95,7 @@ class AutopilotLink:
                 self._ask_time()
             if self.observed is None or now - self.observed.time > 1.0:
                 for name, every in self.dialect.states.items():
-                    kind = getattr(self._mavlink, f"MAVLink_{name.lower()}_message")
-                    self.command(511, kind.id, every * _INTERVAL)
+                    self.command(511, message_class(name.lower()).id, every * _INTERVAL)
         return seen
 
     def ask_parameter(self, name: str) -> None:
@@ -167,7 +165,7 @@ class AutopilotLink:
         return True
 
     def _send(self, name: str, *fields: Any) -> None:
-        self._connection.send(getattr(self._mavlink, f"MAVLink_{name}_message")(*fields))
+        self._connection.send(message_class(name)(*fields))
 
     def _take_heartbeat(self, message: MavlinkMessage) -> None:
         self.mode = self.dialect.mode_of(message.custom_mode)

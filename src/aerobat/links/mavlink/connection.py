@@ -49,6 +49,11 @@ def dialect() -> Any:
     return common
 
 
+def message_class(name: str) -> Any:
+    """The class of the dialect's messages of a name in small letters, as "param_value"."""
+    return getattr(dialect(), f"MAVLink_{name}_message")
+
+
 def connect(address: str, *, listen: bool, system: int, component: int = 1, baud: int = 57600) -> Connection:
     """Open a connection.
 

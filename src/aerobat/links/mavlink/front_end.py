@@ -11,7 +11,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.links.autopilot.vehicle import POINT_TIMEOUT, SimulatedVehicle
 from aerobat.links.goals import AttitudeGoal, Mode, PositionGoal, yaw_of
-from aerobat.links.mavlink.connection import Connection, MavlinkMessage, dialect
+from aerobat.links.mavlink.connection import Connection, MavlinkMessage, message_class
 from aerobat.links.mavlink.dialects import ARMED, CUSTOM_MODE_ENABLED, PX4, Dialect
 from aerobat.links.mavlink.frames import (
     from_global,
@@ -42,7 +42,6 @@ class FrontEnd:
         self._guided = False  # in ArduPilot's mode GUIDED, in which it holds where no set-points come
         self._say = say
         self._connection = connection
-        self._mavlink = dialect()
         self._began = vehicle.time
         self.parameters = {
             self.dialect.hover_thrust: vehicle.hover_fraction,
@@ -52,7 +51,7 @@ class FrontEnd:
         }
         # by the message's number: its name, its fields, and the interval [s], NaN until somebody asks for it
         self._streams: dict[int, tuple[str, Callable[[], Sequence[Any]], float]] = {
-            self._kind(name).id: (name, fields, interval)
+            message_class(name).id: (name, fields, interval)
             for name, fields, interval in (
                 ("heartbeat", self._heartbeat, 0.5),
                 ("sys_status", self._sys_status, 1.0),
@@ -88,12 +87,8 @@ class FrontEnd:
                 self._send(name, *fields())
                 self._due[identity] = max(self._due[identity] + interval, now)
 
-    def _kind(self, name: str) -> Any:
-        """The class of a message by its name in small letters."""
-        return getattr(self._mavlink, f"MAVLink_{name}_message")
-
     def _send(self, name: str, *fields: Any) -> None:
-        self._connection.send(self._kind(name)(*fields))
+        self._connection.send(message_class(name)(*fields))
 
     # the fields of what is streamed
 
@@ -276,7 +271,7 @@ class FrontEnd:
         return True
 
     def _give_message(self, identity: int) -> bool:
-        if identity == self._kind("autopilot_version").id:
+        if identity == message_class("autopilot_version").id:
             capabilities = 64 | 128 | 8192 | 16384  # set-points in three ways, MAVLink 2
             none = (0,) * 8
             self._send(
