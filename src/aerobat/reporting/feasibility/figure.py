@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
-NOT_NAMED = "no limit named"
 FILLS = {  # of cells without a plan that flies
     Feasibility.NOT_FLYABLE: RED,
     Feasibility.NO_PLAN: FAINT,
@@ -29,16 +28,7 @@ FILLS = {  # of cells without a plan that flies
     Feasibility.NO_ANSWER: PAPER,
 }
 WIDTH, HEIGHTS = 9.6, (2.6, 6.5)  # [in] of a grid: across the page, and as high as its rows ask
-CELL_HEIGHT = 0.5  # [in] of one of its cells, where that is within these heights
-TICK_WIDTH = 0.37  # [in] of a number under a grid
-LINE = 2.6  # [in] the height of a line's axes
 ROW = 0.2  # [in] of the legend
-BAR = 0.14  # [in] the width of the scale of durations
-DARK = 0.55  # of the scale of durations: from there letters are white
-WRITTEN = (0.42, 0.2)  # [in] a cell that holds a duration and a letter
-NARROW = (0.12, 0.14)  # [in] one that holds a letter
-MAX_LETTERS = 60  # that stand side by side above a line
-MAX_TICKS = 20
 
 
 @validated
@@ -69,8 +59,8 @@ def map_figure(found: FeasibilityMap) -> Figure:
 def _size(found: FeasibilityMap) -> tuple[float, float]:
     """Width and height of the axes [in]."""
     if len(found.axes) == 1:
-        return PAGE_WIDTH - COLUMNS[0] - MARGIN, LINE
-    return WIDTH, float(np.clip(CELL_HEIGHT * len(found.axes[0].values), *HEIGHTS))
+        return PAGE_WIDTH - COLUMNS[0] - MARGIN, 2.6
+    return WIDTH, float(np.clip(0.5 * len(found.axes[0].values), *HEIGHTS))
 
 
 def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
@@ -81,7 +71,7 @@ def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
     axes.imshow(colours.reshape(rows, columns, 4), origin="lower", aspect="auto", interpolation="nearest")
     for axis, set_ticks, set_label, size in (
         (found.axes[0], axes.set_yticks, axes.set_ylabel, _size(found)[1] / ROW),
-        (found.axes[1], axes.set_xticks, axes.set_xlabel, WIDTH / TICK_WIDTH),
+        (found.axes[1], axes.set_xticks, axes.set_xlabel, WIDTH / 0.37),
     ):
         step = max(1, int(np.ceil(len(axis.values) / size)))
         places = np.arange(0, len(axis.values), step)
@@ -99,7 +89,7 @@ def _write_cells(axes: Axes, found: FeasibilityMap, durations: Array) -> None:
     width, height = _size(found) / np.array([columns, len(found.axes[0].values)])
     for number, (cell, part) in enumerate(zip(found.cells, _parts(durations), strict=True)):
         row, column = divmod(number, columns)
-        is_dark = cell.is_planned and part > DARK
+        is_dark = cell.is_planned and part > 0.55  # of the scale: from there letters are white
         text = _cell_text(cell, letter_of(cell, kinds), width, height)
         axes.text(column, row, text, size=SMALL, ha="center", va="center", color=PAPER if is_dark else INK)
 
@@ -125,9 +115,9 @@ def _parts(durations: Array) -> Array:
 
 def _cell_text(cell: Cell, letter: str, width: float, height: float) -> str:
     """As much as a cell of that size [in] holds: its duration and letter, the letter alone, or nothing."""
-    if width >= WRITTEN[0] and height >= WRITTEN[1] and cell.duration is not None:
+    if width >= 0.42 and height >= 0.2 and cell.duration is not None:
         return f"{cell.duration:.2f} {letter}"
-    return letter if width >= NARROW[0] and height >= NARROW[1] else ""
+    return letter if width >= 0.12 and height >= 0.14 else ""
 
 
 def _draw_scale(figure: Figure, axes: Axes, scale: Colormap, durations: Array) -> None:
@@ -136,7 +126,7 @@ def _draw_scale(figure: Figure, axes: Axes, scale: Colormap, durations: Array) -
     from matplotlib.colors import Normalize
 
     box, across = axes.get_position(), float(figure.get_size_inches()[0])
-    side = figure.add_axes((box.x1 + 0.15 / across, box.y0, BAR / across, box.height))
+    side = figure.add_axes((box.x1 + 0.15 / across, box.y0, 0.14 / across, box.height))
     values = Normalize(float(np.nanmin(durations)), float(np.nanmax(durations)))
     figure.colorbar(ScalarMappable(values, scale), cax=side, label="duration [s]")
     side.grid(visible=False)
@@ -156,9 +146,9 @@ def _draw_line(axes: Axes, found: FeasibilityMap) -> None:
     for place, cell in zip(places, found.cells, strict=True):
         if not cell.is_planned:
             axes.axvspan(place - 0.5, place + 0.5, color=FILLS[cell.feasibility], linewidth=0.0)
-        if len(places) <= MAX_LETTERS:
+        if len(places) <= 60:  # so many letters stand side by side
             axes.text(float(place), 0.97 * top, letter_of(cell, kinds), size=SMALL, ha="center", va="top")
-    step = max(1, len(places) // MAX_TICKS)
+    step = max(1, len(places) // 20)
     axes.set_xticks(places[::step], [f"{value:g}" for value in axis.values[::step]])
     axes.set(xlabel=axis.label, ylabel="duration [s]")
 
@@ -176,7 +166,7 @@ class Kind:
     @property
     def name(self) -> str:
         """The name of the kind in a few words: its feasibility and the limits that bind."""
-        return f"{self.feasibility}: {', '.join(self.limits) or NOT_NAMED}"
+        return f"{self.feasibility}: {', '.join(self.limits) or 'no limit named'}"
 
 
 def kinds_of(found: FeasibilityMap) -> dict[tuple[Feasibility, tuple[str, ...]], Kind]:

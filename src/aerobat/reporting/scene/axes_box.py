@@ -23,8 +23,6 @@ ROUND = np.array([1.0, 2.0, 5.0])
 # [in] for the scales: left of a box and below it, right of it and above
 BOX_MARGINS = np.array([[0.5, 0.5], [0.3, 0.2]])
 NUMBERS = 0.15  # [in] from an edge to the numbers along it
-NAME_OFFSETS = np.array([0.3, 0.2])  # [in] from the numbers to the axis' name, to the side and up or down
-MIN_PITCH = 0.26  # [in] between the numbers of a scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +146,7 @@ def _scale(axes: Axes, box: AxesBox, camera: Camera, axis: int, per_metre: float
     places = camera.project(points)
     if len(ticks) > 1:
         pitch = max(float(np.linalg.norm(places[1] - places[0])) * per_metre, 1e-6)  # an axis seen end-on
-        keep = slice(None, None, max(1, int(np.ceil(MIN_PITCH / pitch))))
+        keep = slice(None, None, max(1, int(np.ceil(0.26 / pitch))))  # [in] between numbers
         places, ticks = places[keep], ticks[keep]
     for place, tick in zip(places + NUMBERS * outward / per_metre, ticks, strict=True):
         axes.text(place[0], place[1], f"{tick:g}".replace("-", "−"), size=SMALL, ha="center", va="center")
@@ -157,7 +155,7 @@ def _scale(axes: Axes, box: AxesBox, camera: Camera, axis: int, per_metre: float
         place = camera.project(edge) + np.array([-NUMBERS, NUMBERS]) / per_metre
     else:
         edge[axis] = (box.lower[axis] + box.upper[axis]) / 2
-        place = camera.project(edge) + (NUMBERS + NAME_OFFSETS) * outward / per_metre
+        place = camera.project(edge) + (NUMBERS + np.array([0.3, 0.2])) * outward / per_metre
     axes.text(place[0], place[1], f"{'xyz'[axis]} [m]", size=NORMAL, ha="center", va="center")
 
 

@@ -11,11 +11,6 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.problem.gate import Gate
 
-AZIMUTHS = np.deg2rad(np.arange(-180.0, 180.0, 5.0))
-ELEVATIONS = np.deg2rad([20.0, 27.0])
-OBLIQUE = 0.3  # the smallest horizontal component of a view that looks deep
-CUSTOMARY = np.deg2rad(-60.0)  # where a viewer stands when nothing speaks for another place: x to the right
-
 
 @dataclass(frozen=True)
 class Camera:
@@ -56,7 +51,8 @@ def best_view(path: Array, gates: Sequence[Gate], corners: Array, size: Array) -
         corners: Of the box that is fitted into the picture [m], (8, 3).
         size: The picture's width and height, (2,).
     """
-    cameras = [Camera(float(a), float(e)) for a in AZIMUTHS for e in ELEVATIONS]
+    azimuths, elevations = np.deg2rad(np.arange(-180.0, 180.0, 5.0)), np.deg2rad([20.0, 27.0])
+    cameras = [Camera(float(a), float(e)) for a in azimuths for e in elevations]
     scores = _spread(path, corners, size, cameras)
     scores *= _openness(gates, cameras) * _depth(cameras) * _custom(path, cameras)
     return cameras[int(np.argmax(scores))]
@@ -80,9 +76,9 @@ def _openness(gates: Sequence[Gate], cameras: list[Camera]) -> Array:
 
 
 def _depth(cameras: list[Camera]) -> Array:
-    """Views straight along a horizontal axis look flat, (cameras,)."""
+    """Views along a horizontal axis look flat; those across both axes by 0.3 or more deep, (cameras,)."""
     sideways = [np.abs(camera.toward[:2]).min() for camera in cameras]
-    return np.asarray(np.minimum(np.array(sideways) / OBLIQUE, 1.0) ** 0.5)
+    return np.asarray(np.minimum(np.array(sideways) / 0.3, 1.0) ** 0.5)
 
 
 def _custom(path: Array, cameras: list[Camera]) -> Array:
@@ -90,5 +86,5 @@ def _custom(path: Array, cameras: list[Camera]) -> Array:
     travel = path[-1] - path[0]
     travel = travel / max(float(np.linalg.norm(travel)), 1.0)
     onward = np.array([camera.screen[0] @ travel for camera in cameras])
-    customary = np.cos([camera.azimuth - CUSTOMARY for camera in cameras])
+    customary = np.cos([camera.azimuth - np.deg2rad(-60.0) for camera in cameras])  # with x to the right
     return np.asarray(1.0 + 0.15 * onward + 0.02 * customary)

@@ -17,10 +17,6 @@ from aerobat.vehicle import Vehicle
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 19)
 CIRCLE = np.stack([np.cos(TURN), np.sin(TURN), np.zeros_like(TURN)], axis=-1)
-AXIS_LENGTH = 0.45  # the length of a drawn thrust axis, as a fraction of the vehicle's span
-FRAME = 0.12  # the thickness of a gate's bars, as a fraction of the opening's shorter side
-EDGE_ON = 0.2  # a gate whose normal is this square to the view is seen edge-on
-MAST = 0.35  # the height of a rotor above its arm, as a fraction of the rotor's radius
 LIGHT = np.array([0.3, -0.5, 0.81])  # where light comes from in shaded pictures
 DARK, BRIGHT = "#8f6a12", "#f0c964"  # the darkest and the lightest side of a bar
 SEEN_FROM_ABOVE: Colour = (BLUE, 0.45)
@@ -62,7 +58,7 @@ def vehicle_shapes(
     """
     shapes, discs = [], []
     for rotor in vehicle.rotors:
-        top = rotor.position_body + np.array([0.0, 0.0, MAST * rotor.radius])
+        top = rotor.position_body + np.array([0.0, 0.0, 0.35 * rotor.radius])  # of a mast
         arm = np.array([[0.0, 0.0, 0.0], rotor.position_body, top])
         disc = top + rotor.radius * CIRCLE
         arm, disc = (position + scale * so3.rotate(q_world_body, part) for part in (arm, disc))
@@ -72,8 +68,8 @@ def vehicle_shapes(
 
 
 def thrust_axis_shape(vehicle: Vehicle, position: Array, q_world_body: Array, scale: float) -> Shape:
-    """A line from a vehicle along its thrust axis."""
-    tip = position + AXIS_LENGTH * scale * span(vehicle) * so3.thrust_axis(q_world_body)
+    """A line from a vehicle along its thrust axis, somewhat shorter than half the vehicle's span."""
+    tip = position + 0.45 * scale * span(vehicle) * so3.thrust_axis(q_world_body)
     return Shape(np.array([position, tip]), edge=INK, width=0.9)
 
 
@@ -109,7 +105,7 @@ def gate_bars(gate: Gate) -> list[Array]:
     The inner edges of the frame are the opening, `Gate.outline`; the bars lie outside it and are as deep
     as they are thick, half before the gate's plane and half behind.
     """
-    thickness = FRAME * float(gate.opening.size.min())
+    thickness = 0.12 * float(gate.opening.size.min())  # [m]
     inner, outer = gate.outline, gate.frame(thickness)
     depth = gate.normal * thickness / 2
     bars = []
@@ -137,7 +133,7 @@ def gate_shapes(gate: Gate) -> list[Shape]:
 
 def gate_section(gate: Gate, camera: Camera) -> list[Shape]:
     """A gate as `gate_shapes`; seen along its own plane, bars that would close the opening are pale."""
-    if abs(float(gate.normal @ camera.toward)) > EDGE_ON:
+    if abs(float(gate.normal @ camera.toward)) > 0.2:
         return gate_shapes(gate)
     shapes = []
     for bar in gate_bars(gate):

@@ -16,7 +16,6 @@ from aerobat.reporting.scene.shapes import Shape
 from aerobat.reporting.style import FAINT, MUTED
 
 GLASS, DARKEST = 0.42, 0.12  # opacity of a face that is turned from the light, and toward it
-LINE = 0.45  # opacity of a line at which faces meet
 CELLS = 12  # to which the longest side of what is shown is cut: each is before or behind a path as a whole
 
 
@@ -59,7 +58,7 @@ def _surface_shapes(surface: Surface, camera: Camera, cell: float) -> Iterator[S
             yield Shape(part, face=glass)
     for edge in surface.edges:
         for part in _cells(edge, cell):
-            yield Shape(part, edge=(FAINT, LINE), width=0.7)
+            yield Shape(part, edge=(FAINT, 0.45), width=0.7)
 
 
 def _cells(corners: Array, cell: float) -> list[Array]:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import PolyCollection
 
 Colour = str | tuple[str, float]  # a name, or a name and its opacity
-NOTHING = "none"
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +23,8 @@ class Shape:
     """A flat polygon, or a line when it has no face."""
 
     points: Array  # [m] world, (n, 3)
-    face: Colour = NOTHING
-    edge: Colour = NOTHING
+    face: Colour = "none"
+    edge: Colour = "none"
     width: float = 0.0  # [pt] of the edge
     depth_bias: float = 0.0  # [m] toward the viewer, for the order of drawing only
 
