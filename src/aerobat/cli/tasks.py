@@ -151,12 +151,13 @@ def plan_of(record: RunRecord, explain: bool = False, workers: str | None = None
         explain: Whether what takes seconds to know is found out too.
         workers: Who flies what tells whether flights pass.
     """
-    assert record.planner is not None, "a plan that came from a file is not made"
+    planner = record.planner
+    assert planner is not None, "a plan that came from a file is not made"
     if record.flight.probability is not None:
-        found = _plan_that_passes(record, workers)
+        found = _plan_that_passes(record, planner, workers)
         return with_explanation(found) if explain else found
     try:
-        return _plan_made(record, explain)
+        return _plan_made(record, planner, explain)
     except Infeasible as refusal:
         if not explain:
             raise
@@ -177,32 +178,30 @@ def _advice(record: RunRecord, refusal: Infeasible) -> str:
         return explained(refusal, task, note).advice
 
 
-def _plan_made(record: RunRecord, explain: bool) -> Plan:
+def _plan_made(record: RunRecord, planner: Planner, explain: bool) -> Plan:
     """The plan that the run's planner finds."""
-    assert record.planner is not None, "a plan that came from a file is not made"
-    limit = getattr(record.planner, "time_limit", None)
+    limit = getattr(planner, "time_limit", None)
     with showing(PlanningProgress(record.planner_name)) as progress, within_time(limit):
         if record.paper:  # without a vehicle; whether this one can fly it is told all the same
-            found = plan(record.problem, record.planner, progress=progress.record, vehicle=None)
+            found = plan(record.problem, planner, progress=progress.record, vehicle=None)
             found = found.for_vehicle(record.vehicle)
         else:
-            found = plan(record.problem, record.planner, record.vehicle, progress.record)
-            found = _steadied(found, record, progress.record)
+            found = plan(record.problem, planner, record.vehicle, progress.record)
+            found = _steadied(found, record, planner, progress.record)
         return with_explanation(found, progress.record) if explain else found
 
 
-def _steadied(found: Plan, record: RunRecord, progress: Callable[[Attempt], None]) -> Plan:
+def _steadied(found: Plan, record: RunRecord, planner: Planner, progress: Callable[[Attempt], None]) -> Plan:
     """The plan, or one as fast of which more flights succeed under the run's conditions, or a lab's."""
     from aerobat.studies.passing import steadied
 
-    assert record.planner is not None, "a plan that came from a file is not made"
     flight = record.flight
     conditions = flight.conditions
     if conditions is None or conditions == load_dispersion("none"):
         conditions = load_dispersion(USUAL_CONDITIONS)
     return steadied(
         found,
-        record.planner,
+        planner,
         conditions,
         seed=flight.seed,
         controller=flight.controller,
@@ -210,10 +209,9 @@ def _steadied(found: Plan, record: RunRecord, progress: Callable[[Attempt], None
     )
 
 
-def _plan_that_passes(record: RunRecord, workers: str | None) -> Plan:
+def _plan_that_passes(record: RunRecord, planner: Planner, workers: str | None) -> Plan:
     """The plan of a run that is tightened until flights pass."""
     flight = record.flight
-    assert record.planner is not None, "a plan that came from a file is not made"
     assert flight.probability is not None, "a probability is asked"
     assert flight.conditions is not None, "with conditions"
     if record.paper:
@@ -223,7 +221,7 @@ def _plan_that_passes(record: RunRecord, workers: str | None) -> Plan:
     with showing(PlanningProgress(record.planner_name)) as progress:
         return plan_to_pass(
             record.problem,
-            record.planner,
+            planner,
             record.vehicle,
             probability=flight.probability,
             conditions=flight.conditions,

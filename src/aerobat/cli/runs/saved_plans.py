@@ -36,9 +36,8 @@ def read_saved_plan(path: Path, options: PlanningOptions) -> Plan:
 
     Raises SpecError for options that plan anew.
     """
-    for name in ("planner", "paper", "angle", *(option_name(flag) for flag in offered_options())):
-        if is_given(getattr(options, name, None)):
-            flag = "--" + name.replace("_", "-")
+    for flag in ("--planner", "--paper", "--angle", *offered_options()):
+        if is_given(getattr(options, option_name(flag), None)):
             raise SpecError(f"{flag} plans anew, but {path} is a plan; leave it out, or name a problem")
     found, facts = read_source(path, options.rate or 100.0)
     if isinstance(found, Trajectory):
