@@ -216,5 +216,5 @@ def _rate(times: Array, values: Array) -> Array:
 
 def _turning(times: Array, q: NDArray[np.float64]) -> Array:
     """The body rates [rad/s] between attitudes, (T, 3), the first one twice."""
-    turns = so3.log(so3.multiply(so3.conjugate(q[:-1]), q[1:])) / np.diff(times)[:, None]
+    turns = so3.box_minus(q[1:], q[:-1]) / np.diff(times)[:, None]
     return np.concatenate([turns[:1], turns])

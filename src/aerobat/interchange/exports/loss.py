@@ -116,7 +116,7 @@ class ExportRows:
         instants = times[:-1, None] + s * np.diff(times)[:, None]
         planned = attitudes(plan, instants.ravel()).reshape(*instants.shape, 4)
         first = q[:-1, None]
-        turn = so3.log(so3.multiply(so3.conjugate(q[:-1]), q[1:]))
+        turn = so3.box_minus(q[1:], q[:-1])
         read = first if held else so3.multiply(first, so3.exp(s[:, None] * turn[:, None]))
         return peak_angles(planned, np.broadcast_to(read, planned.shape))
 
