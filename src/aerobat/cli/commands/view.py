@@ -64,7 +64,7 @@ class LiveOptions:
     """Serve a page with sliders, at which the maneuver is planned and flown anew, until Ctrl-C."""
 
     planner: Annotated[str | None, Parameter(group=serving)] = None
-    """The planner. Default: that of a plan, else miqp."""
+    """The planner. Default: that of a plan, else what suits the problem."""
 
     conditions: Annotated[str | None, Parameter(group=serving)] = None
     """The variation from flight to flight where the dispersion is 1: none, lab, field, or a TOML file.

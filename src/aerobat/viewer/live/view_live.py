@@ -81,7 +81,7 @@ def view_live(
 
     Args:
         shown: What is planned, or its name, or a plan to begin with.
-        planner: How to plan, or its name; by default a plan's own of its order, else miqp.
+        planner: How to plan, or its name; by default a plan's own, else what suits the problem.
         vehicle: What flies, or its name; by default a plan's own, else agile-quad.
         conditions: What varies from flight to flight, or its name; the slider multiplies it, from 0.
         port: Of 127.0.0.1; 0 for any that is free.
