@@ -2,19 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
-from typing import TypeVar
-
 import numpy as np
 
-from aerobat.errors import SpecError
-from aerobat.planning.recorder import Progress
-from aerobat.planning.result import Plan
-from aerobat.problem import Problem, Stage, StageSequence
-from aerobat.vehicle import Vehicle
-
-P = TypeVar("P")
+from aerobat.problem import Stage, StageSequence
 
 COURSE_STAGES = 6  # that say where they are: from so many on a path through them is the start
 POINTS = 4  # gates and waypoints alone, likewise
@@ -43,22 +33,3 @@ def is_placed_in_windows(sequence: StageSequence) -> bool:
     """True of sequences in order through more places than are searched at once."""
     places = sum(stage.is_placed for stage in sequence.stages)
     return sequence.ordered and places > MAX_EXACT_PLACES
-
-
-def on_open_courses(
-    name: str, method: Callable[[P, Problem, Vehicle | None, Progress | None], Plan]
-) -> Callable[[P, Problem, Vehicle | None, Progress | None], Plan]:
-    """The method `plan` of the planner of that name, which refuses closed courses in a sentence."""
-
-    @wraps(method)
-    def plan(
-        self: P, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
-    ) -> Plan:
-        if not problem.ends:
-            raise SpecError(
-                f"maneuver.closed: the {name} planner goes from a start to a goal, a closed course has "
-                "neither; take free-knots"
-            )
-        return method(self, problem, vehicle, progress)
-
-    return plan

@@ -6,7 +6,7 @@ other, and the planner of each part nothing of rests.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import wraps
 from typing import Annotated, Any, TypeVar
@@ -21,13 +21,12 @@ from aerobat.flatness import reference
 from aerobat.optimization.deadline import within_time
 from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Progress
-from aerobat.planning.result import Plan
+from aerobat.planning.result import Plan, PlanMethod
 from aerobat.problem import Gate, Heading, Maneuver, Problem, Stage, StageSequence, at_rest
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 P = TypeVar("P")
-PlanMethod = Callable[[P, Problem, Vehicle | None, Progress | None], Plan]
 
 
 def between_holds(method: PlanMethod[P]) -> PlanMethod[P]:

@@ -7,7 +7,7 @@ later or sooner, and its certificate says whether it passes them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import wraps
 from typing import TypeVar
@@ -18,7 +18,7 @@ from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.optimization.deadline import within_time
 from aerobat.planning.passages import as_passed
 from aerobat.planning.recorder import Progress
-from aerobat.planning.result import Plan
+from aerobat.planning.result import Plan, PlanMethod
 from aerobat.problem import Gate, Problem
 from aerobat.problem.planned_passage import CROSSING_SPEED
 from aerobat.trajectory import Trajectory
@@ -30,9 +30,7 @@ SETTLED = 5e-3  # [m] from where a gate is planned to where it is passed: planne
 STEPS = 6  # of Newton's method
 
 
-def through_moving_gates(
-    method: Callable[[P, Problem, Vehicle | None, Progress | None], Plan],
-) -> Callable[[P, Problem, Vehicle | None, Progress | None], Plan]:
+def through_moving_gates(method: PlanMethod[P]) -> PlanMethod[P]:
     """A planner's method `plan` that plans, where gates move, through where they are when they are passed."""
 
     @wraps(method)

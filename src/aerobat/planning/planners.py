@@ -19,13 +19,13 @@ from pydantic import Field
 from aerobat.declaration import Label, Registry, placed, shown, suggest_for, validated
 from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.planning.assessment.contradiction import contradiction
-from aerobat.planning.courses import is_course, on_open_courses
+from aerobat.planning.courses import is_course
 from aerobat.planning.heading.follow import with_heading
 from aerobat.planning.holds import between_holds
 from aerobat.planning.moving_gates import through_moving_gates
 from aerobat.planning.passages import require_clear_ends, require_openings
 from aerobat.planning.recorder import Progress
-from aerobat.planning.result import FLYING_RESERVE, Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan, PlanMethod
 from aerobat.problem import Problem, as_problem
 from aerobat.problem.heading import HeadingMode
 from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
@@ -203,23 +203,33 @@ def planner(name: Label) -> Callable[[type[P]], type[P]]:
     def register(cls: type[P]) -> type[P]:
         if "plan" in vars(cls):
             planning: Any = cls
-            method = _on_one_thread(through_moving_gates(between_holds(cls.plan)))
-            closes = getattr(cls, "PLANS_CLOSED_COURSES", False)
-            planning.plan = validated(method if closes else on_open_courses(name, method))
+            planning.plan = validated(_for_all_problems(name, cls))
         return cast(type[P], PLANNERS.add(name, cls))
 
     return register
 
 
-def _on_one_thread(method: Callable[..., Plan]) -> Callable[..., Plan]:
-    """A planner's method `plan`, whose matrices are small, with its linear algebra on one thread."""
+def _for_all_problems(name: str, cls: type[P]) -> PlanMethod[P]:
+    """The method `plan` of a planner's class, of problems with rests and moving gates too.
 
-    @wraps(method)
-    def plan(*args: Any, **kwargs: Any) -> Plan:
+    Closed courses are left to planners that know them. Matrices are small: one thread does linear algebra.
+    """
+    planned = through_moving_gates(between_holds(cls.plan))
+    knows_closed_courses = getattr(cls, "PLANS_CLOSED_COURSES", False)
+
+    @wraps(cls.plan)
+    def plan(
+        self: P, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
+    ) -> Plan:
+        if not (problem.ends or knows_closed_courses):
+            raise SpecError(
+                f"maneuver.closed: the {name} planner goes from a start to a goal, a closed course has "
+                "neither; take free-knots"
+            )
         from aerobat.optimization.threads import one_thread  # SciPy is imported when something is planned
 
         with one_thread():
-            return method(*args, **kwargs)
+            return planned(self, problem, vehicle, progress)
 
     return plan
 

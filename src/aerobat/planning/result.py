@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,7 +14,7 @@ from aerobat.planning.assessment.assessment import Assessment, SecondOpinion
 from aerobat.planning.evidence import Evidence
 from aerobat.planning.flyability import Flyability
 from aerobat.planning.passages import PlacedStage
-from aerobat.planning.recorder import Attempt
+from aerobat.planning.recorder import Attempt, Progress
 from aerobat.planning.rotor_margin import RotorMargin, reserve_shortfalls
 from aerobat.planning.task import Task
 from aerobat.planning.tube import Tube
@@ -192,6 +194,10 @@ class Plan:
             f"{self.problem.name}: {self.duration:.3f} s in {self.pieces}{dt}, {self.status} by "
             f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{given_up}{assessed}{rescue}{tube}"
         )
+
+
+P = TypeVar("P")
+PlanMethod = Callable[[P, Problem, Vehicle | None, Progress | None], Plan]  # `plan` of a planner P
 
 
 @validated
