@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -40,10 +41,13 @@ class WarmStart:
     @classmethod
     def of(cls, plan: Plan, sequence: StageSequence) -> WarmStart:
         """A plan's trajectory, and the order of the sequence's stages in it if it leaves that open."""
-        times = [placed.time for placed in plan.stages]
+        return cls.through(plan.trajectory, sequence.stages, [placed.time for placed in plan.stages])
+
+    @classmethod
+    def through(cls, trajectory: Trajectory, stages: Sequence[Stage], times: Sequence[float]) -> WarmStart:
+        """A trajectory through stages at times [s] in any order."""
         order = sorted(range(len(times)), key=times.__getitem__)
-        stages = tuple(sequence.stages[i] for i in order)
-        return cls(plan.trajectory, stages, tuple(times[i] for i in order))
+        return cls(trajectory, tuple(stages[i] for i in order), tuple(times[i] for i in order))
 
     @property
     def phases(self) -> Array:

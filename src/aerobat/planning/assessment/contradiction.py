@@ -41,7 +41,7 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
     balance = force_balance(problem.environment, vehicle)
     for stage in problem.stages(vehicle.max_specific_thrust, vehicle.body_radius).stages:
         asked = [c.bound(balance) for c in _linear(stage)]
-        if asked and not _is_possible(asked, problem.path_limits):
+        if asked and not is_possible(asked, problem.path_limits):
             return _contradiction(stage, asked, problem.path_limits)
         tilt, most = _least_tilt(stage), problem.limits.max_tilt
         if tilt > most + ROUNDING:
@@ -66,9 +66,9 @@ def _linear(stage: Stage) -> list[Condition]:
 
 
 def _contradiction(stage: Stage, asked: list[LinearBound], limits: Limits) -> Contradiction:
-    binding = [k for k in range(KNOWN) if _is_possible(asked, limits.without(k))]
+    binding = [k for k in range(KNOWN) if is_possible(asked, limits.without(k))]
     names = tuple(f"limits.{DERIVATIVES[k]}" if k else "limits.lower and limits.upper" for k in binding)
-    if not _is_possible(asked, Limits()):
+    if not is_possible(asked, Limits()):
         sentence = (
             f"the conditions of the stage '{stage.name}' exclude each other; change or drop one of them"
         )
@@ -89,8 +89,8 @@ def _told(derivative: int, name: str, limits: Limits) -> str:
     return f"{name} ({np.min(limits.of(derivative)[1]):g} {UNITS[derivative]})"
 
 
-def _is_possible(asked: list[LinearBound], limits: Limits) -> bool:
-    """False where no position, velocity and acceleration within the limits are as they are asked."""
+def is_possible(asked: list[LinearBound], limits: Limits) -> bool:
+    """Return False where no position, velocity and acceleration within the limits are as they are asked."""
     boxes = [limits.of(derivative) for derivative in range(KNOWN)]
     lower, upper = (np.concatenate([box[side] for box in boxes]) for side in (0, 1))
     bounded = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))

@@ -13,7 +13,7 @@ from aerobat.planning.courses import is_placed_in_windows
 from aerobat.planning.miqp.diagnosis import NOT_CONVERGED, OUT_OF_TIME
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import INPUT_NAMES
-from aerobat.planning.passages import PlacedStage, place_stages
+from aerobat.planning.passages import place_stages
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
@@ -34,6 +34,10 @@ class Placement:
     answer: AssignmentResult
     dt: float  # [s]
 
+    def times(self, trajectory: Trajectory) -> list[float]:
+        """The times [s] at which its path passes the stages."""
+        return [float(trajectory.knots[slot + 1]) for slot in self.answer.slots or ()]
+
 
 @dataclass
 class Attempts:
@@ -44,8 +48,8 @@ class Attempts:
     recorder: Recorder
     slots: tuple[int, ...] | None = None  # of the last solution: where the next solve begins
 
-    def solve(self, dt: float, node_limit: int | None = None) -> AssignmentResult:
-        """The paper's program at one dt; solved exactly where neither time nor nodes are limited.
+    def solve(self, dt: float, node_limit: int | None = None) -> Placement:
+        """The answer of the paper's program at one dt, exact where neither time nor nodes are limited.
 
         Courses of more gates than are searched at once have their stages placed in windows that move along.
         """
@@ -57,7 +61,7 @@ class Attempts:
             answer = self.solver.solve(program, node_limit=limit, start=self.slots)
             answer = improved_in_windows(program, answer, self.slots)
         self.slots = answer.slots or self.slots
-        return answer
+        return Placement(answer, dt)
 
     @property
     def task(self) -> Task:
@@ -91,7 +95,7 @@ class Attempts:
         solution = Solution(
             source=placement,
             duration=dt * self.formulation.chain.intervals,
-            trajectory=self.trajectory(answer, dt) if solved else None,
+            trajectory=self.trajectory(placement) if solved else None,
             status=answer.status,
             nodes=answer.nodes,
             solve_time=answer.time,
@@ -102,28 +106,41 @@ class Attempts:
         )
         return judge(solution, self.task, self.recorder, self.jumps)
 
-    def path(self, placement: Placement) -> WarmStart:
-        """The path of an answer, with the stages in their order."""
-        trajectory, slots = self.trajectory(placement.answer, placement.dt), placement.answer.slots or ()
-        times = [float(trajectory.knots[slot + 1]) for slot in slots]
-        order = sorted(range(len(times)), key=times.__getitem__)
-        stages = tuple(self.task.stages.stages[i] for i in order)
-        return WarmStart(trajectory, stages, tuple(times[i] for i in order))
+    def certified(self, dt: float) -> Judged[Placement] | None:
+        """The certified answer at one dt; None where it is not certified, or no time is left."""
+        if self.is_over:
+            return None
+        judged = self.judge(self.solve(dt))
+        return judged if judged.feasible else None
 
-    def trajectory(self, answer: AssignmentResult, dt: float) -> Trajectory:
-        """An answer's path."""
-        formulation = self.formulation
+    def trajectory(self, placement: Placement) -> Trajectory:
+        """The path of an answer."""
+        formulation, answer, dt = self.formulation, placement.answer, placement.dt
         assert answer.x is not None
         return Trajectory.from_inputs(
             formulation.initial, formulation.inputs(answer.x, dt), dt, formulation.problem.heading.start
         )
 
-    def placed(self, judged: Judged[Placement]) -> tuple[PlacedStage, ...]:
-        """When a path passes its stages."""
-        trajectory, slots = judged.solution.trajectory, judged.solution.source.answer.slots or ()
+    def path(self, placement: Placement) -> WarmStart:
+        """The path of an answer, with the stages in their order."""
+        trajectory = self.trajectory(placement)
+        return WarmStart.through(trajectory, self.task.stages.stages, placement.times(trajectory))
+
+    def plan(self, judged: Judged[Placement], backend: str) -> Plan:
+        """The plan of a program's own answer, with the bound on its cost."""
+        placement, trajectory = judged.solution.source, judged.solution.trajectory
         assert trajectory is not None
-        times = [float(trajectory.knots[slot + 1]) for slot in slots]
-        return place_stages(self.formulation.sequence.stages, slots, times)
+        answer, times = placement.answer, placement.times(trajectory)
+        return judged.plan(
+            self.recorder,
+            planner="miqp",
+            order=self.formulation.chain.order,
+            status=judged.solution.status,
+            backend=backend,
+            stages=place_stages(self.formulation.sequence.stages, answer.slots or (), times),
+            bound=self.formulation.cost(answer.bound, placement.dt),
+            gap=answer.gap,
+        )
 
 
 def _why_unsolved(answer: AssignmentResult) -> str:
@@ -141,19 +158,3 @@ def default_order(problem: Problem, vehicle: Vehicle | None) -> int:
     """The lowest order that is flyable, and whose input the problem's limits bound or leave alone."""
     limited = [k for k in INPUT_NAMES if np.isfinite(problem.limits.of(k)[1]).any()]
     return max([flyable_order(vehicle), *limited])
-
-
-def plan_of(attempts: Attempts, judged: Judged[Placement], backend: str) -> Plan:
-    """The plan of a program's own answer, with the bound on its cost."""
-    placement = judged.solution.source
-    answer = placement.answer
-    return judged.plan(
-        attempts.recorder,
-        planner="miqp",
-        order=attempts.formulation.chain.order,
-        status=judged.solution.status,
-        backend=backend,
-        stages=attempts.placed(judged),
-        bound=attempts.formulation.cost(answer.bound, placement.dt),
-        gap=answer.gap,
-    )

@@ -170,7 +170,9 @@ class Formulation:
 
     @cached_property
     def _limits(self) -> tuple[Array, Array]:
-        return _columns(self._rows)
+        """The lower and the upper limits of all rows in SI units, (m,) each."""
+        bounds = np.array(list(self._rows.values())).reshape(-1, 2)
+        return bounds[:, 0], bounds[:, 1]
 
     @cached_property
     def _matrix(self) -> Array:
@@ -238,9 +240,3 @@ class Formulation:
         stage, rows, bounds = self.sequence.stages[i], self._stage_rows[i], self._stage_bounds[i]
         lower, upper = (bounds[:, side] * scale[rows] - free[rows] for side in (0, 1))
         return SlottedStage(stage.name, tuple(self._slots(stage)), rows, lower, upper)
-
-
-def _columns(rows: dict[Row, tuple[float, float]]) -> tuple[Array, Array]:
-    """The lower and the upper bounds of rows, (m,) each."""
-    bounds = np.array(list(rows.values())).reshape(-1, 2)
-    return bounds[:, 0], bounds[:, 1]

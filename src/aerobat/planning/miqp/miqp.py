@@ -12,11 +12,12 @@ from pydantic import Field
 
 from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.errors import Infeasible, Reason
-from aerobat.optimization import AssignmentProgram, solver
+from aerobat.optimization import solver
 from aerobat.optimization.deadline import out_of_time, within_time
+from aerobat.planning.assessment.contradiction import is_possible
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.certified_solve import Judged
-from aerobat.planning.miqp.attempts import COURSE_SCAN_NODES, Attempts, Placement, default_order, plan_of
+from aerobat.planning.miqp.attempts import COURSE_SCAN_NODES, Attempts, Placement, default_order
 from aerobat.planning.miqp.diagnosis import leg_without_room, why_infeasible
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
@@ -31,7 +32,7 @@ from aerobat.planning.search import GridSearch, Search
 from aerobat.planning.task import Task
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
 from aerobat.planning.warm_start import CLEARANCE, Clearance, Reserve
-from aerobat.problem.problem import Problem
+from aerobat.problem.problem import Limits, Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
@@ -101,32 +102,25 @@ class Miqp(Planner):
                 why = Reason(f"{infeasible.sentence}; {rescue}", infeasible.limits)
                 raise Infeasible(why, infeasible.attempts) from None
 
-    @property
-    def _quicker(self) -> str:
-        """What takes less time, in words."""
-        if self.backend == "builtin":
-            return "use fewer intervals"
-        return "take the backend builtin, which is quicker"
-
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = default_order(problem, vehicle) if self.order is None else self.order
         task = Task.of(problem, vehicle, self.reserve, self.clearance)
         formulation = formulate(task, order, self.intervals)
         attempts = Attempts(formulation, solver(self.backend), recorder)
         if vehicle is None or self.search is not None:
-            found = (self.search or GridSearch()).smallest(partial(_attempt, attempts))
+            found = (self.search or GridSearch()).smallest(attempts.certified)
         else:
             first = duration_lower_bound(problem, vehicle) / self.intervals
             leg = leg_without_room(formulation, first)
             if leg is not None:
-                attempts.judge(Placement(attempts.solve(first, COURSE_SCAN_NODES), first))
+                attempts.judge(attempts.solve(first, COURSE_SCAN_NODES))
                 raise Infeasible(leg, recorder.attempts)
             least = least_duration(problem, vehicle)
             last = max(4.0, 2.0 * first, 2.0 * least / self.intervals)
             return self._refined(attempts, (first, last), least)
         if found is None:
             raise self._nothing_found(attempts)
-        return plan_of(attempts, found, self.backend)
+        return attempts.plan(found, self.backend)
 
     def _refined(self, attempts: Attempts, scanned: tuple[float, float], least: float) -> Plan:
         """The plan of the shortest path from programs along a scan on dt.
@@ -147,7 +141,7 @@ class Miqp(Planner):
         if found is None:
             raise self._nothing_found(attempts)
         if isinstance(found.solution.source, Placement):
-            return plan_of(attempts, found, self.backend)
+            return attempts.plan(found, self.backend)
         if self.flies:
             found = FlownPath.of(refinement, found).through_gates().with_reserves().judged
         return found.plan(
@@ -163,16 +157,11 @@ class Miqp(Planner):
         """The refusal: too little time, or the bound that binds."""
         made = tuple(attempts.recorder.attempts)
         if out_of_time():
-            return too_short(attempts.task.problem, self.time_limit, made, self._quicker)
+            quicker = "take the backend builtin, which is quicker"
+            if self.backend == "builtin":
+                quicker = "use fewer intervals"
+            return too_short(attempts.task.problem, self.time_limit, made, quicker)
         return Infeasible(partial(why_infeasible, attempts.formulation, made), made)
-
-
-def _attempt(attempts: Attempts, dt: float) -> Judged[Placement] | None:
-    """Outcome of one dt; None where its program's path is not certified, or no time is left."""
-    if attempts.is_over:
-        return None
-    judged = attempts.judge(Placement(attempts.solve(dt), dt))
-    return judged if judged.feasible else None
 
 
 def formulate(task: Task, order: int, intervals: int) -> Formulation:
@@ -195,16 +184,7 @@ def _check_stages(task: Task) -> None:
     """Refuse a stage whose own conditions exclude each other, at whatever time."""
     for stage in task.stages.linear.stages:
         bounds = [condition.bound(task.balance) for condition in stage.conditions]
-        if not bounds:
-            continue
-        instant = AssignmentProgram(
-            equality=np.zeros((0, 9)),
-            target=np.zeros(0),
-            rows=np.array([bound.weights.ravel() for bound in bounds]),
-            lower=np.array([bound.limits[0] for bound in bounds]),
-            upper=np.array([bound.limits[1] for bound in bounds]),
-        )
-        if solver("builtin").solve(instant).status == "infeasible":
+        if bounds and not is_possible(bounds, Limits()):
             sentence = (
                 f"the conditions of the stage '{stage.name}' exclude each other: no position, velocity and "
                 "acceleration satisfies them all; change or drop one of them"

@@ -134,7 +134,7 @@ class _Scan:
         while COARSE_GROWTH * dt * self.attempts.formulation.chain.intervals < self.least:
             dt *= COARSE_GROWTH
         while dt <= last and unsolved < UNSOLVED and not self.attempts.is_over:
-            placement = Placement(self.attempts.solve(dt, SCAN_NODES), dt)
+            placement = self.attempts.solve(dt, SCAN_NODES)
             excess = inf
             if placement.answer.x is not None:
                 guess = self.attempts.path(placement)
@@ -152,7 +152,7 @@ class _Scan:
 
     def start(self, dt: float) -> WarmStart | None:
         """The path of the program of a dt through slots that led nowhere yet; None where it has none."""
-        placement = Placement(self.attempts.solve(dt, SCAN_NODES), dt)
+        placement = self.attempts.solve(dt, SCAN_NODES)
         if placement.answer.x is None or placement.answer.slots in self.known:
             return None
         self.known.append(placement.answer.slots)
