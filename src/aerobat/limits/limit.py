@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 
-import numpy as np
-
-from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.errors import Reason, SpecError
 from aerobat.flatness.references import force_balance
@@ -118,15 +115,3 @@ def size_of(lower: float, upper: float) -> float:
         return upper - lower
     largest = max((abs(end) for end in (lower, upper) if abs(end) < inf), default=0.0)
     return largest if largest > SMALLEST_SIZE else 1.0
-
-
-def stacked(limits: tuple[Limit, ...]) -> tuple[Array, Array, Array, Array]:
-    """Return weights on the measures (c, 11) and on the path (c, 6, 3), lower and upper ends (c,).
-
-    All of them are divided by the limits' sizes.
-    """
-    sizes = np.array([limit.size for limit in limits])
-    measured = np.array([limit.quantity.measured for limit in limits]).reshape(len(limits), -1)
-    path = np.array([limit.quantity.path for limit in limits]).reshape(len(limits), 6, 3)
-    lower, upper = np.array([limit.ends for limit in limits]).reshape(-1, 2).T
-    return measured / sizes[:, None], path / sizes[:, None, None], lower, upper

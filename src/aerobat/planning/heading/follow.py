@@ -54,7 +54,7 @@ def with_heading(plan: Plan, reserve: float) -> Plan:
     spline = YawSpline.along(plan.trajectory)
     for more, left in TRIES:
         task = Task.of(plan.problem, plan.vehicle, SHARE * reserve + more)
-        found = _turned(plan, spline, _Following(task, heading, spline).variables(left))
+        found = _turned(plan, spline, _YawProgram(task, heading, spline).best(left))
         if found.certified or not plan.certified:
             break
     else:
@@ -117,22 +117,28 @@ def _asked(heading: Heading, limits: YawLimits) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Following:
-    """The programs that find a yaw."""
+class _YawProgram:
+    """The quadratic programs that find a yaw, in the variables that the ends of the path leave free."""
 
     task: Task
     heading: Heading
     spline: YawSpline
 
+    def best(self, left: float) -> Array:
+        """All variables of the best yaw that is found, of whose turns a part is left."""
+        free, added = self._ends
+        found = [self._improved(start) for start in self._starts()]
+        return np.asarray(free @ min(found, key=self._rank) * left + added)
+
     @cached_property
-    def limits(self) -> YawLimits:
+    def _limits(self) -> YawLimits:
         """Limits at the places of the spline."""
         return YawLimits(self.task, self.spline.cut_path, self.spline.times(PLACES))
 
     @cached_property
-    def target(self) -> tuple[Array, Array]:
+    def _target(self) -> tuple[Array, Array]:
         """The yaw that is asked [rad], without jumps, and how much it is, (m,) each."""
-        angle, weight = _asked(self.heading, self.limits)
+        angle, weight = _asked(self.heading, self._limits)
         known = np.flatnonzero(weight >= ASKED)
         if not len(known):
             return np.zeros_like(angle), np.zeros_like(weight)
@@ -141,99 +147,78 @@ class _Following:
         return steady, np.where(weight >= ASKED, weight, 0.0)
 
     @cached_property
-    def ends(self) -> tuple[Array, Array]:
+    def _ends(self) -> tuple[Array, Array]:
         """From the free variables (v,) to all of them: a matrix (n, v), and what is added, (n,)."""
         count = PER_KNOT * (len(self.spline.seconds) + 1)
         every, added = np.eye(count), np.zeros(count)
         if not self.task.stages.closed:  # it begins as the heading starts, and ends still
             return every[:, PER_KNOT : count - PER_KNOT + 1], added
-        first, last = self.limits_at_ends
+        path = self.spline.cut_path
+        first, last = YawLimits(self.task, path, np.array([0.0, path.duration])).carried.q_world_body
         turned = so3.multiply(so3.conjugate(last), first)
         lag = 2.0 * np.arctan2(turned[3], turned[0])
-        target = self.target[0]
+        target = self._target[0]
         added[-PER_KNOT] = lag + 2 * np.pi * np.round((target[-1] - target[0] - lag) / (2 * np.pi))
         free = every[:, : count - PER_KNOT].copy()
         free[-PER_KNOT:, :PER_KNOT] = np.eye(PER_KNOT)
         return free, added
 
-    @property
-    def limits_at_ends(self) -> Array:
-        """The attitudes without yaw at both ends of the path, (2, 4)."""
-        path = self.spline.cut_path
-        return YawLimits(self.task, path, np.array([0.0, path.duration])).carried.q_world_body
-
-    def variables(self, left: float) -> Array:
-        """All variables of the best yaw that was found, of whose turns a part is left."""
-        free, added = self.ends
-        program = _YawProgram(self, free, added)
-        found = [program.improved(start) for start in program.starts()]
-        return np.asarray(free @ min(found, key=program.rank) * left + added)
-
-
-@dataclass(frozen=True, eq=False)
-class _YawProgram:
-    """The program for one following, in its free variables."""
-
-    following: _Following
-    free: Array  # from these to all variables, (n, v)
-    added: Array  # (n,)
-
     @cached_property
-    def rows(self) -> list[Array]:
+    def _rows(self) -> list[Array]:
         """The yaw and its derivatives at the places by the free variables, (m, v) each."""
-        return [self.following.spline.rows(PLACES, k) @ self.free for k in range(ORDERS)]
+        return [self.spline.rows(PLACES, k) @ self._ends[0] for k in range(ORDERS)]
 
     @cached_property
-    def fixed(self) -> Array:
+    def _fixed(self) -> Array:
         """The part of them that is fixed, (4, m)."""
-        return np.array([self.following.spline.rows(PLACES, k) @ self.added for k in range(ORDERS)])
+        return np.array([self.spline.rows(PLACES, k) @ self._ends[1] for k in range(ORDERS)])
 
     @cached_property
-    def pull(self) -> Array:
+    def _pull(self) -> Array:
         """The weights of squared distances from what is asked [s], (m,)."""
-        return np.asarray(self.following.target[1] ** 2 * self.seconds)
+        return np.asarray(self._target[1] ** 2 * self._seconds)
 
     @cached_property
-    def seconds(self) -> Array:
+    def _seconds(self) -> Array:
         """The time that each place stands for [s], (m,)."""
-        return np.repeat(self.following.spline.seconds, len(PLACES)) / len(PLACES)
+        return np.repeat(self.spline.seconds, len(PLACES)) / len(PLACES)
 
-    def yaw(self, x: Array) -> Array:
+    def _yaw(self, x: Array) -> Array:
         """The yaw and its derivatives, (4, m)."""
-        return np.array([each @ x for each in self.rows]) + self.fixed
+        return np.array([each @ x for each in self._rows]) + self._fixed
 
-    def slopes(self, yaw: Array, smooth: float = SMOOTH) -> tuple[Array, Array]:
+    def _slopes(self, yaw: Array, smooth: float = SMOOTH) -> tuple[Array, Array]:
         """The cost's gradient (v,) and Hessian (v, v)."""
-        bend, (value, *_, third) = smooth * self.seconds, self.rows
-        hessian = (value.T * self.pull) @ value + (third.T * bend) @ third
+        bend, (value, *_, third) = smooth * self._seconds, self._rows
+        hessian = (value.T * self._pull) @ value + (third.T * bend) @ third
         hessian += 1e-9 * np.trace(hessian) / len(hessian) * np.eye(len(hessian))
-        off = self.pull * (yaw[0] - self.following.target[0])
+        off = self._pull * (yaw[0] - self._target[0])
         return value.T @ off + third.T @ (bend * yaw[3]), hessian
 
-    def starts(self) -> list[Array]:
+    def _starts(self) -> list[Array]:
         """No turn at all, and what would be followed, the smoother the less, if there were no limits."""
-        still = np.zeros(self.free.shape[1])
-        slopes = [self.slopes(self.yaw(still), SMOOTH * more) for more in SMOOTHER]
+        still = np.zeros(self._ends[0].shape[1])
+        slopes = [self._slopes(self._yaw(still), SMOOTH * more) for more in SMOOTHER]
         return [still, *(np.asarray(-np.linalg.solve(hessian, gradient)) for gradient, hessian in slopes)]
 
-    def rank(self, x: Array) -> tuple[float, float]:
+    def _rank(self, x: Array) -> tuple[float, float]:
         """By how much limits are exceeded, slack aside, and the cost."""
-        yaw = self.yaw(x)
-        off = self.pull @ (yaw[0] - self.following.target[0]) ** 2
-        exceeded = float(self.following.limits.excess(yaw).max())
-        return max(exceeded, SLACK), float(off + SMOOTH * self.seconds @ yaw[3] ** 2)
+        yaw = self._yaw(x)
+        off = self._pull @ (yaw[0] - self._target[0]) ** 2
+        exceeded = float(self._limits.excess(yaw).max())
+        return max(exceeded, SLACK), float(off + SMOOTH * self._seconds @ yaw[3] ** 2)
 
-    def improved(self, x: Array) -> Array:
+    def _improved(self, x: Array) -> Array:
         """A better yaw near another: first within the limits, then cheaper."""
-        limits, reach = self.following.limits, REACH
-        is_yaw = np.tile(np.arange(PER_KNOT) == 0, len(self.free) // PER_KNOT) @ self.free > 0.0
-        rank = self.rank(x)
+        (free, _), limits, reach = self._ends, self._limits, REACH
+        is_yaw = np.tile(np.arange(PER_KNOT) == 0, len(free) // PER_KNOT) @ free > 0.0
+        rank = self._rank(x)
         for _ in range(ROUNDS):
-            yaw = self.yaw(x)
-            excess, (gradient, hessian) = limits.excess(yaw), self.slopes(yaw)
+            yaw = self._yaw(x)
+            excess, (gradient, hessian) = limits.excess(yaw), self._slopes(yaw)
             at, which = np.nonzero(excess > -AT_ITS_END)
             slopes = limits.slopes(yaw)[:, at, which]
-            linear = sum(slope[:, None] * each[at] for slope, each in zip(slopes, self.rows, strict=True))
+            linear = sum(slope[:, None] * each[at] for slope, each in zip(slopes, self._rows, strict=True))
             near = excess[at, which]
             room = np.where(near > 0.0, -RESTORED * near, -near)
             far = np.where(is_yaw, reach, inf)
@@ -242,7 +227,7 @@ class _YawProgram:
                 step = quadratic_minimum(hessian, gradient, far, linear, np.maximum(room, 0.0))
             if step is None:
                 break
-            tried = self.rank(x + step)
+            tried = self._rank(x + step)
             if tried < rank:
                 gained = rank[0] > tried[0] or rank[1] - tried[1] > ENOUGH * rank[1]
                 x, rank, reach = x + step, tried, 2.0 * reach

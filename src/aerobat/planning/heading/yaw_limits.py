@@ -12,7 +12,7 @@ from aerobat.arrays import Array, xyz
 from aerobat.flatness import axial_drag, lateral_drag, reference
 from aerobat.kernels import flatness as kernel
 from aerobat.kernels.vectors import dot
-from aerobat.limits.limit import Limit, stacked
+from aerobat.limits.limit import Limit
 from aerobat.limits.quantity import MEASURES
 from aerobat.planning.task import Task
 from aerobat.states import Setpoint
@@ -57,12 +57,14 @@ class YawLimits:
 
     @cached_property
     def _weights(self) -> Array:
-        measured, *_ = stacked(self._limits)
+        """Weights on the measures for the upper ends of all limits, then for the lower ones, (c, 11)."""
+        rows = [limit.quantity.measured / limit.size for limit in self._limits]
+        measured = np.array(rows).reshape(-1, MEASURES)
         return np.concatenate([measured, -measured])
 
     @cached_property
     def _ends(self) -> Array:
-        *_, lower, upper = stacked(self._limits)
+        lower, upper = np.array([limit.ends for limit in self._limits]).reshape(-1, 2).T
         keep = np.array([limit.kept(self.task.reserve) for limit in self._limits])
         ends = np.concatenate([upper - keep[:, 1], -lower - keep[:, 0]])
         return np.asarray(np.maximum(ends, self._values(np.zeros((ORDERS, len(self.times))))))
