@@ -10,7 +10,7 @@ from math import ceil, inf
 from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.interior_point import Settings
 from aerobat.planning.around.guesses import ROUTES, Guess, guesses
-from aerobat.planning.certified_solve import Judged
+from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import (
     MAX_SEGMENTS,
     RefinedPath,
@@ -30,14 +30,6 @@ LONGEST = 0.5  # [s] of a guess's segment: with longer ones 100 m past trunks lo
 
 
 @dataclass(frozen=True, eq=False)
-class Around:
-    """A certified path, and the refinement that it comes from, whose task says what it keeps clear."""
-
-    refinement: Refinement
-    judged: Judged[RefinedPath]
-
-
-@dataclass(frozen=True, eq=False)
 class _Rough:
     """A path along a route that further rounds may make a plan of."""
 
@@ -50,7 +42,7 @@ class _Rough:
         return self.path.path.trajectory.duration
 
 
-def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -> Around | None:
+def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -> FlownPath | None:
     """Return the fastest certified path that is found along routes around obstacles; None where none is.
 
     Args:
@@ -65,7 +57,7 @@ def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -
             for found in sorted(rough, key=lambda each: each.duration):
                 judged = found.refinement.finished(found.path)
                 if judged.feasible:
-                    return Around(found.refinement, judged)
+                    return FlownPath.of(found.refinement, judged)
         if out_of_time():
             break
     return None
