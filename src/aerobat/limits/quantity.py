@@ -24,26 +24,18 @@ MEASURES = 11
 MAGNITUDES = (SPECIFIC_THRUST, BODY_RATE)  # which are smooth when squared
 
 
-def _no_path() -> Array:
-    return np.zeros(PATH_SHAPE)
-
-
-def _nothing() -> Array:
-    return np.zeros(MEASURES)
-
-
 @dataclass(frozen=True, eq=False)
 class PathQuantity:
     """The sum of `path` times position and its derivatives and of `measured` times the measures."""
 
-    path: Array = field(default_factory=_no_path)  # (6, 3)
-    measured: Array = field(default_factory=_nothing)  # (11,)
+    path: Array = field(default_factory=lambda: np.zeros(PATH_SHAPE))  # (6, 3)
+    measured: Array = field(default_factory=lambda: np.zeros(MEASURES))  # (11,)
     constant: float = 0.0
 
     @classmethod
     def of_wrench(cls, wrench: ArrayLike, rate: ArrayLike = 0.0) -> PathQuantity:
         """Return weights (4,) times the wrench, and others (4,) times its time derivative."""
-        measured = _nothing()
+        measured = np.zeros(MEASURES)
         measured[WRENCH], measured[WRENCH_RATE] = wrench, rate
         return cls(measured=measured)
 

@@ -179,17 +179,17 @@ class RefinedPoint:
         values = values.reshape(program.counts.shape) * program.weights + program.backoff[:, None]
         values[~program.counts] = LIMITED
         rows, bounds = program.windows
-        windows = rows @ self._ratios - bounds
+        windows = rows @ self._data.ratios - bounds
         return np.concatenate([values.ravel(), windows, program.stages.inequalities(self._at_stages)])
 
     @cached_property
     def equalities(self) -> Array:
         """The values of the equality constraints on durations, then of those at stages, and of a closure."""
         rows, targets = self.program.timed
-        found = [rows @ self._ratios - targets, self.program.stages.equalities(self._at_stages)]
+        found = [rows @ self._data.ratios - targets, self.program.stages.equalities(self._at_stages)]
         if self.program.closure is not None:
             around = self._data.derivatives(CLOSURE_PLACES)
-            found.append(self.program.closure.values(around, self._durations))
+            found.append(self.program.closure.values(around, self._data.durations))
         return np.concatenate(found)
 
     @cached_property
@@ -198,7 +198,7 @@ class RefinedPoint:
         program = self.program
         limits = program.limits.slopes(self._motion.derivatives.reshape(-1, 6, 3), program.near)
         windows = np.zeros((len(program.windows[1]), len(self.x)))
-        windows[:, program.spline.ratio_columns] = program.windows[0] * self._ratios
+        windows[:, program.spline.ratio_columns] = program.windows[0] * self._data.ratios
         others = np.concatenate([windows, self._stage_rows(*self._stage_slopes)])
         return RefinedRows(program, self._motion.slopes, limits, others)
 
@@ -207,11 +207,11 @@ class RefinedPoint:
         """The slopes of the equalities, (p, n)."""
         rows, _ = self.program.timed
         timed = np.zeros((len(rows), len(self.x)))
-        timed[:, self.program.spline.ratio_columns] = rows * self._ratios
+        timed[:, self.program.spline.ratio_columns] = rows * self._data.ratios
         found = [timed, self._stage_rows(*self.program.stages.equality_slopes())]
         if self.program.closure is not None:
             around = self.program.spline.motion(self._data, CLOSURE_PLACES)
-            by_motion = self.program.closure.slopes(around.derivatives, self._durations)
+            by_motion = self.program.closure.slopes(around.derivatives, self._data.durations)
             by_local = np.einsum("spka,spkaK->sK", by_motion, around.slopes)
             found.append(self.program.spline.scattered(by_local)[None])
         return np.concatenate(found)
@@ -231,13 +231,14 @@ class RefinedPoint:
         bent = (second.reshape(segments, count, 18, 18) @ moving).reshape(segments, count * 18, -1)
         blocks = np.swapaxes(moving.reshape(bent.shape), 1, 2) @ bent
         blocks += self._motion.curvature(self.rows.limits.weighted(weights).reshape(segments, count, 6, 3))
-        count = len(program.timed[1])
-        blocks += self._stage_blocks(others[windows:], equality_weights[count : self._linear_equalities])
+        # of the equalities those at stages: a closure's curvature is left out
+        first, end = len(program.timed[1]), len(equality_weights) - (program.closure is not None)
+        blocks += self._stage_blocks(others[windows:], equality_weights[first:end])
         rows = self.rows.others
         matrix = spline.assembled(blocks) + rows.T @ (squares[size:, None] * rows)
-        by_ratio = others[:windows] @ program.windows[0] + equality_weights[:count] @ program.timed[0]
+        by_ratio = others[:windows] @ program.windows[0] + equality_weights[:first] @ program.timed[0]
         columns = spline.ratio_columns
-        matrix[columns, columns] += by_ratio * self._ratios
+        matrix[columns, columns] += by_ratio * self._data.ratios
         return matrix
 
     def _stage_blocks(self, inequality_weights: Array, equality_weights: Array) -> Array:
@@ -265,21 +266,6 @@ class RefinedPoint:
         by_local = (weights.reshape(len(at), 1, 18) @ slopes)[:, 0]
         rows[np.arange(len(at))[:, None], spline.columns[segments]] = by_local
         return rows[:, :-1]
-
-    @property
-    def _linear_equalities(self) -> int:
-        """The number of equality constraints but that of a closure, whose curvature is left out."""
-        return len(self.equalities) - (self.program.closure is not None)
-
-    @property
-    def _durations(self) -> Array:
-        """Of all segments [s], (S,)."""
-        return self._data.durations
-
-    @property
-    def _ratios(self) -> Array:
-        """τ of all segments, (S,)."""
-        return self._data.ratios
 
     @cached_property
     def _data(self) -> KnotData:
