@@ -23,7 +23,6 @@ class Solver(Protocol):
     name: ClassVar[str]
     package: ClassVar[str]  # that it imports
     extra: ClassVar[str | None]  # of aerobat, which installs the package; None where aerobat itself does
-    uses_start: ClassVar[bool]  # a start is tried first, not only checked
 
     def solve(
         self,
@@ -39,7 +38,7 @@ class Solver(Protocol):
             program: what to solve.
             time_limit: [s]; None sets no limit.
             node_limit: relaxations solved, as the solver counts them; None sets no limit.
-            start: one slot a stage, an assignment that may be good.
+            start: one slot a stage, an assignment that may be good; SCIP only checks it.
 
         Raises:
             SpecError: `start` has not one slot a stage.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import inf
 from typing import Any, ClassVar
 
@@ -20,7 +19,6 @@ _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the l
 _PARAMETERS = {"FeasibilityTol": 1e-9, "IntFeasTol": 1e-9, "MIPGap": 1e-9}
 
 
-@dataclass(frozen=True)
 class Gurobi:
     """One binary for each stage and slot, its bounds switched on by big-M or by indicator constraints.
 
@@ -31,10 +29,7 @@ class Gurobi:
     name: ClassVar[str] = "gurobi"
     package: ClassVar[str] = "gurobipy"
     extra: ClassVar[str | None] = "gurobi"
-    uses_start: ClassVar[bool] = True
     free_variables: ClassVar[int] = 200  # with a quadratic objective
-
-    threads: int = 1
 
     def solve(
         self,
@@ -56,7 +51,7 @@ class Gurobi:
         try:
             with gurobipy.Env(empty=True) as env:
                 env.setParam("OutputFlag", 0)  # before it starts, or it prints the licence's banner
-                env.setParam("Threads", self.threads)
+                env.setParam("Threads", 1)
                 env.start()
                 with gurobipy.Model(env=env) as model:
                     limit = shorter(time_limit)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import inf
 from typing import Any, ClassVar
 
@@ -18,14 +17,12 @@ from aerobat.optimization.result import AssignmentResult, Status, verified
 _MEANING: dict[str, Status] = {"optimal": "optimal", "infeasible": "infeasible"}
 
 
-@dataclass(frozen=True)
 class Scip:
     """One binary for each stage and slot, its bounds switched on by big-M or by indicator constraints."""
 
     name: ClassVar[str] = "scip"
     package: ClassVar[str] = "pyscipopt"
     extra: ClassVar[str | None] = "scip"
-    uses_start: ClassVar[bool] = False
 
     def solve(
         self,

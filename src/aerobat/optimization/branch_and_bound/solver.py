@@ -1,18 +1,28 @@
-"""The built-in solver: exact, its answers verified."""
+"""The built-in solver: a QP for what no choice touches, an exact search over slots for the rest, verified."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import inf
 from time import perf_counter
 from typing import ClassVar
 
+import numpy as np
+
+from aerobat.arrays import Array, Mask
 from aerobat.optimization.assignment import AssignmentProgram
-from aerobat.optimization.branch_and_bound.direct_search import NAME, DirectSearch
-from aerobat.optimization.branch_and_bound.search import SearchLimits
+from aerobat.optimization.branch_and_bound.candidates import CandidateBounds, Candidates
+from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged
+from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
+from aerobat.optimization.branch_and_bound.null_space import NullSpace, ReducedBounds, split_coupled
+from aerobat.optimization.branch_and_bound.search import BestFirstSearch, SearchLimits
 from aerobat.optimization.deadline import shorter
-from aerobat.optimization.result import AssignmentResult, verified
+from aerobat.optimization.result import AssignmentResult, Status, verified
+
+_MATRICES = ("rows", "equality", "hessian", "gradient")
+_EQUALITY_TOLERANCE = 1e-12  # bounds closer than this, relative to the larger, make an equality
+_CONTRADICTION_TOLERANCE = 1e-9  # on the same scale, by which a lower bound must exceed the upper one
 
 
 class BranchAndBound:
@@ -22,14 +32,11 @@ class BranchAndBound:
     why it is right.
     """
 
-    name: ClassVar[str] = NAME
+    name: ClassVar[str] = "builtin"
     package: ClassVar[str] = "daqp"
     extra: ClassVar[str | None] = None
-    uses_start: ClassVar[bool] = True
 
-    def __init__(self) -> None:
-        """Begin without factorizations."""
-        self._direct = DirectSearch()
+    _factorization: _Factorization | None = None
 
     def solve(
         self,
@@ -45,5 +52,138 @@ class BranchAndBound:
         limit = shorter(time_limit)
         deadline = inf if limit is None else began + limit
         limits = SearchLimits(deadline, inf if node_limit is None else node_limit)
-        result = verified(program, self._direct.claim(program, limits, start))
+        result = verified(program, self._claim(program, limits, start))
         return replace(result, time=perf_counter() - began)
+
+    def _claim(
+        self, program: AssignmentProgram, limits: SearchLimits, start: Sequence[int] | None
+    ) -> AssignmentResult:
+        """The assignment of minimum cost, or what was found within the limits, not yet verified."""
+        try:
+            prepared = self._prepared(program)
+        except NotConverged:
+            return _without_solution("unknown", -inf)
+        if prepared is None:
+            return _without_solution("infeasible", inf)
+        factorization, blocks = prepared
+        return factorization.claim(program, blocks, limits, start)
+
+    def _prepared(self, program: AssignmentProgram) -> tuple[_Factorization, _Blocks] | None:
+        """The factorization, kept from the last program where it fits, and what is to be searched.
+
+        None where there is no solution. Raises NotConverged for the independent block's QP; the search deals
+        with its own.
+        """
+        lower, upper = program.root_bounds
+        larger = np.maximum(np.abs(lower), np.abs(upper))
+        scale = np.where(np.isfinite(larger), larger, 0.0)
+        if (lower - upper > _CONTRADICTION_TOLERANCE * scale).any() or not _is_ordered(program):
+            return None
+        implicit_equalities = upper - lower <= _EQUALITY_TOLERANCE * scale
+        kept = self._factorization
+        if kept is None or not kept.fits(program, implicit_equalities):
+            kept = _Factorization(program, implicit_equalities)
+            self._factorization = kept
+        blocks = kept.blocks(program, lower, upper)
+        return None if blocks is None else (kept, blocks)
+
+
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """One program in the null space: the block to be searched, and the other, solved."""
+
+    root: ReducedBounds
+    bounds: CandidateBounds
+    independent: ReducedBounds
+    y: Array  # the independent block's solution
+    elsewhere: float  # the cost of all but the block that is searched
+
+
+class _Factorization:
+    """All that depends on the matrices, on which rows are equalities and on the rows of the stages alone."""
+
+    def __init__(self, program: AssignmentProgram, implicit_equalities: Mask) -> None:
+        self._program = program
+        self._implicit_equalities = implicit_equalities
+        stage_rows = [stage.rows.ravel() for stage in program.stages if len(stage.slots) > 1]
+        coupled, independent = split_coupled(
+            program, np.concatenate([np.zeros(0, dtype=np.intp), *stage_rows])
+        )
+        self.coupled = NullSpace(program, coupled, implicit_equalities)
+        self.independent = NullSpace(program, independent, implicit_equalities)
+        self.candidates = Candidates(program, self.coupled)
+        self.dual_bounds = DualBounds(self.candidates, self.coupled.rows)
+        self.coupled_qp = LeastDistanceQP(self.coupled.rows)
+        self.independent_qp = LeastDistanceQP(self.independent.rows)
+
+    def fits(self, program: AssignmentProgram, implicit_equalities: Mask) -> bool:
+        """Tell if another program has the same matrices, and the same rows in the same roles."""
+        own = self._program
+        if own.precedence != program.precedence or len(own.stages) != len(program.stages):
+            return False
+        stages = zip(own.stages, program.stages, strict=True)
+        return (
+            all(getattr(own, name) is getattr(program, name) for name in _MATRICES)
+            and np.array_equal(self._implicit_equalities, implicit_equalities)
+            and all(a.slots == b.slots and np.array_equal(a.rows, b.rows) for a, b in stages)
+        )
+
+    def claim(
+        self,
+        program: AssignmentProgram,
+        blocks: _Blocks,
+        limits: SearchLimits,
+        start: Sequence[int] | None,
+    ) -> AssignmentResult:
+        """Search the coupled block, and put its solution and the independent block's together."""
+        search = BestFirstSearch(
+            self.candidates, self.dual_bounds, self.coupled_qp, blocks.bounds, blocks.root
+        )
+        if start is not None:
+            search.try_start({stage: start[stage] for stage in self.candidates.free_stages})
+        search.run(limits)
+        x = slots = None
+        if search.best is not None:
+            solution, chosen = search.best
+            x = np.zeros(program.num_variables)
+            x[self.coupled.columns] = self.coupled.expand(blocks.root, solution.y)
+            x[self.independent.columns] = self.independent.expand(blocks.independent, blocks.y)
+            slots = self.candidates.slots_with(program, chosen)
+        return AssignmentResult(
+            status=search.status,
+            backend=BranchAndBound.name,
+            bound=blocks.elsewhere + blocks.root.cost(search.bound),
+            x=x,
+            slots=slots,
+            nodes=search.nodes,
+        )
+
+    def blocks(self, program: AssignmentProgram, lower: Array, upper: Array) -> _Blocks | None:
+        """Return a program's right-hand sides, the independent block solved; None where it has no solution.
+
+        `lower` and `upper` (m,) are the root's bounds. Raises NotConverged for the independent block's QP.
+        """
+        root = self.coupled.bounds(program, lower, upper)
+        independent = self.independent.bounds(program, lower, upper)
+        if not (root.consistent and independent.consistent):
+            return None
+        independent = independent.in_units(independent.min_norm or 1.0)
+        solution = self.independent_qp.solve(independent.lower, independent.upper)
+        if solution is None:
+            return None
+        bounds = self.candidates.bounds(program, self.coupled, root)
+        root = root.in_units(max(root.min_norm, self.candidates.min_norm(bounds)) or 1.0)
+        elsewhere = program.constant + independent.cost(solution.value)
+        return _Blocks(root, bounds.in_units(root.unit), independent, solution.y, elsewhere)
+
+
+def _without_solution(status: Status, bound: float) -> AssignmentResult:
+    return AssignmentResult(status=status, backend=BranchAndBound.name, bound=bound)
+
+
+def _is_ordered(program: AssignmentProgram) -> bool:
+    """Tell if the precedence has no cycle and the fixed stages have distinct slots, in order."""
+    fixed = {i: stage.slots[0] for i, stage in enumerate(program.stages) if len(stage.slots) == 1}
+    in_order = all(fixed[i] < fixed[j] for i in fixed for j in fixed if program.precedes[i, j])
+    is_distinct = len(set(fixed.values())) == len(fixed)
+    return in_order and is_distinct and not program.precedes.diagonal().any()
