@@ -99,7 +99,7 @@ def test_a_stage_is_not_put_where_it_has_no_slot() -> None:
 
 def test_programs_with_other_bounds_share_their_matrices() -> None:
     program = AssignmentProgram(**GOOD, hessian=np.eye(2), gradient=np.ones(2))
-    other = program.with_bounds(upper=[1.0, 1.0])
+    other = replace(program, upper=[1.0, 1.0])
     for name in ("rows", "equality", "hessian", "gradient"):
         assert getattr(other, name) is getattr(program, name)
     assert other.upper.tolist() == [1.0, 1.0]

@@ -76,7 +76,7 @@ def fixed(program: AssignmentProgram, slots: tuple[int, ...]) -> AssignmentProgr
     for stage, slot in zip(program.stages, slots, strict=True):
         i = [stage.index(slot)]
         placed.append(SlottedStage(stage.name, (slot,), stage.rows[i], stage.lower[i], stage.upper[i]))
-    return program.with_bounds(stages=placed)
+    return replace(program, stages=tuple(placed))
 
 
 def enumerated(program: AssignmentProgram) -> float:
@@ -253,7 +253,7 @@ def test_an_ordered_flip_is_in_order_and_costs_no_less() -> None:
 def test_a_series_of_programs_with_the_same_matrices_is_solved_as_if_each_were_alone() -> None:
     series, kept = flip(FLIP_ROLL), solver()
     for scale in (1.0, 0.9, 1.1, 0.2, 1.0):
-        series = series.with_bounds(lower=scale * flip(FLIP_ROLL).lower, upper=scale * flip(FLIP_ROLL).upper)
+        series = replace(series, lower=scale * flip(FLIP_ROLL).lower, upper=scale * flip(FLIP_ROLL).upper)
         together, alone = kept.solve(series), solver().solve(series)
         assert (together.status, together.slots, together.nodes) == (alone.status, alone.slots, alone.nodes)
         assert together.cost == alone.cost

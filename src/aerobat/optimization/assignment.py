@@ -11,10 +11,9 @@ A stage that sits in a slot tightens the bounds of a few range rows. Nothing her
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import inf
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,8 +68,8 @@ class SlottedStage:
 class AssignmentProgram:
     """The whole problem.
 
-    Programs that share their matrices (made by `with_bounds`, or from the same write-protected arrays) share
-    a solver's factorizations too. Raises SpecError for what does not fit together.
+    Programs that share their write-protected matrices, as those made by `dataclasses.replace` do, share a
+    solver's factorizations too. Raises SpecError for what does not fit together.
     """
 
     equality: Array  # E (p, n)
@@ -131,26 +130,6 @@ class AssignmentProgram:
     def is_totally_ordered(self) -> bool:
         """True if the stages come in the order in which they are listed."""
         return all(self.precedes[i, i + 1] for i in range(len(self.stages) - 1))
-
-    def with_bounds(
-        self,
-        *,
-        target: ArrayLike | None = None,
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-        stages: Sequence[SlottedStage] | None = None,
-    ) -> AssignmentProgram:
-        """Return the program with the same matrices and other right-hand sides.
-
-        Args:
-            target: right-hand side of the equality rows, (p,); None keeps the program's, as below.
-            lower: lower bounds of the range rows, (m,).
-            upper: upper bounds of the range rows, (m,).
-            stages: other stages.
-        """
-        sides = {"target": target, "lower": lower, "upper": upper, "stages": stages}
-        changes: dict[str, Any] = {name: value for name, value in sides.items() if value is not None}
-        return replace(self, **changes)
 
     def cost(self, x: Array) -> float:
         """Return ½ xᵀ H x + fᵀ x + c."""

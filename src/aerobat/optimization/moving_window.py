@@ -113,7 +113,7 @@ class _Windows:
         free = [self._between(i, window) if i in window else self._fixed(i) for i in range(len(stages))]
         start = None if self.best is None else self._slots
         result = self._search.solve(
-            self._program.with_bounds(stages=free), node_limit=WINDOW_NODES, start=start
+            replace(self._program, stages=tuple(free)), node_limit=WINDOW_NODES, start=start
         )
         self.nodes += result.nodes
         self.time += result.time
