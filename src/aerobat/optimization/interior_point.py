@@ -200,10 +200,12 @@ class _Merit:
 def interior_point(
     program: ConstrainedProgram,
     start: Array,
-    settings: Settings | None = None,
+    settings: Settings,
     multipliers: Array | None = None,
 ) -> InteriorPointResult:
     """Return a local minimum near a start, feasible or not, or where iterations or time end.
+
+    What makes no sense on the way, or lies at the edge of the box, is infinite.
 
     Args:
         program: What is minimized.
@@ -211,7 +213,8 @@ def interior_point(
         settings: Accuracy and length.
         multipliers: Of the inequalities, from a program that is nearly the same.
     """
-    return _InteriorPoint(program, settings or Settings()).run(start, multipliers)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return _InteriorPoint(program, settings).run(start, multipliers)
 
 
 class _InteriorPoint:
@@ -226,11 +229,7 @@ class _InteriorPoint:
         self._merit = _Merit()
 
     def run(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
-        """Descend; what makes no sense on the way, or lies at the edge of the box, is infinite."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return self._descended(start, multipliers)
-
-    def _descended(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
+        """Descend from a start until the end."""
         iterate, costs, jammed = self._begun(start, multipliers), [], False
         if not np.isfinite(iterate.point.inequalities).all():
             return InteriorPointResult(iterate.x, False, 0, iterate.z)  # no step leads on from there
