@@ -15,7 +15,7 @@ from aerobat.planning.evidence import Evidence
 from aerobat.planning.passages import PlacedStage
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import Plan
-from aerobat.planning.rotor_margin import reserve_shortfalls, sampled_margin
+from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.task import Task
 from aerobat.trajectory import Trajectory
 
@@ -109,16 +109,6 @@ def certified_solve(
         if judged.feasible or not left or not program.tighten(judged.solution, judged.certificate):
             break
     return judged
-
-
-def refuted_by_samples(solution: Solution[Detail], task: Task) -> Solution[Detail]:
-    """The solution, a failure where samples already show that the vehicle's rotors cannot follow it."""
-    if task.vehicle_if_any is None or solution.trajectory is None or solution.failure is not None:
-        return solution
-    sampled = sampled_margin(solution.trajectory, task.vehicle, task.environment)
-    if sampled.margin >= 0.0:
-        return solution
-    return replace(solution, failure=sampled.reason, margin=sampled.margin)
 
 
 def judge(solution: Solution[Detail], task: Task, recorder: Recorder, jumps: bool = False) -> Judged[Detail]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 from time import perf_counter
 from typing import Annotated
@@ -13,16 +12,17 @@ from pydantic import Field, Strict
 from aerobat.arrays import Array
 from aerobat.declaration import AS_IT_IS, Count, NonNegative
 from aerobat.errors import Infeasible, Reason, SpecError, limits_of
-from aerobat.optimization.deadline import out_of_time, within_time
-from aerobat.planning.certified_solve import Judged, Solution, judge, refuted_by_samples
-from aerobat.planning.passages import PlacedStage, place_stages
+from aerobat.optimization.deadline import out_of_time
+from aerobat.planning.certified_solve import Judged, Solution, judge
+from aerobat.planning.passages import place_stages
 from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, unhurried, violated_stage
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import Plan
+from aerobat.planning.rotor_margin import sampled_margin
 from aerobat.planning.search import BisectionSearch, GridSearch, Search
 from aerobat.planning.task import Task
-from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
+from aerobat.planning.time_limit import TIME_LIMIT, best_in_time
 from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
@@ -75,16 +75,18 @@ class MinSnap(Planner):
         """
         planning = _Planning(self, problem, vehicle, Recorder(progress))
         first = float(planning.durations.sum())
-        with within_time(self.time_limit):
+
+        def shortest() -> Plan | None:
             if vehicle is None:
                 found = planning.attempt(first)
             else:
                 found = self._search(planning.scaling, first).smallest(planning.attempt)
-            if found is not None:
-                return stopped(planning.result(found))
-            if out_of_time():
-                raise too_short(problem, self.time_limit, planning.recorder.attempts)
-        raise Infeasible(planning.why_infeasible(), planning.recorder.attempts)
+            return None if found is None else planning.result(found)
+
+        plan = best_in_time(problem, self.time_limit, planning.recorder, shortest)
+        if plan is None:
+            raise Infeasible(planning.why_infeasible(), planning.recorder.attempts)
+        return plan
 
     def _search(self, scaling: TimeScaling, first: float) -> Search:
         if self.search is not None:
@@ -115,12 +117,11 @@ class _Planning:
         """
         if self.recorder.attempts and out_of_time():
             return None
-        solution = _ClosedForm(self, duration).solve()
-        judged = judge(solution, self.task, self.recorder)
+        judged = judge(self._closed_form(duration), self.task, self.recorder)
         stopped = len(self.recorder.attempts) == self.config.stop_after
         return judged if judged.feasible or stopped else None
 
-    def scaled(self, duration: float) -> Array:
+    def _scaled(self, duration: float) -> Array:
         """Durations of the segments [s] that make up one duration [s]."""
         durations = self.durations.copy()
         if self.scaling is TimeScaling.ALL:
@@ -162,67 +163,57 @@ class _Planning:
             stages=found.solution.placed,
         )
 
-
-@dataclass
-class _ClosedForm:
-    """The path at one duration."""
-
-    planning: _Planning
-    duration: float
-
-    def solve(self) -> Solution[None]:
-        """The path; a failure where it misses a stage or samples refute it.
+    def _closed_form(self, duration: float) -> Solution[None]:
+        """The path of one duration; a failure where it misses a stage or samples refute it.
 
         Speeds at least as high as asked are left free where they come out so, and held at that elsewhere.
         """
         started = perf_counter()
-        task, order = self.planning.task, self.planning.config.order
+        task, durations, margin = self.task, self._scaled(duration), None
         for begun in (unhurried(task), task):
-            trajectory = self._trajectory(begun)
+            trajectory = self._trajectory(begun, durations)
             failure = violated_stage(task, trajectory)
             if failure is None:
                 break
-        solution = Solution(
+        solve_time = perf_counter() - started
+        if failure is None and task.vehicle_if_any is not None:
+            sampled = sampled_margin(trajectory, task.vehicle, task.environment)
+            if sampled.margin < 0.0:
+                failure, margin = sampled.reason, sampled.margin
+        times = np.cumsum(durations)[:-1].tolist()
+        return Solution(
             source=None,
-            duration=self.duration,
+            duration=duration,
             trajectory=trajectory,
             status="optimal",
             nodes=1,
-            solve_time=perf_counter() - started,
-            cost=trajectory.effort(order),
+            solve_time=solve_time,
+            cost=trajectory.effort(self.config.order),
             failure=failure,
-            placed=self.placed,
+            margin=margin,
+            placed=place_stages(task.stages.stages, range(len(times)), times),
         )
-        return refuted_by_samples(solution, task)
 
-    @property
-    def placed(self) -> tuple[PlacedStage, ...]:
-        """The stages, each at the end of its segment."""
-        times = np.cumsum(self.planning.scaled(self.duration))[:-1].tolist()
-        return place_stages(self.planning.task.stages.stages, range(len(times)), times)
-
-    def _trajectory(self, task: Task) -> Trajectory:
+    def _trajectory(self, task: Task, durations: Array) -> Trajectory:
         """The closed form through stages whose drag at the stages is that of its own velocities there.
 
         Those are an affine function of the velocities of which the drag is taken, v ↦ M v + c, found column
         by column; what is wanted is v = M v + c.
         """
-        stages = len(task.stages.stages)
-        still = np.zeros((stages, 3))
-        trajectory = self._with_drag_of(task, still)
+        stages, heading = len(task.stages.stages), task.problem.heading.start
+
+        def with_drag_of(velocities: Array) -> Trajectory:
+            fixed = fixed_at_knots(task, self.config.order, velocities)
+            return minimum_effort(fixed, durations, self.config.rule, heading)
+
+        trajectory = with_drag_of(np.zeros((stages, 3)))
         if task.balance.drag == 0.0 or not stages:
             return trajectory
         there = trajectory.knots[1:-1]
         constant = trajectory.evaluate(there, 1).ravel()
         columns = [
-            self._with_drag_of(task, unit.reshape(stages, 3)).evaluate(there, 1).ravel() - constant
-            for unit in np.eye(still.size)
+            with_drag_of(unit.reshape(stages, 3)).evaluate(there, 1).ravel() - constant
+            for unit in np.eye(3 * stages)
         ]
-        own = np.linalg.solve(np.eye(still.size) - np.array(columns).T, constant)
-        return self._with_drag_of(task, np.asarray(own).reshape(stages, 3))
-
-    def _with_drag_of(self, task: Task, velocities: Array) -> Trajectory:
-        """The closed form through stages, with the drag of velocities there [m/s], (K - 2, 3)."""
-        config, durations = self.planning.config, self.planning.scaled(self.duration)
-        fixed = fixed_at_knots(task, config.order, velocities)
-        return minimum_effort(fixed, durations, config.rule, task.problem.heading.start)
+        own = np.linalg.solve(np.eye(3 * stages) - np.array(columns).T, constant)
+        return with_drag_of(np.asarray(own).reshape(stages, 3))
