@@ -83,9 +83,8 @@ class BodyPath:
 def _centre(trajectory: Trajectory, pieces: Subintervals, degree: int) -> tuple[Array, Array]:
     """The series of the position [m], (P, K + 1, 3), and what rounding leaves open of it, (P,)."""
     basis = chebyshev.basis(degree)
-    s = pieces.start[:, None] + pieces.length[:, None] * (1 + basis.nodes) / 2
     coefficients = trajectory.coefficients[pieces.interval]
     summed = np.linalg.norm(np.abs(coefficients).sum(axis=1), axis=-1)
-    series = basis.analysis @ polynomial.evaluate(coefficients[:, None], s)
+    series = basis.analysis @ polynomial.evaluate(coefficients[:, None], pieces.positions(basis.nodes))
     series[:, trajectory.coefficients.shape[1] :] = 0.0  # polynomials of this degree have no further terms
     return series, basis.lebesgue * chebyshev.EVALUATION_ROUNDING * summed

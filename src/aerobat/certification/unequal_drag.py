@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import chebyshev as series_of
@@ -23,6 +23,7 @@ from aerobat.certification.enclosure.queries import ChebyshevSeries
 from aerobat.certification.subdivision import MAX_COMMAND_REMAINDER, MAX_REMAINDER, MIN_DURATION
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.flatness import TimeInterval, reference
+from aerobat.flatness.unequal_drag import analysis, nodes
 from aerobat.kernels import flatness
 from aerobat.kernels import unequal_drag as kernel
 from aerobat.kernels.ops import Scalar, Vector
@@ -47,7 +48,7 @@ def interpolated_with_unequal_drag(
     tightness: float,
     derived: Sequence[Limit],
     on_thrust: Sequence[Limit],
-    with_axis: bool = False,
+    with_axis: bool,
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
     """Return the series of `certify.interpolated`, and where no attitude is determined.
 
@@ -121,15 +122,11 @@ class _Motion:
         wind = curve.environment.wind
         world[0] = world[0] - wind
         sums[0] = sums[0] + np.linalg.norm(wind)
-        nodes, analysis = _guess_nodes()
-        times = (
-            trajectory.knots[pieces.interval, None]
-            + pieces.positions(nodes) * trajectory.durations[pieces.interval, None]
-        )
-        times = np.append(0.0, times)
+        count = QUATERNION_DEGREE + 1
+        times = np.append(0.0, pieces.times_at(trajectory, nodes(count)))
         found = reference(trajectory, curve.vehicle, times, environment=curve.environment)
         start, q = np.split(found.setpoint.q_world_body, [1])
-        attitude = analysis @ q.reshape(len(pieces), -1, 4)
+        attitude = analysis(count) @ q.reshape(len(pieces), -1, 4)
         return cls(curve, pieces, basis, np.stack(world, axis=2), np.stack(sums, axis=1), attitude, start[0])
 
     @cached_property
@@ -327,10 +324,3 @@ def _from(curve: ThrustCurve, pieces: Subintervals, count: int) -> tuple[TimeInt
         return ()
     start = pieces[count : count + 1].times(curve.trajectory, np.array([-1.0]))
     return (TimeInterval(float(start[0]), float(curve.trajectory.duration)),)
-
-
-@lru_cache(maxsize=1)
-def _guess_nodes() -> tuple[Array, Array]:
-    """Chebyshev points inside a piece, so that none is at a knot, and the matrix to coefficients."""
-    nodes = series_of.chebpts1(QUATERNION_DEGREE + 1)
-    return np.asarray(nodes), np.asarray(np.linalg.inv(series_of.chebvander(nodes, QUATERNION_DEGREE)))

@@ -24,7 +24,7 @@ from aerobat.flatness.unequal_drag import (
     UnequalDrag,
     body_attitudes,
     body_motion,
-    node_times,
+    nodes,
     resolved_pieces,
     trajectory_through,
 )
@@ -241,10 +241,10 @@ def _turned_frames(
     """The same, and the angle between the frames of mean and of unequal drag."""
     drag = UnequalDrag.of(vehicle, environment)
     pieces = resolved_pieces(trajectory, drag)
-    nodes = node_times(trajectory, pieces)
-    path, at = _mean_frames(trajectory, vehicle, environment, np.append(times, nodes))
+    inner = pieces.times_at(trajectory, nodes())
+    path, at = _mean_frames(trajectory, vehicle, environment, np.append(times, inner))
     at, between = np.split(at, [len(times)])
-    q = path.q_world_body[between].reshape(*nodes.shape, 4)
+    q = path.q_world_body[between].reshape(*inner.shape, 4)
     return path, at, FrameAngle.along(trajectory, drag, pieces, q)
 
 

@@ -8,7 +8,7 @@ from ω_z = 0 (`kernels.unequal_drag`) and is integrated by Picard's iteration o
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -244,24 +244,16 @@ def motion_on(trajectory: Trajectory, pieces: Subintervals, at: Array, orders: i
     return np.stack(found, axis=2)
 
 
-def node_times(trajectory: Trajectory, pieces: Subintervals) -> Array:
-    """Times [s] of the nodes of pieces, (P, NODES)."""
-    s = pieces.start[:, None] + pieces.length[:, None] * (1 + nodes()) / 2
-    return np.asarray(
-        trajectory.knots[pieces.interval, None] + s * trajectory.durations[pieces.interval, None]
-    )
+@cache
+def nodes(count: int = NODES) -> Array:
+    """Chebyshev points inside a piece, so that none is at a knot, (count,)."""
+    return np.asarray(chebyshev.chebpts1(count))
 
 
-@lru_cache(maxsize=1)
-def nodes() -> Array:
-    """Chebyshev points inside a piece, so that none is at a knot, (NODES,)."""
-    return np.asarray(chebyshev.chebpts1(NODES))
-
-
-@lru_cache(maxsize=1)
-def analysis() -> Array:
-    """The matrix from values at the nodes to Chebyshev coefficients, (NODES, NODES)."""
-    return np.asarray(np.linalg.inv(chebyshev.chebvander(nodes(), NODES - 1)))
+@cache
+def analysis(count: int = NODES) -> Array:
+    """The matrix from values at the nodes to Chebyshev coefficients, (count, count)."""
+    return np.asarray(np.linalg.inv(chebyshev.chebvander(nodes(count), count - 1)))
 
 
 def _vector(across: NDArray[np.complex128], along: Array) -> Vector:

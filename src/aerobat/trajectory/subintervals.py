@@ -68,6 +68,11 @@ class Subintervals:
         """Return places (n,) in [-1, 1] on each part in the time of its interval, from 0 to 1, (parts, n)."""
         return np.asarray(self.start[:, None] + self.length[:, None] * (1 + at) / 2)
 
+    def times_at(self, trajectory: Trajectory, at: Array) -> Array:
+        """Times [s] of places (n,) in [-1, 1] on each part of a trajectory's segments, (parts, n)."""
+        starts, durations = trajectory.knots[self.interval, None], trajectory.durations[self.interval, None]
+        return np.asarray(starts + self.positions(at) * durations)
+
     def times(self, trajectory: Trajectory, position: Array) -> Array:
         """Times [s] of positions in [-1, 1] on each part of a trajectory's segments, (n,) -> (n,)."""
         s = self.start + self.length * (1 + position) / 2
