@@ -24,7 +24,6 @@ FAMILIES: list[Family] = [
     path_condition.limits,
     tilt.limits,
 ]
-NO_LIMITS = Limits()
 
 
 def register_limits(family: Family) -> Family:
@@ -40,8 +39,8 @@ def register_limits(family: Family) -> Family:
 def limits_along(
     vehicle: Vehicle | None,
     environment: Environment,
-    limits: Limits = NO_LIMITS,
-    conditions: tuple[Condition, ...] = (),
+    limits: Limits,
+    conditions: tuple[Condition, ...],
 ) -> tuple[Limit, ...]:
     """Return everything that must hold all along a path.
 

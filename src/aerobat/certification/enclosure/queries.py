@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from operator import neg
 
 import numpy as np
 
@@ -97,8 +98,8 @@ class ChebyshevSeries:
 def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float) -> list[ExtremumQuery]:
     """Queries for the minimum and the maximum of a function."""
     return [
-        ExtremumQuery(quantity, unit, Side.MIN, float(lower), column, -1, _negated),
-        ExtremumQuery(quantity, unit, Side.MAX, float(upper), column, 1, _plain),
+        ExtremumQuery(quantity, unit, Side.MIN, float(lower), column, -1, neg),
+        ExtremumQuery(quantity, unit, Side.MAX, float(upper), column, 1, float),
     ]
 
 
@@ -116,11 +117,3 @@ def root(value: float) -> float:
 def angle(value: float) -> float:
     """An angle [rad], read from the negative of its cosine."""
     return math.acos(min(max(-value, -1.0), 1.0))
-
-
-def _plain(value: float) -> float:
-    return value
-
-
-def _negated(value: float) -> float:
-    return -value

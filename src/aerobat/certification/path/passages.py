@@ -97,7 +97,7 @@ class _Instant:
         margin = min(self.passage.margin, gate.opening.inradius)
         speed = float(self.velocity @ gate.normal)
         found = [
-            self._at_most("off plane", "m", abs(along), PLANE_DISTANCE),
+            self._finding("off plane", "m", Side.MAX, abs(along), PLANE_DISTANCE),
             self._finding("inside by", "m", Side.MIN, float(depth), margin),
             self._finding("speed through", "m/s", Side.MIN, speed, self.passage.min_speed),
         ]
@@ -108,13 +108,10 @@ class _Instant:
         wanted = self.passage.up
         sine, cosine = np.linalg.norm(np.cross(wanted, self.thrust)), wanted @ self.thrust
         angle = float(np.arctan2(sine, cosine))
-        found = self._at_most("attitude", "rad", angle, self.passage.attitude_tolerance)
+        found = self._finding("attitude", "rad", Side.MAX, angle, self.passage.attitude_tolerance)
         if np.linalg.norm(self.thrust) < self.floor:
             return replace(found, verdict=Verdict.UNDECIDED)
         return found
-
-    def _at_most(self, quantity: str, unit: str, value: float, limit: float) -> Finding:
-        return self._finding(quantity, unit, Side.MAX, value, limit)
 
     def _finding(self, quantity: str, unit: str, side: Side, value: float, limit: float) -> Finding:
         margin = limit - value if side is Side.MAX else value - limit
