@@ -173,30 +173,6 @@ class _Trial(NamedTuple):
     value: _Value
 
 
-@dataclass(eq=False)
-class _Merit:
-    """The barrier function plus a weight times the violation."""
-
-    weight: float = _LEAST_WEIGHT
-
-    def accepts(self, before: _Value, after: _Value, promised: float, length: float) -> bool:
-        """True where a step is taken.
-
-        Args:
-            before: Where it begins.
-            after: Where it ends.
-            promised: Change of the barrier function that a whole step was promised.
-            length: Of the step, 1 for a whole one.
-        """
-        if promised > 0.0 and before.violation > 0.0:
-            self.weight = max(self.weight, promised / (_SHARE * before.violation))
-        fall = min(promised - self.weight * before.violation, 0.0)
-        return self._of(after) <= self._of(before) + _ARMIJO * length * fall + _ROUNDING
-
-    def _of(self, value: _Value) -> float:
-        return value.barrier + self.weight * value.violation
-
-
 def interior_point(
     program: ConstrainedProgram,
     start: Array,
@@ -226,7 +202,7 @@ class _InteriorPoint:
         self._lower, self._upper = program.box
         self._barrier = settings.barrier
         self._damping = settings.damping
-        self._merit = _Merit()
+        self._violation_weight = _LEAST_WEIGHT
 
     def run(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
         """Descend from a start until the end."""
@@ -333,7 +309,7 @@ class _InteriorPoint:
             return None
         for halvings in range(_BACKTRACKS):
             trial = self._tried(at, step, length)
-            if self._merit.accepts(before, trial.value, promised, length):
+            if self._accepts(before, trial.value, promised, length):
                 self._adapt(is_whole=not halvings)
                 return step, length, trial
             if not halvings and trial.value.violation >= before.violation:
@@ -343,6 +319,22 @@ class _InteriorPoint:
                     return corrected
             length *= 0.5
         return None
+
+    def _accepts(self, before: _Value, after: _Value, promised: float, length: float) -> bool:
+        """True where a step lowers the merit: the barrier function plus the weighted violation.
+
+        Args:
+            before: Where it begins.
+            after: Where it ends.
+            promised: Change of the barrier function that a whole step was promised.
+            length: Of the step, 1 for a whole one.
+        """
+        if promised > 0.0 and before.violation > 0.0:
+            least = promised / (_SHARE * before.violation)
+            self._violation_weight = max(self._violation_weight, least)
+        merits = [each.barrier + self._violation_weight * each.violation for each in (before, after)]
+        fall = min(promised - self._violation_weight * before.violation, 0.0)
+        return merits[1] <= merits[0] + _ARMIJO * length * fall + _ROUNDING
 
     def _adapt(self, is_whole: bool) -> None:
         """Damp the next step less after a whole one, more after one that was shortened."""
@@ -381,7 +373,7 @@ class _InteriorPoint:
             step = equations.step(missed, equal)
             length = self._longest(at, step)
             trial = self._tried(at, step, length)
-            if self._merit.accepts(before, trial.value, promised, longest):
+            if self._accepts(before, trial.value, promised, longest):
                 return step, length, trial
             if trial.value.violation > _SLOW_CORRECTION * violation:
                 return None
