@@ -14,7 +14,7 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.engines.floats import FloatOps
-from aerobat.limits.body_in_gate import BodyInGate, extent_of_attitude, extent_of_thrust
+from aerobat.limits.body_in_gate import BodyInGate, OpeningAhead, extent_of_attitude, extent_of_thrust
 from aerobat.planning import PlacedStage
 from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.reporting.plain_data import plain
@@ -174,13 +174,14 @@ def test_a_path_that_bends_no_more_than_its_way_through_a_gate_clears_the_frame_
     body, size = ab.Ellipsoid((wide, wide, high)), 2.0 * max(wide, high) + rng.uniform(0.1, 0.3)
     gate, offset = replace(one.gate, width=size, height=size), 0.4 * one.offset
     way = BodyInGate(gate, 0, PASSAGE_DEPTH + max(wide, high), rng.uniform(0.1, 8.0))
+    opening = OpeningAhead.of_parameters(way.parameters.tolist())
     thrust = so3.rotate(one.attitude, np.array([0.0, 0.0, 1.0]))
     extent = extent_of_thrust(FloatOps, body.revolved, tuple(thrust.tolist()))
     along = one.velocity / np.linalg.norm(one.velocity)
 
     def is_asked(speed: float) -> bool:
         position, velocity = (gate.position + offset).tolist(), (speed * along).tolist()
-        return min(way.opening.room(FloatOps, position, velocity, extent)) >= 0.0
+        return min(opening.room(FloatOps, position, velocity, extent)) >= 0.0
 
     slowest = next((speed for speed in np.geomspace(0.3, 100.0, 80) if is_asked(speed)), None)
     assume(slowest)

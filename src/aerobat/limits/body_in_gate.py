@@ -103,11 +103,6 @@ class BodyInGate:
         ahead = [self.reach, self.bending]
         return np.concatenate([place, outward.ravel(), distances - FRAME_CLEARANCE, ahead])
 
-    @property
-    def opening(self) -> OpeningAhead:
-        """The gate's opening in numbers."""
-        return OpeningAhead.of_parameters(self.parameters.tolist())
-
 
 def extent_of_attitude(ops: Ops, body: Ellipsoid, axes: Axes) -> Extent:
     """Return the extent of a body whose attitude is known.
