@@ -3,8 +3,8 @@
 A certificate proves that the rotors can follow a path; that the loop of controller and rotors does, lag
 included, only a flight shows. What is flown is the plan's trajectory by its vehicle in its environment, with
 the default controller and nothing unknown; then once more with the reserve that the certificate leaves used
-up, all rotors giving less than commanded by the same fraction δ. As rotors that give (1 − δ) f move a body
-as f moves one of 1/(1 − δ) times the mass, inertia and drag, that is what flies then, told otherwise. The
+up, all rotors giving less than commanded by the same fraction δ. That loss is equivalent to dividing mass,
+inertia and drag by 1 − δ, so such a vehicle is simulated, while the controller keeps the nominal one. The
 nominal flight is judged at the gates, their frames included, and past obstacles as scores judge flights.
 """
 
@@ -168,9 +168,7 @@ def own_flights(
     nominal = own_flight(task, trajectory, stages)
     disturbed = disturbed_flight(trajectory, task.vehicle, task.environment, fraction)
     return Flyability(
-        error=nominal.error,
-        passages=nominal.passages,
-        nearest=nominal.nearest,
+        **vars(nominal),
         disturbance=disturbance,
         disturbed_fraction=fraction,
         disturbed_error=_largest_error(disturbed),

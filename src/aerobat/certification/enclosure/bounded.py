@@ -64,7 +64,7 @@ class Bounded:
         return Bounded(shape + value, bound, np.zeros_like(self.error))
 
     def with_error(self, error: Array) -> Bounded:
-        """Return the same for what it is off from by so much more, (P,)."""
+        """Return the same functions with a larger error of the values, by so much, (P,)."""
         return Bounded(self.values, self.bound, self.error + error)
 
     def inverse(self, least: Array) -> Bounded:

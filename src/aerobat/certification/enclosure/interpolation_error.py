@@ -57,7 +57,7 @@ class EllipseBounds:
 
 @dataclass(frozen=True)
 class Turns:
-    """The yaw beside a frame without spin, its rate and that's derivative, along P pieces."""
+    """The yaw beside a frame without spin, its rate and the rate's derivative, along P pieces."""
 
     terms: Array  # magnitudes of their Chebyshev coefficients, (P, K + 1, 3)
     rounding: Array  # in their values, at most, (P, 3)

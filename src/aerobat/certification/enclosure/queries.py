@@ -54,8 +54,8 @@ class ExtremumQuery:
         if self.source is None:
             return found
         end, source = self.side is Side.MAX, self.source
-        about = replace(found, rotor=source.rotor, field=source.fields[end], size=source.size)
-        return replace(about, room=source.rooms[end])
+        field, room = source.fields[end], source.rooms[end]
+        return replace(found, rotor=source.rotor, field=field, size=source.size, room=room)
 
 
 @dataclass(frozen=True)

@@ -73,16 +73,16 @@ def _contradiction(stage: Stage, asked: list[LinearBound], limits: Limits) -> Co
             f"the conditions of the stage '{stage.name}' exclude each other; change or drop one of them"
         )
         return Contradiction(stage.name, (), sentence)
-    told = " or ".join(_told(k, name, limits) for k, name in zip(binding, names, strict=True))
+    bound = " or ".join(_with_value(k, name, limits) for k, name in zip(binding, names, strict=True))
     return Contradiction(
         stage.name,
         names,
-        f"what the stage '{stage.name}' asks lies outside {told or 'the limits together'} at whatever time; "
+        f"what the stage '{stage.name}' asks lies outside {bound or 'the limits together'} at whatever time; "
         "ask less of it or widen them",
     )
 
 
-def _told(derivative: int, name: str, limits: Limits) -> str:
+def _with_value(derivative: int, name: str, limits: Limits) -> str:
     """A limit with its value, where it has one."""
     if derivative == 0:
         return name

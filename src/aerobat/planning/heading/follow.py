@@ -107,7 +107,7 @@ def _turned(plan: Plan, spline: YawSpline, variables: Array) -> Plan:
 
 
 def _asked(heading: Heading, limits: YawLimits) -> tuple[Array, Array]:
-    """The angle [rad] from the body's x axis to what is asked, about the thrust, and that's weight, (m,)."""
+    """The angle [rad] from the body's x axis to what is asked, about the thrust, and its weight, (m,)."""
     setpoint, duration = limits.carried, limits.path.duration
     axes = so3.axes(setpoint.q_world_body)
     flat: FlatState = setpoint.flat

@@ -68,10 +68,10 @@ def leg_without_room(formulation: Formulation, dt: float) -> str | None:
     placed = _placed_when_spread(formulation, dt)
     if placed is None or placed == len(stages):
         return None
-    begin = "the start" if placed == 0 else _told(stages, placed - 1)
+    begin = "the start" if placed == 0 else _stage_name(stages, placed - 1)
     said = (
         f"'{formulation.problem.name}' has no plan with {count} intervals: its {len(stages)} stages spread "
-        f"evenly over them, the leg from {begin} to {_told(stages, placed)} has no path"
+        f"evenly over them, the leg from {begin} to {_stage_name(stages, placed)} has no path"
     )
     for more in (ceil(factor * max(count, len(stages))) for factor in MORE_INTERVALS):
         chain = replace(formulation.chain, intervals=more)
@@ -94,7 +94,7 @@ def _placed_when_spread(formulation: Formulation, dt: float) -> int | None:
     return len(fixed)
 
 
-def _told(stages: Sequence[Stage], number: int) -> str:
+def _stage_name(stages: Sequence[Stage], number: int) -> str:
     """A stage's name, with its lap where there are several."""
     stage = stages[number]
     return f"'{stage.name}'" + (f" of lap {stage.lap}" if stages[-1].lap > 1 else "")
