@@ -182,6 +182,12 @@ def test_the_certificate_returned_is_that_of_the_last_round_of_tightening() -> N
     assert found.certified
 
 
+def test_a_plan_comes_with_the_certificate_that_decided_it_whatever_was_kept_clear() -> None:
+    plan = ab.plan("line", Miqp(reserve=0.1, clearance=0.1))
+    assert plan.evidence is not None
+    assert "certificate" in vars(plan.evidence)  # worked out already
+
+
 def test_what_cannot_be_certified_is_no_plan() -> None:
     """A ground that is left at 4 m/s downwards, one centimetre above it."""
     falling = EndState((0.0, 0.0, 0.01), (0.0, 0.0, -4.0))

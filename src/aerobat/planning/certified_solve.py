@@ -123,7 +123,7 @@ def judge(solution: Solution[Detail], task: Task, recorder: Recorder, jumps: boo
     """
     evidence = certificate = None
     if solution.trajectory is not None and solution.failure is None and task.vehicle_if_any is not None:
-        evidence = Evidence(task.without_reserve, solution.trajectory, solution.placed)
+        evidence = Evidence(task.as_proven, solution.trajectory, solution.placed)
         certificate = evidence.certificate
     outcome = solution.failure
     if certificate is not None:

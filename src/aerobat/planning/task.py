@@ -81,10 +81,10 @@ class Task:
         """Gravity, wind, ground and obstacles, the walls of gates among them."""
         return self.problem.surroundings
 
-    @property
-    def without_reserve(self) -> Task:
-        """The same, every limit used in full."""
-        return replace(self, reserve=0.0) if self.reserve else self
+    @cached_property
+    def as_proven(self) -> Task:
+        """The task that a plan's evidence is about: every limit used in full, nothing more kept clear."""
+        return Task.of(self.problem, self.vehicle_if_any)
 
     @cached_property
     def balance(self) -> ForceBalance:
