@@ -188,16 +188,13 @@ class _Motion:
 
     def body(self, world: Array, rounding: Array) -> Vector:
         """A world vector in body axes, off by its rounding and by the attitude's error."""
-        size = np.linalg.norm(np.abs(self.polynomials_of(world)), axis=-1)
+        bounds = [self.polynomials(component).bound()[:, 0] for component in np.moveaxis(world, -1, 0)]
+        size = np.linalg.norm(bounds, axis=0)
         off = rounding + self.attitude_error * size
         x, y, z = (
             self.polynomials(component).bounded() * self.per_square for component in self.turned(world)
         )
         return x.with_error(off), y.with_error(off), z.with_error(off)
-
-    def polynomials_of(self, world: Array) -> Array:
-        """Return bounds of the magnitudes of a world vector's components on the pieces, (P, 3)."""
-        return np.stack([self.polynomials(world[..., i]).bound()[:, 0] for i in range(3)], axis=-1)
 
     @cached_property
     def attitude_error(self) -> Array:

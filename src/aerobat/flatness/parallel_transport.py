@@ -70,7 +70,8 @@ def _carry(directions: Array, control: Array, heading: float) -> Array:
     # any frame of the right direction differs from the chart's by an angle about it: angles add up
     arcs = so3.multiply(so3.smallest_rotation(directions[:-1], directions[1:]), chart[:-1])
     carried = np.concatenate([first[None], arcs])
-    angles = _angle_about_up(so3.multiply(so3.conjugate(chart), carried))
+    turns = so3.multiply(so3.conjugate(chart), carried)
+    angles = np.asarray(2 * np.arctan2(turns[..., 3], turns[..., 0]))
     angles[1:] += _area(directions[:-1], control)
     q = so3.multiply(chart, so3.about_axis(UP, np.cumsum(angles)))
     turned = np.append(np.dot(q[0], first), np.sum(q[1:] * q[:-1], axis=-1)) < 0
@@ -99,10 +100,6 @@ def _chart(directions: Array) -> Array:
     u, zero = 1 + np.abs(z), np.zeros_like(z)
     chart = np.where(z < 0, [-y, u, zero, x], [u, -y, x, zero]) / np.sqrt(2 * u)
     return np.asarray(chart.T)
-
-
-def _angle_about_up(q: Array) -> Array:
-    return np.asarray(2 * np.arctan2(q[..., 3], q[..., 0]))
 
 
 def _subdivided(times: Array, thrust: Array, floor: float) -> tuple[Subintervals, Array]:

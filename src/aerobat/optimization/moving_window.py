@@ -87,7 +87,8 @@ class _Windows:
 
     def run(self) -> None:
         """Move the windows along until a whole round finds nothing better, or no time is left."""
-        firsts = self._firsts
+        last = max(len(self._slots) - WIDTH, 0)
+        firsts = [*range(0, last, STEP), last]  # stages of the windows, the last of which ends with all
         unchanged, proven = 0, True
         for first in cycle(firsts):
             if out_of_time():
@@ -100,12 +101,6 @@ class _Windows:
             if unchanged == len(firsts):
                 self.settled = proven
                 return
-
-    @property
-    def _firsts(self) -> list[int]:
-        """The first stages of the windows, the last of which ends with the last stage."""
-        last = max(len(self._slots) - WIDTH, 0)
-        return [*range(0, last, STEP), last]
 
     def _solved(self, first: int) -> AssignmentResult:
         window = range(first, first + WIDTH)

@@ -57,17 +57,14 @@ class PolynomialColumn:
 
     values: Array  # (S, N)
     error: Array  # of the values, by rounding, at most, (S,)
-    queries: list[ExtremumQuery]  # whichever column they name
+    queries: list[ExtremumQuery]
 
 
 def kinematic_findings(trajectory: Trajectory, speed: float, limits: Iterable[Limit]) -> list[Finding]:
     """The largest speed, beside its limit [m/s], and the extrema of what limits on the path are about."""
     curve = PolynomialCurve.of(trajectory)
-    columns = [_speed(curve, speed), *(_linear(curve, limit) for limit in limits)]
-    queries = [
-        replace(query, column=place) for place, column in enumerate(columns) for query in column.queries
-    ]
-    return curve.series(columns).answers(queries)
+    columns = [_speed(curve, speed), *(_linear(curve, limit, place) for place, limit in enumerate(limits, 1))]
+    return curve.series(columns).answers([query for column in columns for query in column.queries])
 
 
 def _speed(curve: PolynomialCurve, limit: float) -> PolynomialColumn:
@@ -81,14 +78,14 @@ def _speed(curve: PolynomialCurve, limit: float) -> PolynomialColumn:
     return PolynomialColumn(squared, (2 * np.sqrt(magnitude) + off) * off, [lenient])
 
 
-def _linear(curve: PolynomialCurve, limit: Limit) -> PolynomialColumn:
-    """What a limit on the path is about."""
+def _linear(curve: PolynomialCurve, limit: Limit, place: int) -> PolynomialColumn:
+    """What a limit on the path is about, the column at a place."""
     quantity = limit.quantity
     values = np.einsum("snka,ka->sn", curve.derivatives, quantity.path) + quantity.constant
     summed = np.sum(np.abs(quantity.path) * curve.sums, axis=(1, 2)) + abs(quantity.constant)
     vectors = np.abs(curve.derivatives).max(axis=(0, 1, 3))
     largest = float(vectors @ np.linalg.norm(quantity.path, axis=1)) + abs(quantity.constant)
-    queries = [_lenient(side, largest) for side in within(limit, 0)]
+    queries = [_lenient(side, largest) for side in within(limit, place)]
     return PolynomialColumn(values, chebyshev.EVALUATION_ROUNDING * summed, queries)
 
 

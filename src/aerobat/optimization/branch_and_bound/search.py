@@ -80,15 +80,10 @@ class BestFirstSearch:
         return min(waiting, self._unresolved, self._cutoff if self._cutoff < UNBOUNDED else inf)
 
     @property
-    def is_unfinished(self) -> bool:
-        """True where a limit, or a relaxation without answer, has left something below the cutoff."""
-        return self._improves(self.bound)
-
-    @property
     def status(self) -> Status:
-        """The cost bounds proven so far."""
-        if self.best is not None:
-            return "time_limit" if self.is_unfinished else "optimal"
+        """What is known of the program so far."""
+        if self.best is not None:  # a limit, or a relaxation without answer, may leave something below it
+            return "time_limit" if self._improves(self.bound) else "optimal"
         return "infeasible" if self.bound == inf else "unknown"
 
     def try_start(self, slots: Mapping[int, int]) -> None:
