@@ -26,9 +26,8 @@ from aerobat.vehicle import Vehicle
 
 NEGLIGIBLE_JUMP = 1e-6  # of the largest value at knots: less than any controller or solver can tell
 NEGLIGIBLE_SEAM = 1e-6  # of the largest value, rad, or of 1 rad/s, where a lap closes
-COMMAND_RESOLUTION = (
-    1 / 1000
-)  # of a rotor's range: the steps of a pulse of 1000 to 2000 µs, as motors take commands
+# of a rotor's range: the steps of a pulse of 1000 to 2000 µs, as motors take commands
+COMMAND_RESOLUTION = 1 / 1000
 CANCELLATION = 1e3  # units in the last place of the largest coefficient that fitting a segment may cost
 
 

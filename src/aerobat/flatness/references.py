@@ -282,11 +282,8 @@ def _assembled(
         angle: From these frames to those of unequal drag [rad], yaw included, (T,); None of equal drag.
         yaw: Beside these frames [rad], with two derivatives, (T, 3); None without.
     """
-    thrust, q, determined = (
-        _thrust(flat, vehicle, environment),
-        path.q_world_body[nodes],
-        path.determined[nodes],
-    )
+    thrust = _thrust(flat, vehicle, environment)
+    q, determined = path.q_world_body[nodes], path.determined[nodes]
     airspeed = flat.velocity - environment.wind
     spin = None if yaw is None else yaw.T[1:]
     turned = q if yaw is None else so3.multiply(q, so3.about_axis(so3.UP, yaw[:, 0]))

@@ -59,9 +59,8 @@ class Limit:
     @property
     def ends(self) -> tuple[float, float]:
         """The limit's ends less the quantity's constant, as fractions of the limit's size."""
-        return (self.lower - self.quantity.constant) / self.size, (
-            self.upper - self.quantity.constant
-        ) / self.size
+        constant = self.quantity.constant
+        return (self.lower - constant) / self.size, (self.upper - constant) / self.size
 
     def kept(self, reserve: float) -> tuple[float, float]:
         """Return what a reserve for the controller keeps from either end, as fractions of its size."""

@@ -29,9 +29,7 @@ Extended = NDArray[np.longdouble]  # 80 bits where the machine has them, else fl
 
 MAX_PASSES = 12  # each wins back digits; beyond, the system is as good as singular
 NEGLIGIBLE_CORRECTION = 2.0**-54  # a correction this small, relative to its segment, is lost in float64
-MAX_LAST_CORRECTION = (
-    1e-6  # the last correction, relative to its segment: after a larger one it did not converge
-)
+MAX_LAST_CORRECTION = 1e-6  # relative to its segment: after a larger one it did not converge
 
 
 @dataclass(frozen=True, eq=False)

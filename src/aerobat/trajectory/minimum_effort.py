@@ -27,9 +27,8 @@ class ContinuityRule(StrEnum):
     """Continuity that gives way at an inner knot for a derivative that is fixed there."""
 
     VARIATIONAL = "variational"  # derivative 2s - 1 - d for a fixed derivative d: minimum effort
-    HIGHEST = (
-        "highest"  # the highest that remains, as in Cutler and How: more effort, low ones stay continuous
-    )
+    # the highest that remains, as in Cutler and How: more effort, low ones stay continuous
+    HIGHEST = "highest"
 
 
 @validated

@@ -58,9 +58,7 @@ class Miqp(Planner):
     backend: Literal["builtin", "gurobi", "scip"] = option(
         "builtin", "The solver, builtin, gurobi or scip (the last two are optional extras)."
     )
-    time_limit: NonNegative | None = option(  # [s]
-        None, TIME_LIMIT
-    )
+    time_limit: NonNegative | None = option(None, TIME_LIMIT)  # [s]
     reserve: Reserve = option(
         0.0,
         "The fraction of every limit of the vehicle that is kept from either of its ends for the controller, "
