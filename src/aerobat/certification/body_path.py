@@ -40,7 +40,7 @@ class BodyPath:
 
     def during(self, begin: float, end: float) -> BodyPath:
         """Return the part of it between two times [s]."""
-        first, last = (self.pieces.times(self.trajectory, np.array(side)) for side in (-1.0, 1.0))
+        first, last = self.pieces.spans(self.trajectory)
         rows = np.flatnonzero((first < end) & (begin < last))
         pieces, duration = self.pieces[rows], (last - first)[rows]
         low, high = (np.clip((time - first[rows]) / duration, 0.0, 1.0) for time in (begin, end))

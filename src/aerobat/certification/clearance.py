@@ -126,11 +126,7 @@ def least_gap(path: BodyPath, pieces: Pieces) -> LeastGap:
     if not len(path.pieces):
         return LeastGap()
     centres, radii = path.balls
-    over = (
-        path.pieces.times(path.trajectory, np.array(-1.0)),
-        path.pieces.times(path.trajectory, np.array(1.0)),
-    )
-    lower = pieces.apart(centres, centres, over) - radii[:, None]
+    lower = pieces.apart(centres, centres, path.pieces.spans(path.trajectory)) - radii[:, None]
     first = np.argsort(lower.min(axis=0))[:FIRST]
     pairs = _Beside.of(path, pieces, lower[:, first].argmin(axis=0), first).separated()
     found = pairs.nearest(LeastGap())

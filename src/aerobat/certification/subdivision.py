@@ -47,8 +47,8 @@ def subdivide(curve: ThrustCurve, floor: float) -> Subdivision:
         done.append(pending[good])
         left.append(pending[hopeless & ~good])
         pending = pending[~(good | hopeless)].halves()
-    pieces, rest = Subintervals.joined(done), Subintervals.joined(left)
-    return Subdivision(pieces[pieces.order()], _time_intervals(curve, rest[rest.order()]))
+    pieces, rest = (Subintervals.joined(parts).in_order() for parts in (done, left))
+    return Subdivision(pieces, _time_intervals(curve, rest))
 
 
 def _accurate(curve: ThrustCurve, pieces: Subintervals, norms: Array) -> NDArray[np.bool_]:
@@ -68,7 +68,7 @@ def _time_intervals(curve: ThrustCurve, pieces: Subintervals) -> tuple[TimeInter
     """The intervals that pieces in order make up together."""
     if not len(pieces):
         return ()
-    start, end = (pieces.times(curve.trajectory, np.full(len(pieces), side)) for side in (-1.0, 1.0))
+    start, end = pieces.spans(curve.trajectory)
     apart = start[1:] - end[:-1] > MIN_DURATION
     firsts = start[np.append(True, apart)]
     lasts = end[np.append(apart, True)]

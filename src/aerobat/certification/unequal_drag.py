@@ -63,7 +63,7 @@ def interpolated_with_unequal_drag(
     """
     pieces = pieces.halves()
     for _ in range(HALVINGS):
-        pieces = pieces[pieces.order()]
+        pieces = pieces.in_order()
         motion = _Motion.of(curve, pieces)
         with np.errstate(invalid="ignore", over="ignore"):
             columns = motion.columns(derived, on_thrust)
@@ -319,5 +319,5 @@ def _from(curve: ThrustCurve, pieces: Subintervals, count: int) -> tuple[TimeInt
     """The time from the start of the piece behind the first `count` on, if there is one."""
     if count == len(pieces):
         return ()
-    start = pieces[count : count + 1].times(curve.trajectory, np.array([-1.0]))
-    return (TimeInterval(float(start[0]), float(curve.trajectory.duration)),)
+    starts, _ = pieces[count : count + 1].spans(curve.trajectory)
+    return (TimeInterval(float(starts[0]), float(curve.trajectory.duration)),)

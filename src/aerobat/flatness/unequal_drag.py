@@ -81,8 +81,7 @@ def resolved_pieces(trajectory: Trajectory, drag: UnequalDrag) -> Subintervals:
         )
         done.append(pending[~rough])
         pending = pending[rough].halves()
-    pieces = Subintervals.joined(done)
-    return pieces[pieces.order()]
+    return Subintervals.joined(done).in_order()
 
 
 def trajectory_through(times: Array, flat: FlatState, heading: float) -> Trajectory:
@@ -130,7 +129,8 @@ class FrameAngle:
             last, angle = angle, series @ chebyshev.chebvander(nodes(), NODES).T
             if np.abs(angle - last).max() <= SETTLED * max(1.0, np.abs(angle).max()):
                 break
-        return cls(pieces.times(trajectory, np.full(len(pieces), -1.0)), seconds, series)
+        starts, _ = pieces.spans(trajectory)
+        return cls(starts, seconds, series)
 
     def at(self, times: Array) -> Array:
         """ψ at times [s], (T,)."""

@@ -60,9 +60,17 @@ class Subintervals:
         """The rows in the order of intervals and starts, (n,)."""
         return np.lexsort((self.start, self.interval))
 
+    def in_order(self) -> Subintervals:
+        """The same parts in the order of intervals and starts."""
+        return self[self.order()]
+
     def seconds(self, trajectory: Trajectory) -> Array:
         """Durations [s] of parts of a trajectory's segments, (n,)."""
         return np.asarray(self.length * trajectory.durations[self.interval])
+
+    def spans(self, trajectory: Trajectory) -> tuple[Array, Array]:
+        """Times [s] at which parts of a trajectory's segments begin and end, (n,) each."""
+        return self.times(trajectory, np.array(-1.0)), self.times(trajectory, np.array(1.0))
 
     def positions(self, at: Array) -> Array:
         """Return places (n,) in [-1, 1] on each part in the time of its interval, from 0 to 1, (parts, n)."""
