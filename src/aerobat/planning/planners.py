@@ -12,7 +12,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from functools import wraps
 from types import MappingProxyType, ModuleType
-from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, runtime_checkable
+from typing import (
+    Annotated,
+    Any,
+    Protocol,
+    TypeVar,
+    cast,
+    dataclass_transform,
+    get_type_hints,
+    runtime_checkable,
+)
 
 from pydantic import Field
 
@@ -25,7 +34,7 @@ from aerobat.planning.holds import between_holds
 from aerobat.planning.moving_gates import through_moving_gates
 from aerobat.planning.passages import require_clear_ends, require_openings
 from aerobat.planning.recorder import Progress
-from aerobat.planning.result import FLYING_RESERVE, Plan, PlanMethod
+from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan, PlanMethod
 from aerobat.problem import Problem, as_problem
 from aerobat.problem.heading import HeadingMode
 from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
@@ -193,6 +202,21 @@ def option(default: Any, help: str, off: str | None = None, command_default: Any
     """
     metadata = {"help": help, "off": off, "command_default": command_default}
     return field(default=default, metadata=metadata)
+
+
+# of a limit's range, kept from either of its ends for the controller
+Reserve = Annotated[float, Field(ge=0, lt=0.5)]
+KeptClearance = Annotated[float, Field(ge=0)]  # [m] kept from obstacles for the controller
+
+
+def clearance_option() -> Any:
+    """The option of planners that keep a clearance, a field `clearance` [m]."""
+    return option(
+        0.0,
+        "The distance in metres that the body keeps from obstacles for the controller, less where a passage "
+        "is narrow, and that paths keep inside the radius of waypoints, a tenth of it at most.",
+        command_default=FLYING_CLEARANCE,
+    )
 
 
 @validated

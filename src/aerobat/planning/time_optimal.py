@@ -11,12 +11,12 @@ from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.multi_start import MultiStart, quick_guess
-from aerobat.planning.planners import Planner, option, planner
+from aerobat.planning.planners import KeptClearance, Planner, Reserve, clearance_option, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, Refinement
-from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT
-from aerobat.planning.warm_start import CLEARANCE, Clearance, Reserve, flown_task
+from aerobat.planning.warm_start import flown_task
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -50,7 +50,7 @@ class TimeOptimal(Planner):
         "with 0 a time-optimal plan is a yardstick that no controller follows for sure.",
         command_default=FLYING_RESERVE,
     )
-    clearance: Clearance = option(0.0, CLEARANCE, command_default=FLYING_CLEARANCE)  # [m]
+    clearance: KeptClearance = clearance_option()  # [m]
     starts: Annotated[int, Field(ge=1)] = option(
         STARTS, "The number of starts; more find a faster local optimum at times, and take longer."
     )

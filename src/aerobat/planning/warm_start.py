@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from pydantic import Field
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
@@ -21,13 +19,6 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 NEAR_PLANE = 0.05  # of its extent, by which a path may leave a plane and still be bent out of it
-# of a limit's range, kept from either of its ends for the controller
-Reserve = Annotated[float, Field(ge=0, lt=0.5)]
-Clearance = Annotated[float, Field(ge=0)]  # [m] kept from obstacles for the controller
-CLEARANCE = (
-    "The distance in metres that the body keeps from obstacles for the controller, less where a passage is "
-    "narrow, and that paths keep inside the radius of waypoints, a tenth of it at most."
-)
 
 
 @dataclass(frozen=True, eq=False)

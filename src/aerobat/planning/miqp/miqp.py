@@ -23,15 +23,14 @@ from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
 from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.miqp.shortest import shortest
-from aerobat.planning.planners import Planner, option, planner
+from aerobat.planning.planners import KeptClearance, Planner, Reserve, clearance_option, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
-from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.search import GridSearch, Search
 from aerobat.planning.task import Task
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.planning.warm_start import CLEARANCE, Clearance, Reserve
 from aerobat.problem.problem import Limits, Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
@@ -66,7 +65,7 @@ class Miqp(Planner):
         "nothing. The default is given up where no plan keeps it.",
         command_default=FLYING_RESERVE,
     )
-    clearance: Clearance = option(0.0, CLEARANCE, command_default=FLYING_CLEARANCE)  # [m]
+    clearance: KeptClearance = clearance_option()  # [m]
     rescue: bool = option(
         True, "Give up where nothing is found, and try no other intervals, order or planner.", off="no-rescue"
     )

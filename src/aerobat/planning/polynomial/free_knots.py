@@ -12,12 +12,12 @@ from pydantic import Field
 
 from aerobat.declaration import AS_IT_IS, NonNegative
 from aerobat.planning.multi_start import MultiStart, quick_guess
-from aerobat.planning.planners import Planner, option, planner
+from aerobat.planning.planners import KeptClearance, Planner, Reserve, clearance_option, option, planner
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.refinement.refine import LEG_SEGMENTS, MAX_SEGMENTS, SEGMENTS, Refinement
-from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.time_limit import TIME_LIMIT
-from aerobat.planning.warm_start import CLEARANCE, Clearance, Reserve, flown_task
+from aerobat.planning.warm_start import flown_task
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
@@ -56,7 +56,7 @@ class FreeKnots(Planner):
         "with 0 a plan of four segments or more leaves it next to nothing.",
         command_default=FLYING_RESERVE,
     )
-    clearance: Clearance = option(0.0, CLEARANCE, command_default=FLYING_CLEARANCE)  # [m]
+    clearance: KeptClearance = clearance_option()  # [m]
     time_limit: NonNegative | None = option(None, TIME_LIMIT)  # [s]
 
     def plan(
