@@ -42,7 +42,7 @@ class RotorMargin:
         """A certificate's findings about rotors, in short; None if no attitude is ever determined."""
         if certificate.worst is None:
             return None
-        low, high = (_closest(certificate, side) for side in (Side.MIN, Side.MAX))
+        low, high = (min(rotor_findings(certificate, side), key=_margin) for side in (Side.MIN, Side.MAX))
         assert low.rotor is not None
         assert high.rotor is not None
         return cls(
@@ -144,11 +144,6 @@ def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[Reserve
 def rotor_findings(certificate: Certificate, side: Side | None = None) -> list[Finding]:
     """Findings of a certificate about each rotor's thrust, and its command if it lags, on one side or all."""
     return [f for f in certificate.findings if f.rotor is not None and side in (None, f.side)]
-
-
-def _closest(certificate: Certificate, side: Side) -> Finding:
-    """The rotor's finding with the smallest margin on one side."""
-    return min(rotor_findings(certificate, side), key=_margin)
 
 
 def _margin(finding: Finding) -> float:

@@ -118,7 +118,7 @@ def _along(task: Task, route: Sequence[Array]) -> WarmStart:
     stages: list[Stage] = []
     own: list[int] = []
     for k, leg in enumerate(route):
-        stages += [_corner(point) for point in _inner(leg)]
+        stages += [Stage("corner", fixed(Quantity.POSITION, point)) for point in _inner(leg)]
         if k < len(task.stages.stages):
             own.append(len(stages))
             stages.append(task.stages.stages[k])
@@ -134,10 +134,6 @@ def _inner(leg: Array) -> list[Array]:
         if min(np.linalg.norm(point - kept[-1]), np.linalg.norm(point - leg[-1])) > CLOSEST:
             kept.append(point)
     return kept[1:]
-
-
-def _corner(point: Array) -> Stage:
-    return Stage("corner", fixed(Quantity.POSITION, point))
 
 
 def _turned(task: Task) -> tuple[Task | None, ...]:
