@@ -81,7 +81,7 @@ class BestFirstSearch:
 
     @property
     def status(self) -> Status:
-        """What is known of the program so far."""
+        """The status of the best solution, as far as it is proven."""
         if self.best is not None:  # a limit, or a relaxation without answer, may leave something below it
             return "time_limit" if self._improves(self.bound) else "optimal"
         return "infeasible" if self.bound == inf else "unknown"
