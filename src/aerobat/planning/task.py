@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, isfinite
@@ -69,6 +69,10 @@ class Task:
     def with_room(self, room: float) -> Task:
         """Return the same, with no more clearance than is left where there is little room [m]."""
         return replace(self, clearance=min(self.clearance, max(SHARE * room, LEAST_CLEARANCE)))
+
+    def with_stages(self, stages: Iterable[Stage]) -> Task:
+        """Return the same with other stages, in order or not as before."""
+        return replace(self, stages=replace(self.stages, stages=tuple(stages)))
 
     @property
     def vehicle(self) -> Vehicle:

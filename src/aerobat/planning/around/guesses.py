@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from math import ceil, inf, sqrt
 from typing import NamedTuple
 
@@ -56,7 +56,7 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
     places = _places(task)
     if places is None or not task.problem.ends:
         return
-    legs = list(zip([begin for _, begin in places[:-1]], [end for end, _ in places[1:]], strict=True))
+    legs = [(begin, end) for (_, begin), (end, _) in pairwise(places)]
     lower, upper = task.problem.path_limits.of(0)
     corners = np.array([point for leg in legs for point in leg])
     pieces = task.environment.pieces
@@ -122,8 +122,7 @@ def _along(task: Task, route: Sequence[Array]) -> WarmStart:
         if k < len(task.stages.stages):
             own.append(len(stages))
             stages.append(task.stages.stages[k])
-    through = replace(task, stages=replace(task.stages, stages=tuple(stages)))
-    path = start_along_normals(through, EFFORT)
+    path = start_along_normals(task.with_stages(stages), EFFORT)
     return WarmStart(path.trajectory, task.stages.stages, tuple(path.times[k] for k in own))
 
 
@@ -150,11 +149,11 @@ def _turned(task: Task) -> tuple[Task | None, ...]:
     problem = replace(task.problem, gates=open_gates)
     found = []
     for sign in (1.0, -1.0):
-        stages = tuple(
+        stages = (
             stage if stage.gate not in gates else _on_its_side(task, stage, sign * gates[stage.gate].up)
             for stage in task.stages.stages
         )
-        found.append(replace(task, problem=problem, stages=replace(task.stages, stages=stages)))
+        found.append(replace(task, problem=problem).with_stages(stages))
     steepest = min(gate.up[2] for gate in gates.values())
     return tuple(found if steepest < BOTH_WAYS else found[:1])
 

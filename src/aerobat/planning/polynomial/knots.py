@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import filterfalse, pairwise
 from math import isfinite, sqrt
@@ -78,7 +78,7 @@ def unhurried(task: Task) -> Task:
         stage if stage.attitude else replace(stage, conditions=tuple(filterfalse(_hurries, stage.conditions)))
         for stage in task.stages.stages
     )
-    return _with_stages(task, stages)
+    return task.with_stages(stages)
 
 
 def _without_figures_attitudes(task: Task) -> Task:
@@ -89,7 +89,7 @@ def _without_figures_attitudes(task: Task) -> Task:
         else stage
         for stage in task.stages.stages
     )
-    return _with_stages(task, stages)
+    return task.with_stages(stages)
 
 
 def _is_of_figure(stage: Stage) -> bool:
@@ -99,11 +99,6 @@ def _is_of_figure(stage: Stage) -> bool:
 
 def _is_of_thrust(condition: Condition) -> bool:
     return condition.quantity is Quantity.SPECIFIC_THRUST
-
-
-def _with_stages(task: Task, stages: Iterable[Stage]) -> Task:
-    """The task with other stages."""
-    return replace(task, stages=replace(task.stages, stages=tuple(stages)))
 
 
 def stretched_path(task: Task, order: int) -> Trajectory:
@@ -157,7 +152,7 @@ def path_along_normals(task: Task, order: int) -> Trajectory:
         else replace(stage, conditions=(*stage.conditions, *_along(task.problem.gate(stage.gate), speed)))
         for stage, speed in zip(task.stages.stages, speeds, strict=True)
     ]
-    return stretched_path(_with_stages(task, stages), order)
+    return stretched_path(task.with_stages(stages), order)
 
 
 def start_along_normals(task: Task, order: int) -> WarmStart:
