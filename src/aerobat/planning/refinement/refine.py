@@ -468,7 +468,7 @@ def _shortest(*found: Judged[RefinedPath] | None) -> Judged[RefinedPath] | None:
 
 
 def _refuted(certificate: Certificate, reserve: float) -> tuple[float, list[float]]:
-    """The largest excess that a certificate refutes, or misses of the reserve, and when limits are violated."""
+    """The largest excess that a certificate refutes, or misses of the reserve; when limits are violated."""
     refuted = [f for f in certificate.findings if f.verdict is Verdict.VIOLATED and f.limit is not None]
     beyond = [-(f.margin or 0.0) / (f.size or max(abs(f.limit or 0.0), 1.0)) for f in refuted]
     missed = [shortfall.size for shortfall in reserve_shortfalls(certificate, reserve)]
