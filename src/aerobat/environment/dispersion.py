@@ -4,20 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, ClassVar, TypeVar
 
 from pydantic import Field
 
-from aerobat.declaration import (
-    FieldError,
-    Label,
-    NonNegative,
-    Positive,
-    declared,
-    in_degrees,
-    in_radians,
-    validated,
-)
+from aerobat.declaration import FieldError, Label, NonNegative, Positive, declared, validated
 from aerobat.environment.sensors import AngleSpread, Imu, MotionCapture, SensorRate
 
 T = TypeVar("T")
@@ -129,15 +120,6 @@ class Dispersion:
             sensors = f"IMU at {self.imu.rate:g} Hz, poses at {self.motion_capture.rate:g} Hz"
         spreads = ", ".join(f"{key} {100 * getattr(self, key):.3g} %" for key in self._RELATIVE)
         return f"{self.name}: {spreads}, {sensors}; {' '.join(self.description.split())}".removesuffix("; ")
-
-    @classmethod
-    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace the shorthand."""
-        return in_radians(table, "start_attitude")
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the angle in degrees."""
-        return in_degrees(table, "start_attitude")
 
 
 def _scaled(value: T, factor: float, names: tuple[str, ...]) -> T:

@@ -16,8 +16,6 @@ from aerobat.declaration import (
     UnitVector,
     Vector3,
     declared,
-    in_degrees,
-    in_radians,
     number,
 )
 
@@ -52,18 +50,13 @@ class Imu:
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace the shorthands."""
-        table = in_radians(table, "gyro_range")
+        """Replace the range in g."""
         shorthand = "accelerometer_range_g"
         if shorthand not in table:
             return table
         if "accelerometer_range" in table:
             raise FieldError(shorthand, "stands beside accelerometer_range; give one of them")
         return table | {"accelerometer_range": cls.G * number(table.pop(shorthand), shorthand)}
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the gyro's range in degrees."""
-        return in_degrees(table, "gyro_range")
 
 
 @declared
@@ -83,15 +76,6 @@ class HandOff:
     warp_depth: Positive = 0.5  # [m] from the plane to where the warp is e^(−1/2) of that, a Gaussian
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"rotation_deg": "[deg] `rotation` in degrees"}
-
-    @classmethod
-    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace the shorthand."""
-        return in_radians(table, "rotation")
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the angle in degrees."""
-        return in_degrees(table, "rotation")
 
 
 @declared
@@ -120,12 +104,3 @@ class MotionCapture:
     hand_off: HandOff | None = None  # to a second camera system; left out, there is only one
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"attitude_noise_deg": "[deg] `attitude_noise` in degrees"}
-
-    @classmethod
-    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace the shorthand."""
-        return in_radians(table, "attitude_noise")
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the angle in degrees."""
-        return in_degrees(table, "attitude_noise")

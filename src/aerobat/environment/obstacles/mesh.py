@@ -10,7 +10,7 @@ import numpy as np
 
 from aerobat.declaration import Angle, FieldError, Label, Vector3, number, shown, within_field
 from aerobat.documents import file_name
-from aerobat.environment.obstacles.attitude import ATTITUDE, angles_in_degrees, angles_in_radians, axes_of
+from aerobat.environment.obstacles.attitude import ATTITUDE, axes_of
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.mesh_file import mesh_parts
 from aerobat.environment.obstacles.obstacle import Obstacle, obstacle
@@ -47,8 +47,7 @@ class Mesh(Obstacle):
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace the angles in degrees, and the file by its parts."""
-        table = angles_in_radians(table)
+        """Replace the file by its parts."""
         if "file" in table:
             if "parts" in table:
                 raise FieldError("file", "stands beside parts; give one or the other")
@@ -60,10 +59,6 @@ class Mesh(Obstacle):
         elif "parts" not in table:
             raise FieldError("file", "is missing; add it, or parts")
         return table
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the angles in degrees where those say exactly the same."""
-        return angles_in_degrees(table)
 
     def __post_init__(self) -> None:
         """Check."""

@@ -11,16 +11,8 @@ from pydantic import Field, PlainValidator
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.declaration import (
-    Angle,
-    FieldError,
-    Label,
-    Positive,
-    UnitVector,
-    Vector3,
-    finite,
-)
-from aerobat.environment.obstacles.attitude import ATTITUDE, angles_in_degrees, angles_in_radians, axes_of
+from aerobat.declaration import Angle, FieldError, Label, Positive, UnitVector, Vector3, finite
+from aerobat.environment.obstacles.attitude import ATTITUDE, axes_of
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.obstacle import Obstacle, obstacle
 
@@ -60,15 +52,6 @@ class Box(Obstacle):
     name: Label = "box"  # by which findings name it
 
     SHORTHANDS: ClassVar[Mapping[str, str]] = ATTITUDE
-
-    @classmethod
-    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace the angles in degrees."""
-        return angles_in_radians(table)
-
-    def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the angles in degrees where those say exactly the same."""
-        return angles_in_degrees(table)
 
     @property
     def axes(self) -> Array:
