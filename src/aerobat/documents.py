@@ -8,10 +8,11 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from aerobat.declaration import FieldError, from_table, shown, unknown_name
+from aerobat.declaration import FieldError, from_table, shown, to_table, unknown_name
 from aerobat.errors import SpecError
 from aerobat.storage import read_whole, write_whole
 
@@ -32,32 +33,38 @@ _FOLDER: ContextVar[Path] = ContextVar("_FOLDER", default=Path())  # of the docu
 _NUMBERS = re.compile(r"\[\n((?:\s*[-+\w.]+,\n)+)\s*\]")  # a list of numbers, each on a line of its own
 
 
-def document_names(presets: Traversable) -> tuple[str, ...]:
-    """The names of the documents that lie in the folder `presets`, sorted."""
-    stems = (entry.name.removesuffix(".toml") for entry in presets.iterdir() if entry.name.endswith(".toml"))
-    return tuple(sorted(stems))
+@dataclass(frozen=True)
+class Presets(Generic[T]):
+    """The documents of one kind that come with Aerobat, beside which users have files of their own."""
 
+    cls: type[T]  # the declared class of what they describe; left out in a file, its `name` is the file's
+    kind: str  # what errors call one, such as "vehicle"
+    folder: Traversable  # with a file NAME.toml for each
 
-def preset_text(name_or_path: str | os.PathLike[str], presets: Traversable) -> str | None:
-    """The text of one of the `presets` as it stands, its remarks included; None for any other document."""
-    if name_or_path not in document_names(presets):
-        return None
-    return (presets / f"{name_or_path}.toml").read_text(encoding="utf-8")
+    def names(self) -> tuple[str, ...]:
+        """Return their names, sorted."""
+        files = (entry.name for entry in self.folder.iterdir() if entry.name.endswith(".toml"))
+        return tuple(sorted(name.removesuffix(".toml") for name in files))
 
+    def load(self, name_or_path: str | os.PathLike[str]) -> T:
+        """Return what one of them describes, or a file. Raises SpecError.
 
-def resolve_document(name_or_path: str | os.PathLike[str], presets: Traversable, kind: str) -> Document:
-    """The document that a user means: one of the `presets` by its name, or a file by its path.
+        A path object, or text that ends in .toml or has a folder in it, is the path of a file.
+        """
+        text = os.fspath(name_or_path)
+        path: Document = Path(text)
+        if isinstance(name_or_path, str) and not (text.endswith(".toml") or "/" in text or os.sep in text):
+            known = self.names()
+            if text not in known:
+                raise unknown_name(self.kind, text, known)
+            path = self.folder / f"{text}.toml"
+        return read_document(path, self.cls, self.kind, name=path.name.removesuffix(".toml"))
 
-    A path object, or text that ends in .toml or has a folder in it, is a path; whether it exists is found
-    out on reading. Raises SpecError, with the closest name, for a name that no preset has.
-    """
-    text = os.fspath(name_or_path)
-    if not isinstance(name_or_path, str) or text.endswith(".toml") or "/" in text or os.sep in text:
-        return Path(text)
-    known = document_names(presets)
-    if text not in known:
-        raise unknown_name(kind, text, known)
-    return presets / f"{text}.toml"
+    def text(self, name_or_path: str | os.PathLike[str]) -> str:
+        """Return the text of one of them as it stands, with its remarks, or of a file as it was read."""
+        if name_or_path in self.names():
+            return (self.folder / f"{name_or_path}.toml").read_text(encoding="utf-8")
+        return to_toml(to_table(self.load(name_or_path)))
 
 
 def read_document(path: str | Document, cls: type[T], kind: str, **defaults: Any) -> T:

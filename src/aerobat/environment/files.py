@@ -5,15 +5,15 @@ from __future__ import annotations
 from importlib.resources import files
 
 from aerobat.declaration import PathName, to_table, validated
-from aerobat.documents import document_names, read_document, resolve_document, write_document
+from aerobat.documents import Presets, write_document
 from aerobat.environment.dispersion import Dispersion
 
-PRESETS = files("aerobat.environment") / "presets"
+CONDITIONS = Presets(Dispersion, "conditions", files("aerobat.environment") / "presets")
 
 
 def dispersion_names() -> tuple[str, ...]:
     """Return the names of the conditions that come with Aerobat."""
-    return document_names(PRESETS)
+    return CONDITIONS.names()
 
 
 @validated
@@ -23,8 +23,7 @@ def load_dispersion(name_or_path: PathName) -> Dispersion:
     Raises SpecError, in one sentence that names the file and the field, when there are none such or the file
     is malformed.
     """
-    path = resolve_document(name_or_path, PRESETS, "conditions")
-    return read_document(path, Dispersion, "conditions", name=path.name.removesuffix(".toml"))
+    return CONDITIONS.load(name_or_path)
 
 
 def as_dispersion(dispersion: Dispersion | str) -> Dispersion:

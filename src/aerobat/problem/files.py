@@ -5,22 +5,15 @@ from __future__ import annotations
 from importlib.resources import files
 
 from aerobat.declaration import PathName, to_table, validated
-from aerobat.documents import (
-    document_names,
-    preset_text,
-    read_document,
-    resolve_document,
-    to_toml,
-    write_document,
-)
+from aerobat.documents import Presets, write_document
 from aerobat.problem.problem import Problem
 
-PRESETS = files("aerobat.problem") / "presets"
+PROBLEMS = Presets(Problem, "problem", files("aerobat.problem") / "presets")
 
 
 def problem_names() -> tuple[str, ...]:
     """Return the names of the built-in problems."""
-    return document_names(PRESETS)
+    return PROBLEMS.names()
 
 
 @validated
@@ -29,8 +22,7 @@ def load_problem(name: PathName) -> Problem:
 
     Raises SpecError, in one sentence that names the field, when there is no such problem or it is malformed.
     """
-    path = resolve_document(name, PRESETS, "problem")
-    return read_document(path, Problem, "problem", name=path.name.removesuffix(".toml"))
+    return PROBLEMS.load(name)
 
 
 def as_problem(problem: Problem | str) -> Problem:
@@ -44,7 +36,7 @@ def problem_text(name: PathName) -> str:
 
     Raises SpecError as `load_problem` does.
     """
-    return preset_text(name, PRESETS) or to_toml(to_table(load_problem(name)))
+    return PROBLEMS.text(name)
 
 
 @validated

@@ -5,22 +5,15 @@ from __future__ import annotations
 from importlib.resources import files
 
 from aerobat.declaration import PathName, to_table, validated
-from aerobat.documents import (
-    document_names,
-    preset_text,
-    read_document,
-    resolve_document,
-    to_toml,
-    write_document,
-)
+from aerobat.documents import Presets, write_document
 from aerobat.vehicle.vehicle import Vehicle
 
-PRESETS = files("aerobat.vehicle") / "presets"
+VEHICLES = Presets(Vehicle, "vehicle", files("aerobat.vehicle") / "presets")
 
 
 def vehicle_names() -> tuple[str, ...]:
     """Return the names of the vehicles that come with Aerobat."""
-    return document_names(PRESETS)
+    return VEHICLES.names()
 
 
 @validated
@@ -30,8 +23,7 @@ def load_vehicle(name_or_path: PathName) -> Vehicle:
     Raises SpecError, in one sentence that names the file and the field, when there is no such vehicle, the
     file is malformed, or what it describes cannot fly.
     """
-    path = resolve_document(name_or_path, PRESETS, "vehicle")
-    return read_document(path, Vehicle, "vehicle", name=path.name.removesuffix(".toml"))
+    return VEHICLES.load(name_or_path)
 
 
 def as_vehicle(vehicle: Vehicle | str) -> Vehicle:
@@ -45,7 +37,7 @@ def vehicle_text(name_or_path: PathName) -> str:
 
     Raises SpecError as `load_vehicle` does.
     """
-    return preset_text(name_or_path, PRESETS) or to_toml(to_table(load_vehicle(name_or_path)))
+    return VEHICLES.text(name_or_path)
 
 
 @validated
