@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
+from aerobat import provenance
 from aerobat.errors import Reason
 from aerobat.reporting.feasibility.facts import requirements
 from aerobat.reporting.plain_data import plain
@@ -149,6 +150,18 @@ def test_an_interrupted_map_goes_on_where_it_stopped(tmp_path: Path) -> None:
         file.write_bytes(b"PK")
     with pytest.raises(KeyboardInterrupt):  # what is damaged is planned again
         ab.feasibility_map("line", over, planner="min-snap", keep=kept, executor=Interrupted(0))
+
+
+@pytest.mark.parametrize("library", ["numpy", "scipy"])
+def test_a_map_does_not_go_on_under_another_version_of_a_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, library: str
+) -> None:
+    kept, over = tmp_path / "kept", {"goal.position.x": [1.0]}
+    ab.feasibility_map("line", over, planner="min-snap", workers=1, keep=kept)
+    installed = provenance.version
+    monkeypatch.setattr(provenance, "version", lambda name: "0.1" if name == library else installed(name))
+    with pytest.raises(ab.SpecError, match=r"keeps cells of another map \(versions\); remove it"):
+        ab.feasibility_map("line", over, planner="min-snap", workers=1, keep=kept)
 
 
 @given(

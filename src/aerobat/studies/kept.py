@@ -17,9 +17,9 @@ from aerobat.documents import read_json
 from aerobat.errors import SpecError
 from aerobat.provenance import installed_versions
 from aerobat.storage import digest_of, read_arrays, whole_file, write_whole
+from aerobat.studies.workers import LIBRARIES
 
 FINGERPRINT = "fingerprint.json"
-LIBRARIES = ("aerobat", "numpy", "llvmlite", "jax")  # that the numbers of flights come from
 
 
 @dataclass(frozen=True)
