@@ -11,7 +11,7 @@ from aerobat.environment import Dispersion
 from aerobat.simulation import FlightConfig
 from aerobat.studies.share import Share
 
-CAUSES: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # each with what is there without it
+SWITCHED_OFF: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # causes, and conditions without each
     {
         "the spread of mass": {"mass": 0.0},
         "the spread of inertia": {"inertia": 0.0},
@@ -51,7 +51,7 @@ def standing_in_the_way(conditions: Dispersion, share: Callable[[Dispersion], Sh
         share: Flies the same flights under other conditions.
     """
     freed = []
-    for cause, off in CAUSES.items():
+    for cause, off in SWITCHED_OFF.items():
         without = replace(conditions, **off)
         period = 1.0 / (without.control_rate or FlightConfig().rate)
         without = replace(without, computation_delay=min(without.computation_delay, period))
