@@ -5,8 +5,6 @@ Every field may carry leading axes (time, vehicles); they broadcast.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from aerobat.arrays import Array
 from aerobat.declaration import by_value, validated
 
@@ -15,7 +13,6 @@ STANDARD_GRAVITY = 9.81  # [m/s²] as the paper has it
 
 @validated
 @by_value
-@dataclass(frozen=True, eq=False)
 class BodyState:
     """The state of a rigid body."""
 
@@ -27,7 +24,6 @@ class BodyState:
 
 @validated
 @by_value
-@dataclass(frozen=True, eq=False)
 class FlatState:
     """Position and its derivatives, the flat outputs of a multirotor; all world frame, (..., 3)."""
 
@@ -40,7 +36,6 @@ class FlatState:
 
 @validated
 @by_value
-@dataclass(frozen=True, eq=False)
 class Wrench:
     """The rotors' effect on the body: collective thrust along +z and moments, body frame."""
 
@@ -50,7 +45,6 @@ class Wrench:
 
 @validated
 @by_value
-@dataclass(frozen=True, eq=False)
 class Setpoint:
     """A trajectory's demand on a vehicle: the flat state and all that flatness derives from it."""
 

@@ -7,7 +7,7 @@ from enum import StrEnum
 from math import degrees, inf
 from typing import Literal
 
-from aerobat.declaration import by_value, in_notebooks, short, validated
+from aerobat.declaration import by_value, in_notebooks, validated
 from aerobat.errors import Reason
 from aerobat.flatness import TimeInterval
 from aerobat.limits.limit import quantity_name
@@ -138,9 +138,7 @@ class Discontinuity:
 
 @validated
 @in_notebooks
-@short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Certificate:
     """Findings along the whole of a trajectory, between samples and knots too.
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from enum import Enum
 from importlib import import_module
-from typing import Any, TypeVar
+from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 
@@ -19,8 +19,8 @@ _known_names: dict[type[Any], tuple[str, ...]] = {}  # of fields, by class
 
 
 def in_notebooks(cls: type[T]) -> type[T]:
-    """Give a class a table for notebooks and, where there is one of its values, a picture."""
-    made: Any = cls
+    """Let a class be represented by its text and, in notebooks, by a table and any picture of its values."""
+    made: Any = short(cls)
     made._repr_html_ = _repr_html_
     made._repr_png_ = _repr_png_
     return cls
@@ -38,12 +38,15 @@ def _repr_png_(self: Any) -> bytes | None:
     return png
 
 
+@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(dataclasses.field,))
 def by_value(cls: type[T]) -> type[T]:
-    """Let a frozen dataclass be its content: equality, hash, pickling, and a line as its text.
+    """Make a class a frozen dataclass that is its content: equality, hash, pickling, and a line as its text.
 
     Arrays count by shape and numbers, NaN equals NaN. A class that has a text or a representation of its own
-    keeps it.
+    keeps it. A class that `declared` made a dataclass remains that.
     """
+    if "__dataclass_fields__" not in vars(cls):
+        cls = dataclasses.dataclass(frozen=True, eq=False)(cls)
     made: Any = cls
     made.__eq__ = _equal
     made.__hash__ = _hash

@@ -175,7 +175,6 @@ def _slots(log: SensorLog, poses: Indices) -> Indices:
 
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Estimates:
     """Estimates of a log's states: the state at the end of each sample, and what became of each pose."""
 

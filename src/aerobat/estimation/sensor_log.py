@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from aerobat import so3
@@ -19,7 +17,6 @@ _UNIT = 1e-2  # [-] by which the norm of a quaternion may be off: what few decim
 @validated
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class SensorLog:
     """Record of an IMU and of poses, on one clock; SI units, ENU world, FLU body.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import ceil, isinf, log
 from typing import Annotated, Literal
 
@@ -21,7 +20,6 @@ Side = Literal["both", "width", "height"]
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class Opening:
     """An opening about a gate's centre, and how far the flights at hand vouch for it."""
 

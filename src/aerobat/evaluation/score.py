@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.declaration import by_value, in_notebooks, short, shown, validated
+from aerobat.declaration import by_value, in_notebooks, shown, validated
 from aerobat.errors import OutOfRange, SpecError
 from aerobat.evaluation.criteria import SampledPath, criteria_of
 from aerobat.kernels.running_metrics import RunningMetrics
@@ -73,9 +73,7 @@ class LapTime:
 
 
 @in_notebooks
-@short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Score:
     """A flight in numbers, or a batch of flights: then numbers are arrays (flights,).
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, NamedTuple, Unpack, get_type_hints
@@ -59,7 +58,6 @@ _SHAPES: Mapping[str, tuple[int, ...]] = {
 
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Gradient:
     """A number that a flight comes to, and its slopes in named quantities.
 
@@ -71,7 +69,6 @@ class Gradient:
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class Sensitivity:
     """The errors of a flight against its set-points, and how they change."""
 

@@ -7,7 +7,7 @@ RA-L 2018). With unequal ones across, d is their mean, and `unequal_drag` turns 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,7 +42,6 @@ UNDETERMINED = 1e-3  # the attitude is undetermined where |f| is below this frac
 
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Reference:
     """All that a vehicle must do to follow a trajectory, at every time of a series."""
 

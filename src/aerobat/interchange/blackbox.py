@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi
 from typing import Any
 
@@ -21,7 +20,6 @@ _STEP = 0.005  # [s] between the beginnings that are tried
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class Blackbox:
     """The rates of a flight by a flight controller's own log, on its own clock. Axes are FLU."""
 

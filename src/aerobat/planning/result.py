@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import TypeVar
 
 import numpy as np
 
 from aerobat.certification import Certificate
-from aerobat.declaration import PathName, by_value, in_notebooks, short, validated
+from aerobat.declaration import PathName, by_value, in_notebooks, validated
 from aerobat.planning.assessment.assessment import Assessment, SecondOpinion
 from aerobat.planning.evidence import Evidence
 from aerobat.planning.flyability import Flyability
@@ -31,9 +31,7 @@ FLYING_CLEARANCE = 0.1  # [m] from obstacles, of plans that are flown: what erro
 
 @validated
 @in_notebooks
-@short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """A trajectory that solves a problem, and the evidence for it."""
 

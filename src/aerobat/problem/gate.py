@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from math import degrees, radians
 from typing import Any, ClassVar, cast
@@ -219,7 +219,6 @@ class Gate:
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class GateWall(Obstacle):
     """The wall of a gate: a piece beside each side of the polygon that planners take for its opening.
 

@@ -14,16 +14,7 @@ from numpy.typing import NDArray
 
 from aerobat import so3
 from aerobat.arrays import Array, frozen
-from aerobat.declaration import (
-    PathName,
-    by_value,
-    from_table,
-    in_notebooks,
-    short,
-    shown,
-    to_table,
-    validated,
-)
+from aerobat.declaration import PathName, by_value, from_table, in_notebooks, shown, to_table, validated
 from aerobat.environment import Environment
 from aerobat.environment.obstacles import OBSTACLES, Obstacle
 from aerobat.errors import OutOfRange, SpecError
@@ -83,9 +74,7 @@ SERIES = (
 
 @validated
 @in_notebooks
-@short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Flight:
     """One flight, or a batch of them: then the vehicles' series carry a leading axis of vehicles.
 

@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-from aerobat.declaration import NonNegative, by_value, in_notebooks, short, validated
+from aerobat.declaration import NonNegative, by_value, in_notebooks, validated
 from aerobat.errors import BackendMissing, Infeasible, SpecError
 from aerobat.evaluation.score import Score, score
 from aerobat.optimization.deadline import out_of_time, within_time
@@ -20,7 +20,6 @@ from aerobat.vehicle import Vehicle, as_vehicle
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class Entry:
     """The result of one planner: a plan and its flight, or the reason why there is none."""
 
@@ -40,9 +39,7 @@ class Entry:
 
 @validated
 @in_notebooks
-@short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """All planners on one problem and one vehicle."""
 

@@ -22,7 +22,7 @@ from pydantic import Field
 
 from aerobat.arrays import Array, frozen
 from aerobat.control import Controller
-from aerobat.declaration import NonNegative, Seed, by_value, in_notebooks, short, unknown_name, validated
+from aerobat.declaration import NonNegative, Seed, by_value, in_notebooks, unknown_name, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import SpecError
 from aerobat.evaluation import Score
@@ -55,7 +55,6 @@ Evaluations = Annotated[int, Field(ge=1, le=100_000, description="whole number f
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class FlightCosts:
     """Many flights of some plans under one set of gains; arrays (plans, flights)."""
 
@@ -88,9 +87,7 @@ class FlightCosts:
 
 
 @in_notebooks
-@short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Tuning:
     """The gains that a search found for a vehicle, and what they are worth on other flights."""
 

@@ -53,7 +53,6 @@ class Extremum:
 @validated
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """Position over time, p(t) = Σ_k c_k s^k with s = (t - knot)/T on each segment; starts at t = 0.
 

@@ -6,7 +6,6 @@ rates and thrust are kept for as long as it takes until the loss is noticed; the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf
 
 import numpy as np
@@ -53,7 +52,6 @@ class UndeterminedAttitude(SpecError):
 
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Recoveries:
     """The recoveries from instants of a path."""
 

@@ -8,7 +8,6 @@ one row bounds the clearance at its neighbours from below; only what may be near
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf
 from typing import Any, NamedTuple
 
@@ -30,7 +29,6 @@ NEVER = np.iinfo(np.intp).max  # the row of a contact that there is not
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class NearestObstacle(PerFlight):
     """The obstacle that a flight comes nearest to before it touches any, else the first that it touches."""
 

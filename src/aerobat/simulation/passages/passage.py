@@ -48,7 +48,6 @@ class PerFlight:
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class Passage(PerFlight):
     """A gate's plane crossed in its direction, next to the planned instant; NaN where it was not.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import degrees
 from typing import Any
 
@@ -17,7 +16,6 @@ from aerobat.simulation.passages.passage import PASSAGE_WINDOW, PerFlight
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class PlannedAttitude:
     """A stage's attitude to be taken at an instant."""
 
@@ -29,7 +27,6 @@ class PlannedAttitude:
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class StageAttitude(PerFlight):
     """The thrust axis where it comes nearest to a stage's next to the planned instant; NaN where unknown.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ GRAZING = 1e-3
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class WaypointPassage(PerFlight):
     """The nearest approach to a waypoint next to the planned instant; NaN where there is none.
 

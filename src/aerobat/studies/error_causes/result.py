@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -96,7 +95,6 @@ def _planned(cause: str, problem: Problem, planner: Planner, vehicle: Vehicle | 
 
 
 @by_value
-@dataclass(frozen=True)
 class Cost:
     """The growth of an error by a cause: the median over pairs of flights, with the cause and without.
 
@@ -122,7 +120,6 @@ class Cost:
 
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class TrialResult:
     """Flights of one trial. Errors are arrays (flights,), infinite where a gate was not crossed."""
 
@@ -174,7 +171,6 @@ class TrialResult:
 
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class ErrorCauses:
     """The same flights with no cause of error, with each alone, and with all together."""
 

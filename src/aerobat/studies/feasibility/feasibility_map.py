@@ -21,7 +21,6 @@ from aerobat.declaration import (
     Seed,
     by_value,
     in_notebooks,
-    short,
     shown,
     to_table,
     validated,
@@ -115,7 +114,6 @@ def _range(name: str, first: float, last: float, step: float) -> tuple[float, ..
 
 
 @by_value
-@dataclass(frozen=True)
 class Cell:
     """The answer for one value of each field."""
 
@@ -152,9 +150,7 @@ class Cell:
 
 
 @in_notebooks
-@short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class FeasibilityMap:
     """For which values of one or two fields a problem has a plan: a cell for each, row by row."""
 

@@ -29,7 +29,6 @@ Tried = Callable[[str, float, bool], None]
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class Requirement:
     """The least of a quantity for which a plan is found, proven by it, and what is refused just below.
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import minimize_scalar
 
@@ -19,7 +17,6 @@ _SHIFTS = 201  # that are tried at first
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class Alignment:
     """The move that brings a plan onto a log: turned about the vertical, moved, and begun later."""
 

@@ -97,7 +97,6 @@ class ErrorShare:
 
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Inspection:
     """The causes of a flight's position error."""
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from aerobat.declaration import by_value, in_notebooks, short
+from aerobat.declaration import by_value, in_notebooks
 from aerobat.planning import Plan
 from aerobat.planning.tube import Tube
 from aerobat.studies.share import Share
 
 
 @by_value
-@dataclass(frozen=True, eq=False)
 class Round:
     """One round: a plan with a reserve, and how many of the training flights pass."""
 
@@ -25,9 +22,7 @@ class Round:
 
 
 @in_notebooks
-@short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Passing:
     """A plan whose flights pass with the probability asked, and the proof.
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from aerobat.arrays import Array
-from aerobat.declaration import Label, Number, by_value, in_notebooks, short, unknown_name, validated
+from aerobat.declaration import Label, Number, by_value, in_notebooks, unknown_name, validated
 from aerobat.environment import Dispersion
 from aerobat.evaluation.opening import Opening, Probability, opening_of
 from aerobat.planning import Plan
@@ -46,9 +46,7 @@ class ErrorBand:
 
 
 @in_notebooks
-@short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Sweep:
     """Many flights of one plan, a row each in the table; of the first ones, errors over time too.
 

@@ -6,7 +6,6 @@ Nothing is advised that was not tried: each remedy comes with its plan.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import reduce
 
 from aerobat.declaration import by_value, short, validated
@@ -26,7 +25,6 @@ Tried = Callable[[str, bool], None]
 
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Remedy:
     """Changes with which a problem is planned, and the plan."""
 
@@ -40,7 +38,6 @@ class Remedy:
 
 @short
 @by_value
-@dataclass(frozen=True, eq=False, repr=False)
 class Why:
     """Why a problem has no plan, and what helps."""
 
