@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Unpack
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.declaration import validated
 from aerobat.engines import logged_ticks
-from aerobat.engines.pytree import Tree, from_components, tree_map, tree_stack
+from aerobat.engines.pytree import from_components, tree_map
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.evaluation.criteria import SampledPath, criteria_of
@@ -21,11 +20,9 @@ from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.config import FlightChanges, FlightConfig
-from aerobat.simulation.loop import Log
 from aerobat.simulation.metrics import PoseRow, metrics_row, pose_row, with_metrics
 from aerobat.simulation.passages import FlownBodies, NearestObstacle, nearest_obstacles
 from aerobat.simulation.prepare import prepare
-from aerobat.simulation.reference_source import BLOCK
 from aerobat.simulation.setup import FlightSetup
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -107,19 +104,14 @@ def score_over_time(
         raise SpecError("plant: other simulators fly one vehicle at a time; take fly and score")
     setup = prepare(plan, vehicles, environment=environment, config=config)
     ticks = len(setup.times)
-    blocks = range(0, ticks, BLOCK)
-    parts = [setup.reference.setpoint(k, min(k + BLOCK, ticks)) for k in blocks]
-    path = SampledPath(
-        setup.times,
-        np.concatenate([part.flat.position for part in parts]),
-        np.concatenate([part.q_world_body for part in parts]),
-    )
+    setpoint = setup.reference.setpoint(np.arange(ticks))
+    path = SampledPath(setup.times, setpoint.flat.position, setpoint.q_world_body)
     criteria = criteria_of(goal, path)
     flown = with_metrics(setup, criteria)
     if len(environment.pieces):
         metrics, sums, nearest = _past_obstacles(flown)
     else:
-        sums, _ = _scanned(flown, metrics_row, stride or ticks)
+        sums, _ = flown.scan(metrics_row, stride or ticks)
         metrics, nearest = tree_map(lambda leaf: leaf[:, -1], sums), None
     logged = logged_ticks(ticks, stride or ticks)
     if nearest is not None:
@@ -132,23 +124,9 @@ def _past_obstacles(setup: FlightSetup) -> tuple[RunningMetrics, PoseRow, Neares
 
     Rows take 88 bytes a tick and vehicle.
     """
-    rows, metrics = _scanned(setup, pose_row, 1)
+    rows, states = setup.scan(pose_row, 1)
+    metrics = next(state for state in states if isinstance(state, RunningMetrics))
     position, q_world_body = map(from_components, (rows.position, rows.q_world_body))
     bodies = setup.fleet.body_centres, setup.fleet.semi_axes
     flown = FlownBodies(setup.times, position, q_world_body, *bodies, metrics.ticks)
     return metrics, rows, nearest_obstacles(setup.environment.pieces, flown)
-
-
-def _scanned(setup: FlightSetup, log: Log, stride: int) -> tuple[Tree, RunningMetrics]:
-    """Rows at multiples of a stride and the last tick, leaves (vehicles, T), and the last metrics."""
-    logged = logged_ticks(len(setup.times), stride)
-    loop = setup.compile(log=log)
-    carry = loop.init(setup.first_tick)
-    parts = []
-    for begin, end in setup.chunks(stride):
-        chunk_stride = end if begin % stride else stride
-        carry, rows = loop.scan(carry, setup.inputs(begin, end), chunk_stride)
-        kept = np.isin(begin + logged_ticks(end - begin, chunk_stride), logged)
-        parts.append(tree_map(partial(np.compress, kept, axis=1), rows))
-    metrics = next(state for state in carry if isinstance(state, RunningMetrics))
-    return tree_stack(parts, lambda leaves: np.concatenate(leaves, axis=-1)), metrics

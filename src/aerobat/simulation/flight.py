@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -295,6 +295,12 @@ def setpoint_series(setpoint: Setpoint) -> dict[str, Array]:
 def setpoint_rows(setpoint: Setpoint, rows: slice | NDArray[np.intp]) -> Setpoint:
     """Some rows of set-points."""
     return _setpoint({name: values[rows] for name, values in setpoint_series(setpoint).items()})
+
+
+def joined_setpoints(parts: Sequence[Setpoint]) -> Setpoint:
+    """Join set-points that follow one another."""
+    series = [setpoint_series(part) for part in parts]
+    return _setpoint({name: np.concatenate([each[name] for each in series]) for name in series[0]})
 
 
 def _setpoint(series: Mapping[str, Array]) -> Setpoint:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
@@ -12,19 +11,18 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array
 from aerobat.declaration import validated
 from aerobat.engines import logged_ticks
-from aerobat.engines.pytree import from_components, tree_map, tree_stack
+from aerobat.engines.pytree import from_components, tree_map
 from aerobat.environment import Environment
 from aerobat.flatness import Planned
 from aerobat.problem.gate import Gate
 from aerobat.simulation.bodies import body_states
-from aerobat.simulation.components import LogRow
+from aerobat.simulation.components import LogRow, log_row
 from aerobat.simulation.config import FlightChanges, FlightConfig
-from aerobat.simulation.flight import SERIES, Flight, setpoint_rows, setpoint_series
+from aerobat.simulation.flight import SERIES, Flight, setpoint_series
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
 from aerobat.simulation.plants.outside import fly_outside
 from aerobat.simulation.prepare import setup_of
 from aerobat.simulation.setup import FlightSetup
-from aerobat.states import Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
@@ -59,47 +57,25 @@ def fly(
     if outside:
         gates = () if isinstance(plan, Trajectory) else plan.problem.gates
         return _flown_outside(setup, gates, " on ".join(outside))
-    stride = setup.log_stride
-    loop = setup.compile()
-    logged = logged_ticks(len(setup.times), stride)
-    is_logged = np.zeros(len(setup.times), dtype=bool)
-    is_logged[logged] = True
-    carry = loop.init(setup.first_tick)
-    rows, setpoints = [], []
-    for begin, end in setup.chunks(stride):
-        chunk_stride = end if begin % stride else stride
-        carry, chunk = loop.scan(carry, setup.inputs(begin, end), chunk_stride)
-        ticks = begin + logged_ticks(end - begin, chunk_stride)
-        kept = is_logged[ticks]
-        rows.append(chunk if kept.all() else tree_map(partial(np.compress, kept, axis=1), chunk))
-        setpoints.append(setpoint_rows(setup.reference.setpoint(begin, end), ticks[kept] - begin))
-    log = rows[0] if len(rows) == 1 else tree_stack(rows, lambda parts: np.concatenate(parts, axis=-1))
-    return _flight(setup, log, setup.times[logged], setpoints, setup.engine().name)
+    log, _ = setup.scan(log_row, setup.log_stride)
+    return _flight(setup, log, setup.engine().name)
 
 
 def _flown_outside(setup: FlightSetup, gates: tuple[Gate, ...], name: str) -> Flight:
     rows, contact = fly_outside(setup, gates)
     logged = logged_ticks(len(setup.times), setup.log_stride)
-    setpoints = []
-    for begin, end in setup.chunks():
-        kept = logged[(logged >= begin) & (logged < end)]
-        setpoints.append(setpoint_rows(setup.reference.setpoint(begin, end), kept - begin))
     log = tree_map(lambda leaf: leaf[..., logged], rows)
     touched = None
     if setup.config.plant is not None:
         touched = np.maximum.reduceat(contact, logged).astype(np.float64)[None]
-    return _flight(setup, log, setup.times[logged], setpoints, name, touched)
+    return _flight(setup, log, name, touched)
 
 
-def _flight(
-    setup: FlightSetup,
-    log: LogRow,
-    times: Array,
-    setpoints: Sequence[Setpoint],
-    engine: str,
-    contact: Array | None = None,
-) -> Flight:
+def _flight(setup: FlightSetup, log: LogRow, engine: str, contact: Array | None = None) -> Flight:
+    logged = logged_ticks(len(setup.times), setup.log_stride)
+    times = setup.times[logged]
     series: dict[str, Any] = {
+        **setpoint_series(setup.reference.setpoint(logged)),
         **vars(body_states(log.motion.body)),
         "thrusts": from_components(log.motion.thrusts),
         "commands": from_components(log.commands.thrusts),
@@ -118,8 +94,6 @@ def _flight(
         series["thrust_setpoint"] = log.rate_setpoint.thrust
     if contact is not None:
         series["contact"] = contact
-    for name in setpoint_series(setpoints[0]):
-        series[name] = np.concatenate([setpoint_series(part)[name] for part in setpoints])
     ends, outcomes, sentences = _endings(series, times)
     length = ends.max() + 1
     # a diverged vehicle repeats its last row for as long as another one flies

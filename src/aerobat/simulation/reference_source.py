@@ -15,7 +15,7 @@ from aerobat.engines.pytree import Tree, components, tree_map
 from aerobat.environment import Environment
 from aerobat.flatness.references import axial_drag, force_balance, has_unequal_drag, reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
-from aerobat.simulation.flight import setpoint_rows
+from aerobat.simulation.flight import joined_setpoints, setpoint_rows
 from aerobat.simulation.loop import Due, StepClock
 from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory
@@ -64,7 +64,7 @@ class ReferenceSource:
     @property
     def start(self) -> BodyState:
         """The state of a vehicle that begins without any error, no leading axis."""
-        first = self.setpoint(0, 1)
+        first = self.setpoint(np.array([0]))
         return BodyState(
             first.flat.position[0], first.flat.velocity[0], first.q_world_body[0], first.omega_body[0]
         )
@@ -72,14 +72,14 @@ class ReferenceSource:
     @property
     def max_rate(self) -> float:
         """The most [rad/s] that the reference turns about any axis of the body."""
-        blocks = range(0, len(self), BLOCK)
-        turning = (self.setpoint(begin, min(begin + BLOCK, len(self))).omega_body for begin in blocks)
-        return max(float(np.abs(omega).max()) for omega in turning)
+        return float(np.abs(self.setpoint(np.arange(len(self))).omega_body).max())
 
-    def setpoint(self, begin: int, end: int) -> Setpoint:
-        """Set-points of the ticks from `begin` to before `end`, all of one block."""
-        first = begin - begin % BLOCK
-        return setpoint_rows(self._block(begin).setpoint, slice(begin - first, end - first))
+    def setpoint(self, ticks: NDArray[np.intp]) -> Setpoint:
+        """Set-points of some ticks, which rise."""
+        in_blocks = np.split(ticks, np.flatnonzero(np.diff(ticks // BLOCK)) + 1)
+        return joined_setpoints(
+            [setpoint_rows(self._block(int(each[0])).setpoint, each % BLOCK) for each in in_blocks]
+        )
 
     def chunk(self, begin: int, end: int) -> ReferencePoint:
         """References of the controller at the ticks from `begin` to before `end`, all of one block."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Protocol
 
@@ -12,9 +12,9 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
-from aerobat.engines import CompiledLoop, Engine, choose
+from aerobat.engines import CompiledLoop, Engine, choose, logged_ticks
 from aerobat.engines.engine import first_row
-from aerobat.engines.pytree import Tree, tree_map
+from aerobat.engines.pytree import Tree, tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.kernels.control import ControllerModel
@@ -161,6 +161,28 @@ class FlightSetup(LoopSetup):
         periods = (part.component.period for part in self.parts)
         due = tuple(() if period == 1 else self.reference.due(period, begin, end) for period in periods)
         return LoopInput(self.reference.clock(begin, end), due, self.reference.chunk(begin, end), own)
+
+    def scan(self, log: Log, stride: int) -> tuple[Tree, tuple[Tree, ...]]:
+        """Run the whole flight.
+
+        Args:
+            log: What a row takes of the signals.
+            stride: The ticks from one row to the next.
+
+        Returns the rows of the multiples of the stride and of the last tick, leaves (vehicles, rows), and the
+        last states of the loop's components.
+        """
+        loop = self.compile(log)
+        carry = loop.init(self.first_tick)
+        logged = logged_ticks(len(self.times), stride)
+        parts = []
+        for begin, end in self.chunks(stride):
+            chunk_stride = end if begin % stride else stride
+            carry, rows = loop.scan(carry, self.inputs(begin, end), chunk_stride)
+            kept = np.isin(begin + logged_ticks(end - begin, chunk_stride), logged)
+            parts.append(rows if kept.all() else tree_map(partial(np.compress, kept, axis=1), rows))
+        whole = parts[0] if len(parts) == 1 else tree_stack(parts, partial(np.concatenate, axis=-1))
+        return whole, carry
 
     def chunks(self, log_stride: int = 1, copies: int = 1) -> Iterator[tuple[int, int]]:
         """The flight cut into pieces whose inputs fit into little memory, each of one block.
