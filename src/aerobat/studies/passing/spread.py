@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import radians
 
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
 from aerobat.evaluation import Score
 from aerobat.planning import Plan
 from aerobat.planning.passages import require_openings
 from aerobat.problem import Gate, Problem
 from aerobat.simulation import fly
+from aerobat.studies.passing.task import PassingTask
 from aerobat.vehicle import Vehicle
 
 LEVEL = 0.95  # of the flights, that keep within a tube
@@ -26,48 +26,28 @@ AIM = 0.8  # of a tolerance of attitude, that flights shall keep to after their 
 MAX_THRUST = 0.75  # of the greatest specific thrust, to which it may be: turning takes the rest
 
 
-@dataclass(frozen=True, eq=False)
-class Spread:
-    """Quantiles over flights along time."""
-
-    times: Array  # [s], (T,)
-    position_error: Array  # [m], (T,)
-    attitude_error: Array  # [rad], (T,)
-    rotor_margin: Array  # [-] of a rotor's range, (T,)
-
-
-def spread_of(
-    plan: Plan, vehicle: Vehicle, conditions: Dispersion, seed: int, controller: str, flights: range
-) -> Spread:
-    """The spread of flights, the first ones of `flights`.
-
-    Args:
-        plan: What is flown.
-        vehicle: The nominal one.
-        conditions: What varies.
-        seed: Of the flights.
-        controller: The name of what flies.
-        flights: Their numbers.
-    """
+def tube_series(task: PassingTask, plan: Plan, flights: range) -> dict[str, tuple[float, ...]]:
+    """The times, errors and margins of a plan's `Tube`, by the first ones of some flights of it."""
     batch = fly(
         plan,
-        vehicle,
-        controller=controller,
-        conditions=conditions,
-        seed=seed,
+        task.vehicle,
+        controller=task.controller,
+        conditions=task.conditions,
+        seed=task.seed,
         flights=flights[:SAMPLED],
     )
     spacing = float(batch.times[1] - batch.times[0]) if len(batch.times) > 1 else 1.0
     rows = slice(None, None, max(1, round(1.0 / (ROWS_RATE * spacing))))
-    span = vehicle.thrust_ranges
     commands = batch.commands[:, rows]
-    margins = np.minimum(commands - vehicle.min_thrusts, vehicle.max_thrusts - commands) / span
-    return Spread(
-        times=batch.times[rows],
-        position_error=np.quantile(batch.position_error[:, rows], LEVEL, axis=0),
-        attitude_error=np.quantile(batch.attitude_error[:, rows], LEVEL, axis=0),
-        rotor_margin=np.quantile(margins.min(axis=-1), 1.0 - LEVEL, axis=0),
-    )
+    nearest_limit = np.minimum(commands - task.vehicle.min_thrusts, task.vehicle.max_thrusts - commands)
+    margins = nearest_limit / task.vehicle.thrust_ranges
+    series = {
+        "times": batch.times[rows],
+        "position_error": np.quantile(batch.position_error[:, rows], LEVEL, axis=0),
+        "attitude_error": np.quantile(batch.attitude_error[:, rows], LEVEL, axis=0),
+        "rotor_margin": np.quantile(margins.min(axis=-1), 1.0 - LEVEL, axis=0),
+    }
+    return {name: tuple(values.tolist()) for name, values in series.items()}
 
 
 def narrowed(problem: Problem, vehicle: Vehicle, scores: Score) -> Problem:

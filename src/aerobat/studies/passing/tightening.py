@@ -14,7 +14,7 @@ from aerobat.problem import Problem
 from aerobat.studies.flights import passed
 from aerobat.studies.passing.causes import standing_in_the_way
 from aerobat.studies.passing.result import Passing, Round
-from aerobat.studies.passing.spread import LEVEL, firmer, narrowed, spread_of
+from aerobat.studies.passing.spread import LEVEL, firmer, narrowed, tube_series
 from aerobat.studies.passing.task import VARIANTS, PassingTask, Variant
 from aerobat.studies.share import Share, percent
 
@@ -163,15 +163,11 @@ class Tightening:
 
     def _proven(self, done: Round, share: Share, fresh: range) -> Passing:
         task, plain = self.task, self.rounds[0]
-        spread = spread_of(done.plan, task.vehicle, task.conditions, task.seed, task.controller, fresh)
         tube = Tube(
             conditions=task.conditions.name,
             seed=task.seed,
             level=LEVEL,
-            times=tuple(spread.times.tolist()),
-            position_error=tuple(spread.position_error.tolist()),
-            attitude_error=tuple(spread.attitude_error.tolist()),
-            rotor_margin=tuple(spread.rotor_margin.tolist()),
+            **tube_series(task, done.plan, fresh),
             reserve=done.reserve,
             plain_duration=plain.plan.duration,
             probability=task.probability,
