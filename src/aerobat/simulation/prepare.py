@@ -94,7 +94,6 @@ def setup_of(
         config=config,
         controller=controller,
         is_batch=is_batch,
-        rate=config.rate,
     )
 
 

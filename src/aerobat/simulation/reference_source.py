@@ -53,7 +53,7 @@ class ReferenceSource:
         self._trajectory = trajectory
         self.vehicle = vehicle
         self._environment = environment
-        self._rate = rate
+        self.rate = rate
         self._period = 1.0 / rate
         self._every = every
         self._delay = delay
@@ -116,7 +116,7 @@ class ReferenceSource:
         """The block that a tick is in."""
         vehicle, environment = self.vehicle, self._environment
         return _block(
-            self._trajectory, vehicle, environment, self._rate, self._every, self._delay, tick // BLOCK
+            self._trajectory, vehicle, environment, self.rate, self._every, self._delay, tick // BLOCK
         )
 
 

@@ -123,7 +123,6 @@ class FlightSetup(LoopSetup):
     config: FlightConfig
     controller: Controller  # whose gains the loop has
     is_batch: bool
-    rate: float  # [1/s] of the ticks
 
     @property
     def times(self) -> Array:
@@ -133,7 +132,7 @@ class FlightSetup(LoopSetup):
     @property
     def log_stride(self) -> int:
         """The ticks from one row of the log to the next."""
-        return round(self.rate / self.config.rows_rate)
+        return round(self.reference.rate / self.config.rows_rate)
 
     def engine(self, copies: int = 1) -> Engine:
         """The engine asked for, or the fastest for so many copies of the vehicles."""

@@ -90,7 +90,6 @@ def dispersed_setup(
         config=config,
         controller=controller,
         is_batch=config.flights is not None,
-        rate=rate,
     )
 
 
