@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, isfinite, isinf
 from typing import Any
@@ -32,6 +32,7 @@ from aerobat.simulation.passages import (
     stage_attitudes,
     waypoint_passages,
 )
+from aerobat.simulation.passages.passage import PerFlight
 from aerobat.vehicle import Vehicle, as_vehicle
 
 OTHER_PATH = 0.5  # [m] from a flight's set-points at the median: clocks that differ make less
@@ -74,7 +75,7 @@ class LapTime:
 
 @in_notebooks
 @by_value
-class Score:
+class Score(PerFlight):
     """A flight in numbers, or a batch of flights: then numbers are arrays (flights,).
 
     `score[k]` is the score of one flight of a batch.
@@ -100,17 +101,6 @@ class Score:
     lap_begin_s: float = 0.0  # when the first lap begins; a closed course's before the flight
     observer: ObserverScore | None = None  # of a filter, where a logged flight had one
 
-    def __post_init__(self) -> None:
-        """Write-protect the arrays of a batch."""
-        if not self.is_batch:
-            return
-        judged: list[Any] = [*self.passages, *self.waypoints, *self.places, *self.attitudes]
-        judged += [] if self.nearest is None else [self.nearest]
-        parts = (part for one in judged for part in vars(one).values())
-        for value in (*vars(self).values(), *parts):
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
-
     @property
     def is_batch(self) -> bool:
         """True for a batch, false for one flight."""
@@ -127,8 +117,7 @@ class Score:
             raise SpecError("this is the score of one flight, not of a batch: use it without an index")
         if not -len(self) <= k < len(self):
             raise OutOfRange(f"there are {len(self)} flights, no flight {shown(k)}; count from 0")
-        many = (getattr(self, field.name) for field in fields(self))
-        return Score(*(_of_flight(value, k) for value in many))
+        return self.of_flight(k)
 
     def __iter__(self) -> Iterator[Score]:
         return (self[k] for k in range(len(self)))
@@ -219,15 +208,6 @@ class Score:
         if isfinite(self.off_path_time):
             error, allowed = length(self.max_position_error_m), length(self.path_radius_m)
             yield FlightFailure(self.off_path_time, Outcome.OFF_PATH, {"allowed": allowed, "error": error})
-
-
-def _of_flight(value: Any, k: int) -> Any:
-    """One flight's part of a field of many."""
-    if isinstance(value, tuple):
-        return tuple(each.of_flight(k) for each in value)
-    if isinstance(value, NearestObstacle):
-        return value.of_flight(k)
-    return value[k].item() if isinstance(value, np.ndarray) else value
 
 
 def _failures(judged: Iterable[Passage | WaypointPassage | StageAttitude]) -> Iterator[FlightFailure]:

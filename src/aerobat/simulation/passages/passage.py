@@ -12,7 +12,7 @@ plane, from when it comes into the plane until it has left it, is to lie within 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from math import degrees
 from typing import Any, Self
@@ -41,10 +41,26 @@ PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is
 class PerFlight:
     """A finding of one flight, or of many: then fields that they do not share are arrays (flights,)."""
 
+    def __post_init__(self) -> None:
+        """Write-protect the arrays of many."""
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
     def of_flight(self, k: int) -> Self:
-        """One flight's of many, in plain numbers."""
-        arrays = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return replace(self, **{name: array[k].item() for name, array in arrays.items()})
+        """One flight's of many, in plain numbers, as are the findings that it holds."""
+        return replace(
+            self, **{field.name: _of_flight(getattr(self, field.name), k) for field in fields(self)}
+        )
+
+
+def _of_flight(value: Any, k: int) -> Any:
+    """One flight's part of a field of many."""
+    if isinstance(value, tuple):
+        return tuple(_of_flight(each, k) for each in value)
+    if isinstance(value, PerFlight):
+        return value.of_flight(k)
+    return value[k].item() if isinstance(value, np.ndarray) else value
 
 
 @by_value
