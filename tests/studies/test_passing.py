@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat.studies.passing import Passing, Round, tightening
 from aerobat.studies.passing.causes import standing_in_the_way
-from aerobat.studies.passing.spread import firmer
+from aerobat.studies.passing.spread import with_more_thrust
 from aerobat.studies.passing.tightening import Tightening
 from aerobat.studies.share import Share
 
@@ -186,7 +186,7 @@ def test_figures_whose_flights_stray_off_their_attitudes_are_asked_for_more_thru
     loose = replace(problem, maneuver=problem.maneuver.with_stage_thrust((), 7.0))
     plan = ab.plan(loose, ab.Miqp(reserve=0.15), vehicle)
     strays = ab.score_flights(plan, vehicle, config=ab.FlightConfig(conditions="lab", flights=range(20)))
-    firm = firmer(loose, vehicle, plan, strays, 0.97)
+    firm = with_more_thrust(loose, vehicle, plan, strays, 0.97)
     assert firm.maneuver.min_thrust > 7.0
     assert firm.maneuver.min_thrust <= 0.75 * vehicle.max_specific_thrust
 

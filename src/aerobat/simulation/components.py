@@ -85,11 +85,11 @@ class TrackingController(Component):
         signals: Signals,
     ) -> ControllerState:
         """See `Component.step`."""
-        body, reference = told(ops, parameters, state, inputs, signals)
+        body, reference = controller_inputs(ops, parameters, state, inputs, signals)
         return control.step(ops, self.flags, parameters.model, state, body, reference, signals.clock.elapsed)
 
 
-def told(
+def controller_inputs(
     ops: Ops,
     parameters: ControllerParameters,
     state: Controlling,
@@ -98,7 +98,7 @@ def told(
     takes_forces: bool = True,
     takes_moments: bool = True,
 ) -> tuple[Body, ReferencePoint]:
-    """Return the body when the commands take effect, and the reference that answers a disturbance.
+    """Return the state when the commands take effect, and the reference that counters the disturbance.
 
     Args:
         ops: The operations of an engine.

@@ -19,7 +19,12 @@ from aerobat.kernels.ops import Ops, PerRotor
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rate_loop import RateLoopModel
 from aerobat.kernels.rigid_body import RotorWrench
-from aerobat.simulation.components import ControllerParameters, RateLoop, TrackingController, told
+from aerobat.simulation.components import (
+    ControllerParameters,
+    RateLoop,
+    TrackingController,
+    controller_inputs,
+)
 from aerobat.simulation.loop import Component, Signals
 from aerobat.simulation.setup import LoopPart
 
@@ -67,7 +72,7 @@ class LawController(Component):
         """See `Component.step`."""
         model, elapsed = parameters.model, signals.clock.elapsed
         takes = self.law.TAKES_DISTURBANCES, not self.law.GIVES_RATES
-        body, reference = told(ops, parameters, state, inputs, signals, *takes)
+        body, reference = controller_inputs(ops, parameters, state, inputs, signals, *takes)
         rotors = model.airframe.rotors
         decay_factors = motors.decay_factors(ops, rotors, elapsed)
         thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)

@@ -75,7 +75,7 @@ class ReferenceSource:
         return float(np.abs(self.setpoint(np.arange(len(self))).omega_body).max())
 
     def setpoint(self, ticks: NDArray[np.intp]) -> Setpoint:
-        """Set-points of some ticks, which rise."""
+        """Return the set-points of some ticks, in rising order."""
         in_blocks = np.split(ticks, np.flatnonzero(np.diff(ticks // BLOCK)) + 1)
         return joined_setpoints(
             [setpoint_rows(self._block(int(each[0])).setpoint, each % BLOCK) for each in in_blocks]

@@ -89,8 +89,8 @@ class Actuator(Component):
         )
 
 
-class Told(NamedTuple):
-    """Inputs of a firmware outside at a tick."""
+class FirmwareInputs(NamedTuple):
+    """The inputs of an autopilot's firmware at a tick."""
 
     gyro: Vector  # [rad/s] body
     specific_force: Vector | tuple[()]  # [m/s²] body; () where there is no IMU
@@ -98,11 +98,11 @@ class Told(NamedTuple):
 
 
 class OutsideRow(NamedTuple):
-    """The row that a tick logs, and what is told outside."""
+    """The row of the log of a tick, and the inputs of plant and firmware outside of the loop."""
 
     log: LogRow
     actuation: Actuation
-    told: Told | tuple[()]  # () where no firmware flies
+    firmware: FirmwareInputs | tuple[()]  # () where no firmware flies
 
 
 class RigidBodyRun:
@@ -151,7 +151,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
     motion = VehicleState(
         first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust)
     )
-    first = _told(inside.first_tick, motion)
+    first = _with_motion(inside.first_tick, motion)
     log = _outside_row if autopilot is None else _firmware_row
     init, step = compose(inside.components, log)
     loop = inside.engine().compile(init, step, inside.parameters, first)
@@ -165,7 +165,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
     with _Firmware(setup, scene) as firmware:
         for tick, period in enumerate(np.diff(setup.times, append=setup.times[-1]).tolist()):
             before = run.motion
-            carry, row = loop.step(carry, _told(inside.tick(tick), before))
+            carry, row = loop.step(carry, _with_motion(inside.tick(tick), before))
             log_row, actuation = firmware.step(row, before, period)
             rows.append(log_row)
             touched[tick] = run.contact
@@ -210,12 +210,12 @@ class _Firmware:
         autopilot = self._setup.config.autopilot
         if autopilot is None:
             return row.log, actuation
-        told: Told = first_numbers(row.told)
-        sensed = Sensed(told.gyro, told.specific_force or self._felt(motion), motion.body.q_world_body)
+        inputs: FirmwareInputs = first_numbers(row.firmware)
+        sensed = Sensed(inputs.gyro, inputs.specific_force or self._felt(motion), motion.body.q_world_body)
         if self._run is None:
             rates = self._setup.reference.max_rate
-            self._run = autopilot.begin(self._setup.reference.vehicle, told.setpoint, rates)
-        commands = self._run.step(sensed, told.setpoint, period)
+            self._run = autopilot.begin(self._setup.reference.vehicle, inputs.setpoint, rates)
+        commands = self._run.step(sensed, inputs.setpoint, period)
         rotors = self._scene.airframe.rotors
         limits = zip(commands, rotors.min_thrust, rotors.max_thrust, strict=True)
         saturated = any(not low < command < high for command, low, high in limits)
@@ -237,10 +237,12 @@ def _outside_row(signals: Signals) -> OutsideRow:
 def _firmware_row(signals: Signals) -> OutsideRow:
     imu = signals.find(ImuState)
     felt = () if imu is None else imu.sample.specific_force
-    return _outside_row(signals)._replace(told=Told(gyro(signals), felt, setpoint_in_effect(signals)))
+    return _outside_row(signals)._replace(
+        firmware=FirmwareInputs(gyro(signals), felt, setpoint_in_effect(signals))
+    )
 
 
-def _told(inputs: LoopInput, motion: VehicleState) -> LoopInput:
+def _with_motion(inputs: LoopInput, motion: VehicleState) -> LoopInput:
     """The inputs of a tick with the plant's motion, which is the first component's."""
     return inputs._replace(own=(tree_map(np.float64, motion), *inputs.own[1:]))
 

@@ -50,7 +50,7 @@ def tube_series(task: PassingTask, plan: Plan, flights: range) -> dict[str, tupl
     return {name: tuple(values.tolist()) for name, values in series.items()}
 
 
-def narrowed(problem: Problem, vehicle: Vehicle, scores: Score) -> Problem:
+def with_narrower_gates(problem: Problem, vehicle: Vehicle, scores: Score) -> Problem:
     """The problem with openings and tolerances less by what flights stray in the gates.
 
     An opening stays as it is where the vehicle would not fit into a smaller one.
@@ -69,7 +69,9 @@ def narrowed(problem: Problem, vehicle: Vehicle, scores: Score) -> Problem:
     return smaller
 
 
-def firmer(problem: Problem, vehicle: Vehicle, plan: Plan, scores: Score, fraction: float) -> Problem:
+def with_more_thrust(
+    problem: Problem, vehicle: Vehicle, plan: Plan, scores: Score, fraction: float
+) -> Problem:
     """The problem with more thrust in its stages than its plan has, where flights stray off their attitude.
 
     Against a push across the thrust the vehicle leans by their ratio: the more thrust, the less. The problem

@@ -15,7 +15,7 @@ from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
 from aerobat.planning import Attempt, Plan, Planner, as_planner
 from aerobat.studies.flights import passed
-from aerobat.studies.passing.spread import narrowed
+from aerobat.studies.passing.spread import with_narrower_gates
 from aerobat.studies.passing.task import PassingTask, Variant, going_on
 from aerobat.studies.share import Trials
 from aerobat.studies.workers import pool
@@ -78,7 +78,7 @@ def _calmest(task: PassingTask, plan: Plan, reserve: float) -> Plan:
     scores = task.scores(plan, CHOOSING)
     first = best = passed(scores)
     found = plan
-    problem = narrowed(plan.problem, task.vehicle, scores)
+    problem = with_narrower_gates(plan.problem, task.vehicle, scores)
     for calm in CALMS if first.fraction >= WORTH else ():
         if best.fraction >= ENOUGH:
             break

@@ -14,7 +14,7 @@ from aerobat.problem import Problem
 from aerobat.studies.flights import passed
 from aerobat.studies.passing.causes import standing_in_the_way
 from aerobat.studies.passing.result import Passing, Round
-from aerobat.studies.passing.spread import LEVEL, firmer, narrowed, tube_series
+from aerobat.studies.passing.spread import LEVEL, tube_series, with_more_thrust, with_narrower_gates
 from aerobat.studies.passing.task import VARIANTS, PassingTask, Variant
 from aerobat.studies.share import Share, percent
 
@@ -52,10 +52,10 @@ class Tightening:
     def passing(self) -> Passing:
         """The plan that passes, proven. Raises Infeasible where there is none."""
         plain, scores = self._plain()
-        self._narrowed = self.task.problem
+        self._problem = self.task.problem
         steps, done = 0, plain
         if not self.task.is_likely_enough(plain.share):
-            self._narrowed = narrowed(self.task.problem, self.task.vehicle, scores)
+            self._problem = with_narrower_gates(self.task.problem, self.task.vehicle, scores)
             steps, done = self._smallest()
         for attempt in range(PROOFS):
             fresh = self._fresh(attempt)
@@ -117,7 +117,7 @@ class Tightening:
         tried: list[_Flown] = []
         for variant in self._variants:
             longest = DEAR * min((each.round.plan.duration for each in tried), default=inf)
-            found = self._planned(steps, variant, self._narrowed, longest)
+            found = self._planned(steps, variant, self._problem, longest)
             if found is not None:
                 tried.append(found)
             if found is not None and self.task.is_likely_enough(found.round.share):
@@ -127,16 +127,16 @@ class Tightening:
             return None
         tried.sort(key=lambda each: _fraction(each.round), reverse=True)
         self._variants = tuple(each.variant for each in tried[:KEPT_VARIANTS])
-        return self._firmer(steps, tried[0])
+        return self._with_more_thrust(steps, tried[0])
 
-    def _firmer(self, steps: int, best: _Flown) -> Round:
+    def _with_more_thrust(self, steps: int, best: _Flown) -> Round:
         """A round with more thrust in gates, if more of its flights pass; else the one that is known."""
         kept = 0.5 * (1.0 + self.task.probability)  # half of those that may fail
-        firm = firmer(self._narrowed, self.task.vehicle, best.round.plan, best.scores, kept)
-        again = None if firm == self._narrowed else self._planned(steps, best.variant, firm)
+        firm = with_more_thrust(self._problem, self.task.vehicle, best.round.plan, best.scores, kept)
+        again = None if firm == self._problem else self._planned(steps, best.variant, firm)
         if again is None or _fraction(again.round) <= _fraction(best.round):
             return best.round
-        self._narrowed = firm
+        self._problem = firm
         return again.round
 
     def _planned(self, steps: int, variant: Variant, problem: Problem, longest: float = inf) -> _Flown | None:
