@@ -17,7 +17,7 @@ def __getattr__(name: str) -> Any:
     try:
         return _imported(name)
     except AttributeError:
-        if name.startswith("_"):
+        if name.startswith("_") or name in __all__:  # the latter failed as its module was imported
             raise
         from difflib import get_close_matches  # only once something is wrong
 

@@ -85,6 +85,34 @@ def test_positions_alone_give_the_smooth_path_and_a_bound_on_its_error(line: Pla
     assert 0.0 < error < rows.fit_error < 2e-3
 
 
+@pytest.mark.parametrize("rows", [4, 5, 6, 7])
+def test_a_path_of_few_rows_is_judged_and_its_error_is_told_where_every_second_row_has_a_path(
+    rows: int, tmp_path: Path, monkeypatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = "t,x,y,z\n" + "".join(f"{k},{0.1 * k**2},0,1\n" for k in range(rows))
+    Path("path.csv").write_text(text)
+    assert (read_rows("path.csv").fit_error is None) == (rows < 7)
+    assert code("check", "path.csv") == 0
+    known = "without every second row it is off by" in capsys.readouterr().out
+    assert known == (rows == 7)
+
+
+def test_what_a_path_assumes_is_told_of_a_folder_that_holds_it_too(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("kept").mkdir()
+    rows = [f"{k},{0.1 * k**2},0,1,{k}" for k in range(9)]
+    Path("kept/plan.csv").write_text("\n".join(["t,x,y,z,yaw", *rows, ""]))
+    told = []
+    for name in ("kept", "kept/plan.csv"):
+        assert code("check", name, "--json") == 0
+        told.append(json.loads(capsys.readouterr().out)["assumed"])
+    assert told[0] == told[1]
+    assert told[0][-2] == "without column yaw, which the file holds too"
+
+
 @pytest.mark.parametrize(
     "header", ["t,x,y,z", "# t,x,y,z", '"t","x","y","z"', "TIME,X,Y,Z", "time,px,py,pz", "t, x, y, z"]
 )

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import aerobat as ab
+from aerobat.viewer import replay
 from public_calls import NoPlan, flight, plan
 from refusals import complaint
 
@@ -51,6 +52,13 @@ def test_a_flight_takes_the_name_of_a_control_law_at_the_gains_of_its_vehicle() 
 def test_a_misspelt_public_name_is_answered_by_the_closest() -> None:
     with pytest.raises(AttributeError, match="aerobat has no 'plam'; did you mean 'plan'"):
         ab.plam  # noqa: B018
+
+
+def test_a_public_name_whose_module_fails_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(vars(ab), "view", raising=False)  # kept there once it was used
+    monkeypatch.delattr(replay, "view")  # as of a module that could not be imported whole
+    with pytest.raises(AttributeError, match=r"^module 'aerobat.viewer.replay' has no attribute 'view'$"):
+        ab.view  # noqa: B018
 
 
 def test_a_plan_stands_for_its_trajectory_its_vehicle_and_its_environment(tmp_path: Any) -> None:

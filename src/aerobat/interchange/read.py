@@ -21,9 +21,7 @@ def read_plan(path: PathName, rate: Positive = 100.0) -> Plan | Trajectory:
     Of a folder, the plan that a run has left there is read. Raises SpecError, one sentence, when there is
     none, when there are several, or when the file is malformed.
     """
-    path = Path(path)
-    if os.path.isdir(path):  # of a name that is too long, Path raises
-        path = _only_plan(path)
+    path = plan_file(Path(path))
     if path.suffix == ".plan":
         return load_plan(path)
     return load_trajectory(path) if path.suffix == ".npz" else read_csv(path, rate)
@@ -36,11 +34,17 @@ def read_trajectory(path: PathName, rate: Positive = 100.0) -> Trajectory:
     return found.trajectory if isinstance(found, Plan) else found
 
 
-def _only_plan(folder: Path) -> Path:
+def plan_file(path: Path) -> Path:
+    """Return the file that holds a plan: the path itself, or the only one in a folder.
+
+    Raises SpecError where the folder holds none, or several.
+    """
+    if not os.path.isdir(path):  # Path.is_dir raises for a name that is too long
+        return path
     for pattern in PATTERNS:
-        found = sorted(folder.glob(pattern))
+        found = sorted(path.glob(pattern))
         if len(found) > 1:
-            raise SpecError(f"{folder}/ holds {found[0].name} and {found[1].name}; give one of the files")
+            raise SpecError(f"{path}/ holds {found[0].name} and {found[1].name}; give one of the files")
         if found:
             return found[0]
-    raise SpecError(f"{folder}/ holds no .plan file and no plan.csv; give the file of a trajectory")
+    raise SpecError(f"{path}/ holds no .plan file and no plan.csv; give the file of a trajectory")

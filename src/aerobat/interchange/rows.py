@@ -62,16 +62,17 @@ class PathRows:
 
     @property
     def fit_error(self) -> float | None:
-        """The largest distance [m] of the path through every second row from the rest; None below five rows.
+        """The largest distance [m] of the path through every second row from the rest.
 
         Twice as far from row to row, that path errs by more than the path through all rows does between them.
+        None below five rows, or where every second row does not determine a path.
         """
         rows = len(self.knots) - (len(self.knots) + 1) % 2
-        if rows < FEWEST:
+        kept = self.knots[:rows:2]
+        if rows < FEWEST or _known_numbers(kept) < len(PATH):
             return None
         times = np.concatenate([[0.0], np.cumsum(self.steps)])[:rows]
-        every_second = self._through(self.knots[:rows:2], np.diff(times[::2]))
-        missed = every_second.evaluate(times[1::2]) - self.knots[1:rows:2, 0]
+        missed = self._through(kept, np.diff(times[::2])).evaluate(times[1::2]) - self.knots[1:rows:2, 0]
         return float(np.linalg.norm(missed, axis=1).max())
 
     @property
@@ -90,7 +91,7 @@ class PathRows:
     @staticmethod
     def _through(knots: Array, steps: Array) -> Trajectory:
         if np.isnan(knots).any():
-            known = int(np.sum(~np.isnan(knots), axis=(0, 1)).min())
+            known = _known_numbers(knots)
             if known < len(PATH):
                 raise SpecError(
                     f"{len(knots)} rows give {known} numbers along an axis, a path takes {len(PATH)}; "
@@ -115,6 +116,11 @@ class PathRows:
         upright = so3.smallest_rotation(so3.UP, thrust / np.linalg.norm(thrust))
         turn = so3.multiply(so3.conjugate(upright), self.attitude)
         return float(2.0 * np.arctan2(turn[3], turn[0]))
+
+
+def _known_numbers(knots: Array) -> int:
+    """Count the derivatives that rows (rows, 4, 3) give along the axis that they give the fewest of."""
+    return int(np.sum(~np.isnan(knots), axis=(0, 1)).min())
 
 
 def _snaps(knots: Array, steps: Array) -> Array:

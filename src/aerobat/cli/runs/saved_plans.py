@@ -14,6 +14,7 @@ from aerobat.cli.terminal import say
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_rows
+from aerobat.interchange.read import plan_file
 from aerobat.interchange.robots import SUFFIXES
 from aerobat.planning import Plan
 from aerobat.problem import EndState, Heading, Problem, problem_names
@@ -65,14 +66,17 @@ def read_source(path: Path, rate: float) -> tuple[Plan | Trajectory, list[str]]:
         path: The file or folder.
         rate: Rows a second [1/s] of a CSV file without times.
     """
-    if path.suffix != ".csv" or os.path.isdir(path):
+    path = plan_file(path)
+    if path.suffix != ".csv":
         return read_plan(path, rate), []
     rows = read_rows(path, rate)
     facts = [f"without {each}, which the file holds too" for each in rows.unused]
     error = rows.fit_error
-    if error is not None:
-        facts.append(f"a smooth path between rows (without every second row it is off by {error:.1g} m)")
-    return rows.trajectory, facts
+    if error is None:
+        how_far = "these are too few to tell how far it is off"
+    else:
+        how_far = f"without every second row it is off by {error:.1g} m"
+    return rows.trajectory, [*facts, f"a smooth path between rows ({how_far})"]
 
 
 def assumed_of_path(options: VehicleOptions, vehicle: Vehicle, environment: Environment) -> list[str]:
