@@ -7,12 +7,11 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import TaskOptions, Workers, planning
+from aerobat.cli.options import OutputOptions, TaskOptions, Workers, planning
 from aerobat.cli.progress import PlanningProgress, showing
 from aerobat.cli.runs.folder import finish_study
 from aerobat.cli.runs.record import RunRecord
 from aerobat.cli.tasks import read_task
-from aerobat.studies.compare import Comparison
 from aerobat.studies.compare import compare as compare_planners
 
 WORKERS = (
@@ -51,18 +50,19 @@ def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")
         time_limit=options.time_limit,
         plugins=tuple(map(str, options.plugins)),
     )
-    finish_study(comparison_of(record, options.workers), record, options)
+    run_comparison(record, options, options.workers)
 
 
-def comparison_of(record: RunRecord, workers: str = "1") -> Comparison:
-    """Compare all planners on a run's problem.
+def run_comparison(record: RunRecord, options: OutputOptions, workers: str = "1") -> None:
+    """Compare all planners on a run's problem, write the comparison, then show it.
 
     Args:
         record: What is planned.
+        options: Where to write, and in what form to say it.
         workers: Who plans.
     """
     with showing(PlanningProgress()) as progress:
-        return compare_planners(
+        comparison = compare_planners(
             record.problem,
             record.vehicle,
             progress=progress.record,
@@ -70,3 +70,4 @@ def comparison_of(record: RunRecord, workers: str = "1") -> Comparison:
             time_limit=record.time_limit,
             workers=workers,
         )
+    finish_study(comparison, record, options)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
@@ -20,13 +19,7 @@ from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.reporting.feasibility.facts import requirements
 from aerobat.storage import require_replaceable
-from aerobat.studies.feasibility import (
-    Axis,
-    FeasibilityMap,
-    Requirement,
-    feasibility_map,
-    min_requirements,
-)
+from aerobat.studies.feasibility import Axis, feasibility_map, min_requirements
 from aerobat.studies.feasibility.feasibility_map import finished_cells
 from aerobat.studies.feasibility.probe import TIME_LIMIT
 
@@ -109,18 +102,16 @@ def feasibility(
         plugins=tuple(map(str, options.plugins)),
     )
     require_replaceable(options.out or record.folder, is_of_a_run)  # before minutes of planning
-    if options.over:
-        finish_map(map_of(record, options, options.workers), record, options)
-    else:
-        finish_need(need_of(record, options.workers), record, options)
+    run_study = run_map if options.over else run_need
+    run_study(record, options, options.workers)
 
 
-def map_of(record: RunRecord, options: OutputOptions, workers: str | None = None) -> FeasibilityMap:
-    """The map of a run; cells that are finished are kept beside the run's folder until that is written.
+def run_map(record: RunRecord, options: OutputOptions, workers: str | None = None) -> None:
+    """Make the map of a run, write it, then show it; finished cells are kept beside its folder until then.
 
     Args:
         record: What is planned, and how.
-        options: Where to.
+        options: Where to write, and in what form to say it.
         workers: Who plans.
     """
     axes = [Axis.parse(text) for text in record.over]
@@ -130,7 +121,7 @@ def map_of(record: RunRecord, options: OutputOptions, workers: str | None = None
     count = prod(len(axis.values) for axis in axes)
     unfinished = Unfinished.beside(options.out or record.folder)
     with unfinished.kept("cells", count, finished_cells), showing(Progress("cells", count)) as progress:
-        return feasibility_map(
+        found = feasibility_map(
             record.problem,
             over,
             record.vehicle,
@@ -140,20 +131,17 @@ def map_of(record: RunRecord, options: OutputOptions, workers: str | None = None
             keep=unfinished.parts,
             progress=progress.counting("planned"),
         )
-
-
-def finish_map(found: FeasibilityMap, record: RunRecord, options: OutputOptions) -> None:
-    """Write a map, then show it."""
     name = f"map.{record.flight.table}"
     finish_study(found, record, options, lambda staging: write_table(found.table, staging / name))
-    Unfinished.beside(options.out or record.folder).remove()
+    unfinished.remove()
 
 
-def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement, ...]:
-    """The answers of a run, made anew.
+def run_need(record: RunRecord, options: OutputOptions, workers: str | None = None) -> None:
+    """Find the least that a run asks for, write it with its plans, then show it.
 
     Args:
         record: What is planned, and how.
+        options: Where to write, and in what form to say it.
         workers: Who plans.
     """
     with showing(Progress("plans tried")) as progress:
@@ -161,7 +149,7 @@ def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement,
         def note(quantity: str, value: float, planned: bool) -> None:
             progress.step(f"{quantity} {value:.4g} {'planned' if planned else 'refused'}")
 
-        return min_requirements(
+        found = min_requirements(
             record.problem,
             record.vehicle,
             record.of,
@@ -171,10 +159,6 @@ def need_of(record: RunRecord, workers: str | None = None) -> tuple[Requirement,
             workers=workers,
             progress=note,
         )
-
-
-def finish_need(found: Sequence[Requirement], record: RunRecord, options: OutputOptions) -> None:
-    """Write what is needed with its plans, then show it."""
 
     def write_plans(staging: Path) -> None:
         for each in found:

@@ -10,13 +10,13 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from aerobat.cli.commands.compare import comparison_of
-from aerobat.cli.commands.feasibility import finish_map, finish_need, map_of, need_of
+from aerobat.cli.commands.compare import run_comparison
+from aerobat.cli.commands.feasibility import run_map, run_need
 from aerobat.cli.commands.fly import flown
-from aerobat.cli.commands.sweep import finish_sweep, sweep_of, table_name
+from aerobat.cli.commands.sweep import run_sweep
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ExplainingOptions, OutputOptions, output
-from aerobat.cli.runs.folder import FLIGHT, finish, finish_study
+from aerobat.cli.runs.folder import FLIGHT, finish
 from aerobat.cli.runs.record import RunRecord, read_record, versions_now
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
@@ -25,8 +25,6 @@ from aerobat.documents import read_json
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_table
 from aerobat.planning import Plan, with_explanation
-from aerobat.reporting.feasibility.facts import requirements
-from aerobat.reporting.plain_data import plain
 from aerobat.simulation import Flight, load_flight
 
 
@@ -60,9 +58,10 @@ def repeat(
         raise SpecError(f"{folder}/ was made with --import {' '.join(missing)}; give that here too")
     out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")
     options = replace(options, out=out)
-    if record.command in STUDIES:
-        old, again = STUDIES[record.command](folder, record, options)
-        names = [name for name, value in again.items() if not _same(value, old.get(name))]
+    if record.command not in ("fly", "plan"):
+        earlier = _results(folder, record)
+        _run_study(folder, record, options)
+        names = [name for name, value in _results(out, record).items() if not _same(value, earlier.get(name))]
         return _told(folder, record, f"{', '.join(names)} differ" if names else "", ExitCode.WELL)
     run = _Run.read(folder, record)
     if record.planner is not None:
@@ -74,60 +73,40 @@ def repeat(
     return _told(folder, record, run.difference(_Run(plan, flight.flight if flight else None)), code)
 
 
-Compared = tuple[Mapping[str, Any], Mapping[str, Any]]  # what lies in a folder, and what came again, by names
+def _run_study(folder: Path, record: RunRecord, options: RepeatOptions) -> None:
+    """Do the study in a folder again."""
+    match record.command:
+        case "compare":
+            run_comparison(record, options)
+        case "map":
+            run_map(record, options)
+        case "need":
+            run_need(record, options)
+        case "sweep":
+            plan = _Run.read(folder, record).plan if record.planner is None else plan_of(record)
+            run_sweep(plan, record, options)
 
 
-def _repeat_comparison(folder: Path, record: RunRecord, options: RepeatOptions) -> Compared:
-    old = _there(folder / "compare.json")
-    comparison = comparison_of(record)
-    finish_study(comparison, record, options)
-    return _durations(old), _durations(plain(comparison))
+def _results(folder: Path, record: RunRecord) -> Mapping[str, Any]:
+    """Read what a study in a folder came to, by names: the columns of its table, or its facts.
 
-
-def _repeat_sweep(folder: Path, record: RunRecord, options: RepeatOptions) -> Compared:
-    old = read_table(folder / table_name(record.flight))
-    plan = _Run.read(folder, record).plan if record.planner is None else plan_of(record)
-    swept = sweep_of(plan, record, options)
-    finish_sweep(swept, record, options)
-    return old, swept.table
-
-
-def _repeat_map(folder: Path, record: RunRecord, options: RepeatOptions) -> Compared:
-    old = read_table(folder / f"map.{record.flight.table}")
-    found = map_of(record, options)
-    finish_map(found, record, options)
-    return old, found.table
-
-
-def _repeat_need(folder: Path, record: RunRecord, options: RepeatOptions) -> Compared:
-    old = _there(folder / "need.json")
-    found = need_of(record)
-    finish_need(found, record, options)
-    return old, plain(requirements(record.problem.name, record.vehicle.name, found))
-
-
-STUDIES = {
-    "compare": _repeat_comparison,
-    "sweep": _repeat_sweep,
-    "map": _repeat_map,
-    "need": _repeat_need,
-}
-
-
-def _there(file: Path) -> Any:
-    """Read a study's facts. Raises SpecError where none are there."""
+    Of a comparison, the durations of its plans: times of the clock are others whenever it is repeated.
+    Raises SpecError where none are there.
+    """
+    tables = {"sweep": "flights", "map": "map"}
+    if record.command in tables:
+        return read_table(folder / f"{tables[record.command]}.{record.flight.table}")
+    name = f"{record.command}.json"
     try:
-        return read_json(file)
+        facts = read_json(folder / name)
     except SpecError:
-        raise SpecError(f"{file.parent}/ has no {file.name} that can be read; run anew") from None
-
-
-def _durations(told: Any) -> Mapping[str, Any]:
-    """The durations of a comparison's plans: times of the clock are others whenever it is repeated."""
+        raise SpecError(f"{folder}/ has no {name} that can be read; run anew") from None
+    if record.command == "need":
+        return dict(facts)
     try:
         return {
             f"the duration by {row['planner']} {k}": row["duration_s"]
-            for k, row in enumerate(told["planners"])
+            for k, row in enumerate(facts["planners"])
         }
     except (TypeError, KeyError):
         raise SpecError("compare.json is no comparison; compare anew") from None

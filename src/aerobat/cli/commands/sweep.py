@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -22,22 +21,16 @@ from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.planning import Plan, load_plan
 from aerobat.storage import require_replaceable
-from aerobat.studies.sweep.result import Sweep
 from aerobat.studies.sweep.sweep import finished_flights
 from aerobat.studies.sweep.sweep import sweep as sweep_plan
 
 PLAN = "sweep.plan"
 
 
-def _plan_kept(folder: Path, record: RunRecord, make: Callable[[RunRecord], Plan]) -> Plan:
-    """The plan of a sweep, kept or new; new ones are kept.
+def _plan_kept(folder: Path, record: RunRecord) -> Plan:
+    """The plan that the folder of the unfinished sweep keeps, or a new one, which is kept there.
 
-    Args:
-        folder: Of the unfinished sweep.
-        record: Of the sweep.
-        make: Plans.
-
-    Raises SpecError where the flights are those of another sweep.
+    Raises SpecError where the flights there are those of another sweep.
     """
     if all(os.path.exists(folder / name) for name in (RECORD, PLAN)):
         if _without_runs(read_record(folder)) != _without_runs(record):
@@ -46,7 +39,7 @@ def _plan_kept(folder: Path, record: RunRecord, make: Callable[[RunRecord], Plan
                 "those to finish it, remove it, or give another --out"
             )
         return load_plan(folder / PLAN)
-    found = make(record)
+    found = plan_of(record)
     found.save(folder / PLAN)
     write_record(record, folder)
     return found
@@ -99,29 +92,26 @@ def sweep(
         runs=sweeping.flights,
         table=sweeping.table,
     )
-    require_writable(table_name(settings))
+    require_writable(f"flights.{settings.table}")
 
     def kept_or_new(record: RunRecord) -> Plan:
         folder = options.out or record.folder
         require_replaceable(folder, is_of_a_run)  # before hours of flying
-        return _plan_kept(Unfinished.beside(folder).folder, record, plan_of)
+        return _plan_kept(Unfinished.beside(folder).folder, record)
 
     plan, record = planned(problem, options, "sweep", settings, kept_or_new)
-    finish_sweep(sweep_of(plan, record, options, sweeping.workers), record, options)
+    run_sweep(plan, record, options, sweeping.workers)
 
 
-def table_name(settings: FlightSettings) -> str:
-    """The name of a sweep's table."""
-    return f"flights.{settings.table}"
+def run_sweep(plan: Plan, record: RunRecord, options: OutputOptions, workers: str | None = None) -> None:
+    """Fly a sweep, write it with its plan and its table, then show it.
 
-
-def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: str | None = None) -> Sweep:
-    """The flights of a run; what is finished is kept beside the run's folder until that is written.
+    Finished flights are kept beside the run's folder until that is written.
 
     Args:
         plan: What is flown.
         record: How.
-        options: Where to.
+        options: Where to write, and in what form to say it.
         workers: Who flies it.
     """
     flight = record.flight
@@ -129,7 +119,7 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: str
     unfinished = Unfinished.beside(options.out or record.folder)
     keeping = unfinished.kept("flights", flight.runs, finished_flights)
     with keeping, showing(Progress("flown", flight.runs)) as progress:
-        return sweep_plan(
+        swept = sweep_plan(
             plan,
             flight.conditions,
             flight.runs,
@@ -141,13 +131,9 @@ def sweep_of(plan: Plan, record: RunRecord, options: OutputOptions, workers: str
             progress=progress.counting("went well"),
         )
 
-
-def finish_sweep(sweep: Sweep, record: RunRecord, options: OutputOptions) -> None:
-    """Write a sweep with its plan and its table, then show it."""
-
     def write_others(staging: Path) -> None:
-        sweep.plan.save(staging / f"{sweep.plan.problem.name}.plan")
-        write_table(sweep.table, staging / table_name(record.flight))
+        swept.plan.save(staging / f"{swept.plan.problem.name}.plan")
+        write_table(swept.table, staging / f"flights.{flight.table}")
 
-    finish_study(sweep, record, options, write_others)
-    Unfinished.beside(options.out or record.folder).remove()
+    finish_study(swept, record, options, write_others)
+    unfinished.remove()
