@@ -1,7 +1,8 @@
 """CRSF, by which receivers of FPV quadrotors speak to their boards: the frame of all channels.
 
 The format is that of Team BlackSheep, github.com/tbs-fpv/tbs-crsf-spec: address, length, type, payload, and a
-CRC-8 (DVB-S2) of type and payload; 16 channels of 11 bits each, the first in the lowest bits.
+CRC-8 (DVB-S2) of type and payload; 16 channels of 11 bits each, the first in the lowest bits. The
+address of a flight controller is 0xC8.
 """
 
 from __future__ import annotations
@@ -11,16 +12,12 @@ from functools import reduce
 
 from aerobat.links.betaflight.packets import ReceiverProtocol
 
-_FLIGHT_CONTROLLER, _CHANNELS_PACKED = 0xC8, 0x16
-_BITS, _PAYLOAD = 11, 22  # of a channel, bytes of sixteen
-_POLYNOMIAL = 0xD5
-
 
 def channels_frame(counts: Sequence[int]) -> bytes:
     """The frame of 16 channels, each 0 to 2047."""
-    packed = reduce(lambda bits, count: bits << _BITS | count, reversed(counts), 0)
-    body = bytes([_CHANNELS_PACKED]) + packed.to_bytes(_PAYLOAD, "little")
-    return bytes([_FLIGHT_CONTROLLER, len(body) + 1]) + body + bytes([crc8(body)])
+    packed = reduce(lambda bits, count: bits << 11 | count, reversed(counts), 0)
+    body = bytes([0x16]) + packed.to_bytes(22, "little")  # the type RC_CHANNELS_PACKED
+    return bytes([0xC8, len(body) + 1]) + body + bytes([crc8(body)])
 
 
 def crc8(data: bytes) -> int:
@@ -29,7 +26,7 @@ def crc8(data: bytes) -> int:
     for byte in data:
         crc ^= byte
         for _ in range(8):
-            crc = crc << 1 ^ (_POLYNOMIAL if crc & 0x80 else 0)
+            crc = crc << 1 ^ (0xD5 if crc & 0x80 else 0)
         crc &= 0xFF
     return crc
 

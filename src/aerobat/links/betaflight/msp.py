@@ -11,7 +11,7 @@ from aerobat.errors import SpecError
 from aerobat.links.betaflight.packets import ReceiverProtocol
 
 STATUS_EX, SET_RAW_RC = 150, 200
-_TO_BOARD, _FROM_BOARD, _REFUSED = b"$M<", b"$M>", b"$M!"
+_FROM_BOARD, _REFUSED = b"$M>", b"$M!"
 _HEAD = 5  # bytes before the payload: three, its size, the code
 # the firmware's src/main/fc/runtime_config.c, bit by bit
 ARMING_DISABLE_FLAGS = (
@@ -20,13 +20,11 @@ ARMING_DISABLE_FLAGS = (
     "DSHOT_TELEM", "REBOOT_REQD", "DSHOT_BBANG", "NO_ACC_CAL", "MOTOR_PROTO", "FLIP_SWITCH", "ALT_HOLD_SW",
     "POS_HOLD_SW", "ARM_SWITCH",
 )  # fmt: skip
-_SWITCH = "ARM_SWITCH"  # up beside others while the switch asks for arming
-_FLAGS_AT = 15  # of the status: the count of bytes of flight modes beyond the first four
 
 
 def request(code: int, payload: bytes = b"") -> bytes:
     """The frame of a request to a board, its payload 255 bytes at most."""
-    return _framed(_TO_BOARD, code, payload)
+    return _framed(b"$M<", code, payload)
 
 
 MSP = ReceiverProtocol(lambda counts: request(SET_RAW_RC, struct.pack(f"<{len(counts)}H", *counts)))
@@ -62,11 +60,14 @@ def response(data: bytes, code: int) -> bytes | None:
 
 
 def flags_of(status: bytes) -> tuple[str, ...]:
-    """The names of the arming-disable flags that a status holds, the switch's own left out beside others."""
-    at = _FLAGS_AT + 2 + (status[_FLAGS_AT] & 15)
-    (bits,) = struct.unpack_from("<I", status, at)
+    """The names of the arming-disable flags that a status holds.
+
+    The switch's own, which is set beside others while the switch asks for arming, is left out then.
+    """
+    modes = status[15] & 15  # the number of bytes of flight modes beyond the first four
+    (bits,) = struct.unpack_from("<I", status, 17 + modes)
     names = [name for bit, name in enumerate(ARMING_DISABLE_FLAGS) if bits >> bit & 1]
-    return tuple(name for name in names if name != _SWITCH or len(names) == 1)
+    return tuple(name for name in names if name != "ARM_SWITCH" or len(names) == 1)
 
 
 def arming_disable_flags(exchange: Callable[[bytes, Callable[[bytes], bool]], bytes]) -> tuple[str, ...]:

@@ -13,14 +13,7 @@ from typing import NamedTuple
 from aerobat.kernels.ops import Vector
 from aerobat.simulation.flight_controller import Sensed
 
-_STATE = struct.Struct("<d3d3d4d3d3dd")
-_STICKS = struct.Struct("<d16H")
-_ARMED, _DISARMED, _CENTRE = 1900, 1000, 1500
-_HALF_TRAVEL = 500.0  # of a stick, from its centre
-_LOWEST, _HIGHEST = 1000, 2000
-_IDLE, _TRAVEL = 1050.0, 950.0  # of the throttle: below the first, min_check, the motors idle
-_CHANNELS = 16
-_AIR_PRESSURE = 101325.0  # [Pa]
+_LOWEST, _CENTRE, _HIGHEST = 1000, 1500, 2000  # [µs] pulses of a stick
 _TIMESTAMP = 1.0  # [s] always: the firmware would set its clock's pace by differences
 MOTORS = ("front right", "rear left", "front left", "rear right")  # in the order of the packet
 
@@ -29,7 +22,9 @@ def state_packet(sensed: Sensed) -> bytes:
     """The packet of a state; position and velocity, which the firmware does not fly by, are zero."""
     p, q, r = sensed.omega
     force = (-part for part in sensed.specific_force)
-    return _STATE.pack(_TIMESTAMP, p, -q, -r, *force, *sensed.q_world_body, *(0.0,) * 6, _AIR_PRESSURE)
+    air_pressure = 101325.0  # [Pa]
+    numbers = (_TIMESTAMP, p, -q, -r, *force, *sensed.q_world_body, *(0.0,) * 6, air_pressure)
+    return struct.pack("<d3d3d4d3d3dd", *numbers)
 
 
 class ReceiverProtocol(NamedTuple):
@@ -45,7 +40,7 @@ class ReceiverProtocol(NamedTuple):
         return round((pulse - self.offset) / self.step)
 
 
-SIMULATOR = ReceiverProtocol(lambda counts: _STICKS.pack(_TIMESTAMP, *counts))
+SIMULATOR = ReceiverProtocol(lambda counts: struct.pack("<d16H", _TIMESTAMP, *counts))
 
 
 class Sticks:
@@ -58,7 +53,7 @@ class Sticks:
             max_rate: [rad/s] at the end of each stick.
             protocol: By which they are sent.
         """
-        self._scale = _HALF_TRAVEL / max_rate
+        self._scale = 500.0 / max_rate  # [µs/(rad/s)]
         self._protocol = protocol
         self._left = [0.0] * 4
 
@@ -68,7 +63,7 @@ class Sticks:
         wanted = (
             _CENTRE + self._scale * p,
             _CENTRE + self._scale * q,
-            _IDLE + _TRAVEL * throttle,
+            1050.0 + 950.0 * throttle,  # below 1050 µs, min_check, the motors idle
             _CENTRE - self._scale * r,
         )
         return self._framed([self._rounded(k, pulse) for k, pulse in enumerate(wanted)], armed=True)
@@ -85,5 +80,5 @@ class Sticks:
         return sent
 
     def _framed(self, sticks: Sequence[int], armed: bool) -> bytes:
-        switches = [_ARMED if armed else _DISARMED] + [_DISARMED] * (_CHANNELS - len(sticks) - 1)
+        switches = [1900 if armed else 1000] + [1000] * 11  # [µs]; the first one arms
         return self._protocol.frame([*sticks, *map(self._protocol.count, switches)])

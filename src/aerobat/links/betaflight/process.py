@@ -25,9 +25,7 @@ _PATIENCE = 20.0  # [s] of the wall for an answer
 _STEP = 0.01  # [s] of the firmware between looks at its serial line
 _LOOK = 0.002  # [s] of the wall that each look lasts
 _PROMPT = b"\n# "
-_REFUSAL = "###ERROR"
 _LINES_AT_ONCE = 20  # that its buffer holds
-_SAVED = "eeprom.bin"
 _PREFIX = "aerobat-betaflight-"  # of temporary folders
 _LEFT = 60.0  # [s] after which a folder that nobody has locked was left by a killed process
 _INSTALL = (
@@ -95,7 +93,7 @@ class Firmware:
         """
         executable, library = _executable(), _lockstep()
         self._folder = _Folder()
-        self._saved = Path(self._folder.name) / _SAVED
+        self._saved = Path(self._folder.name) / "eeprom.bin"
         if saved is not None:
             self._saved.write_bytes(saved)
         self._orders, theirs = socket.socketpair()
@@ -194,7 +192,7 @@ class Firmware:
             told = "".join(f"{line}\n" for line in few).encode()
             answer = self.exchange(told, partial(_has_prompts, len(few)))
             for line, each in zip(few, answer.decode(errors="replace").split(_PROMPT.decode()), strict=False):
-                if _REFUSAL in each:
+                if "###ERROR" in each:
                     said = " ".join(each.split())
                     raise SpecError(f"autopilot: Betaflight refuses {line!r}: {said}; take version 4.6")
         assert self._serial is not None, "it was spoken to"

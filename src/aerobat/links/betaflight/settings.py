@@ -20,11 +20,6 @@ from aerobat.simulation.law_controller import DERIVATIVE, GYRO
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
-# the firmware's src/main/flight/pid.h: a thousandth of a motor's range for 1°/s, 1°, and 1°/s²
-_PROPORTIONAL, _INTEGRAL, _DERIVATIVE = 0.032029, 0.244381, 0.000529
-_YAW_INTEGRAL = 2.5  # times as much, pid_init.c
-_MIXED = 1000.0
-_MAX_GAIN = 250
 GYRO_LIMIT = 1998.0  # [°/s] of the gyro, and of what a stick can ask
 _COARSEST = 10.0  # [°/s] by which the rates of sticks can be set
 _MIN_RATE = 570.0  # [°/s] at a stick's end, room for corrections included
@@ -136,6 +131,11 @@ def betaflight_settings(vehicle: Vehicle, max_rate: float, simulated: bool = Fal
 
 
 def _gains(vehicle: Vehicle) -> Iterator[tuple[str, int]]:
+    """The gains in the firmware's units.
+
+    One unit is `scale` thousandths of a motor's range for 1°/s, 1° and 1°/s²: its src/main/flight/pid.h, for
+    the integral of yaw pid_init.c.
+    """
     fleet = Fleet.of([vehicle])
     gains = rate_gains(FloatOps, first_numbers(airframe_parameters(fleet)))
     span = fleet.max_thrusts[0] - fleet.min_thrusts[0]
@@ -143,13 +143,13 @@ def _gains(vehicle: Vehicle) -> Iterator[tuple[str, int]]:
     authority = torque / np.diagonal(fleet.inertia[0])  # [rad/s²]
     for k, axis in enumerate(("roll", "pitch", "yaw")):
         for letter, kind, scale in (
-            ("p", gains.proportional, _PROPORTIONAL),
-            ("i", gains.integral, _INTEGRAL * (_YAW_INTEGRAL if axis == "yaw" else 1.0)),
-            ("d", gains.derivative, _DERIVATIVE),
+            ("p", gains.proportional, 0.032029),
+            ("i", gains.integral, 0.244381 * (2.5 if axis == "yaw" else 1.0)),
+            ("d", gains.derivative, 0.000529),
         ):
-            value = round(kind[k] / authority[k] * _MIXED * pi / 180.0 / scale)
+            value = round(kind[k] / authority[k] * 1000.0 * pi / 180.0 / scale)
             value = max(value, 1 if kind[k] > 0.0 else 0)  # a small gain is no gain at all else
-            if value > _MAX_GAIN:
+            if value > 250:  # the most that its command line takes
                 raise SpecError(
                     f"autopilot: the rotors of '{vehicle.name}' are too slow for Betaflight's gains, "
                     f"{letter}_{axis} would be {value}; take a vehicle of less lag or less inertia"

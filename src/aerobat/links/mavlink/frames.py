@@ -17,9 +17,6 @@ from math import cos, pi, radians, sqrt
 from aerobat.kernels.ops import Quaternion, Vector
 from aerobat.kernels.quaternions import multiply
 
-_S = sqrt(0.5)
-_WORLD: Quaternion = (0.0, _S, _S, 0.0)
-_BODY: Quaternion = (0.0, 1.0, 0.0, 0.0)
 _EARTH = 6_371_000.0  # [m] mean radius
 HOME = (47.397742, 8.545594, 488.0)  # [°], [°], [m] where simulated vehicles stand, as PX4's own do
 
@@ -38,7 +35,8 @@ def swap_body(vector: Vector) -> Vector:
 
 def swap_attitude(q: Quaternion) -> Quaternion:
     """The attitude of FLU in ENU to that of FRD in NED, or back; with w ≥ 0."""
-    w, x, y, z = multiply(multiply(_WORLD, q), _BODY)
+    to_ned = (0.0, sqrt(0.5), sqrt(0.5), 0.0)
+    w, x, y, z = multiply(multiply(to_ned, q), (0.0, 1.0, 0.0, 0.0))
     sign = -1.0 if w < 0.0 else 1.0
     return sign * w, sign * x, sign * y, sign * z
 
