@@ -250,7 +250,7 @@ def test_a_maneuver_begins_where_the_odometry_sees_the_vehicle() -> None:
     start = flown.plan.trajectory.evaluate(0.0) + flown.offset
     np.testing.assert_allclose(start, sky.position, atol=2e-3)
     assert start[0] > 9.9
-    seen = sky.node.commander.seen
+    seen = sky.node.commander.observed
     assert seen is not None
     np.testing.assert_allclose(start, seen.body.position, atol=2e-3)
     gate = next(m for m in sky.shown[-1].markers if m.ns == "gate")

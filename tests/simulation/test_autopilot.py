@@ -63,7 +63,7 @@ def test_it_takes_off_goes_somewhere_and_lands() -> None:
     on(vehicle, 10.0)
     assert (vehicle.landed, vehicle.armed, vehicle.crashed) == (True, False, False)
     np.testing.assert_allclose(vehicle.state.position, [1.0, -2.0, 0.0], atol=0.02)
-    assert vehicle.told == []
+    assert vehicle.notices == []
 
 
 def test_it_refuses_what_makes_no_sense() -> None:
@@ -89,7 +89,7 @@ def test_a_client_that_streams_points_is_followed_and_missed_after_its_time() ->
     assert vehicle.mode is Mode.OFFBOARD
     on(vehicle, 0.2)
     assert vehicle.mode is Mode.HOLD
-    assert vehicle.told[0].startswith("no set-points for 0.5")
+    assert vehicle.notices[0].startswith("no set-points for 0.5")
 
 
 def test_a_client_that_streams_attitudes_is_missed_sooner() -> None:
@@ -141,7 +141,7 @@ def test_a_fall_to_the_ground_is_told_and_ends_the_flight() -> None:
     vehicle.hold()
     on(vehicle, 3.0)
     assert (vehicle.crashed, vehicle.landed, vehicle.armed) == (True, True, False)
-    assert vehicle.told[0].startswith("hit the ground at")
+    assert vehicle.notices[0].startswith("hit the ground at")
     assert not vehicle.arm()
 
 

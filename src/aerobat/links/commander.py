@@ -1,4 +1,4 @@
-"""A vehicle's way through a session of maneuvers: up, from hover to hover by missions, and down.
+"""A vehicle's course through a session of maneuvers: up, from hover to hover by missions, and down.
 
 The same for every link whose vehicle tracks points of a path: it knows times, states and goals, no messages.
 """
@@ -30,7 +30,7 @@ _SPINNING_UP = 1.5  # [s] that goals stay on the ground before they climb, so th
 _ASTRAY = 1.5  # [m] from its goal, from which on a vehicle does not follow it
 _STILL = 0.15  # [m/s] of a hover
 _ALOFT = 0.3  # [m] above the ground, from which on a still vehicle hovers
-_RECENT = 0.5  # [s] for which what was seen counts as how it is
+_RECENT = 0.5  # [s] for which an observed state counts as the present one
 _LONG = 1.0  # [s] without news, after which nothing can be told it any more
 
 
@@ -45,16 +45,25 @@ class Doing(StrEnum):
     LANDING = "landing"
 
 
-class _Way(NamedTuple):
-    """A way to a hover, or to the ground."""
+class Route(NamedTuple):
+    """A route to a hover, or to the ground."""
 
     path: Trajectory
     began: float  # [s]
     yaw: float  # [rad]
 
+    @property
+    def end(self) -> Array:
+        """Where it leads [m], (3,)."""
+        return self.path.evaluate(self.path.duration)
+
+    def goal(self, now: float) -> PositionGoal:
+        """The goal at a time [s]."""
+        return goal_on(self.path, max(now - self.began, 0.0), self.yaw)
+
 
 class Commander:
-    """The goal of each tick, from orders and from what is seen of the vehicle.
+    """The goal of each tick, from orders and from observed states of the vehicle.
 
     Goals are given one period ahead, so that each is known when its time comes.
     """
@@ -71,12 +80,12 @@ class Commander:
             say: what takes sentences about the course of things.
         """
         self.doing = Doing.NOTHING
-        self.seen: Observed | None = None
+        self.observed: Observed | None = None  # the last state
+        self.route: Route | None = None  # that is followed, or hovered at the end of
         self.ground = 0.0  # [m] the height at which it took off
         self.log: list[Observed] = []  # of the last plan that was flown, times since its start
         self.mission: Mission[PathGoal] | None = None  # the last one
         self._vehicle, self._gravity, self._period, self._say = vehicle, gravity, period, say
-        self._way: _Way | None = None
         self._there_by = 0.0  # [s] until when a vehicle has to be up, or down
         self._leapt = False  # between two states, since that began
 
@@ -85,34 +94,27 @@ class Commander:
         """The reason why the last mission was given up; empty where it was not."""
         return "" if self.mission is None else self.mission.reason
 
-    def way(self, now: float) -> tuple[Array, float, float] | None:
-        """The end of a way to a hover or to the ground [m], its yaw [rad], and its time left [s]."""
-        if self._way is None:
-            return None
-        path, began, yaw = self._way
-        return path.evaluate(path.duration), yaw, began + path.duration - now
-
-    def observe(self, seen: Observed) -> None:
+    def observe(self, observed: Observed) -> None:
         """Take note of a state."""
-        if self.seen is not None:
-            if seen.time <= self.seen.time:
+        if self.observed is not None:
+            if observed.time <= self.observed.time:
                 return
-            moved = dist(seen.body.position, self.seen.body.position)
-            self._leapt |= moved > _ASTRAY and seen.time - self.seen.time < _RECENT
-        self.seen = seen
+            moved = dist(observed.body.position, self.observed.body.position)
+            self._leapt |= moved > _ASTRAY and observed.time - self.observed.time < _RECENT
+        self.observed = observed
         if self.mission is not None and self.mission.phase is Phase.MANEUVER:
-            self.log.append(seen._replace(time=seen.time - self.mission.maneuver_began))
+            self.log.append(observed._replace(time=observed.time - self.mission.maneuver_began))
 
     def take_off(self, now: float, height: float) -> None:
         """Climb by so much [m] from the ground. Raises SpecError for a vehicle that is not on it."""
-        seen = self._recent(now)
+        observed = self._recent(now)
         if self.doing is not Doing.NOTHING:
             raise SpecError(f"the vehicle is {self.doing} already")
-        here = np.array(seen.body.position)
+        here = np.array(observed.body.position)
         self.ground = float(here[2])
         up = rest_to_rest(here, here + height * so3.UP)
         self._there_by, self._leapt = now + _SPINNING_UP + up.duration + _PATIENCE, False
-        self._go(Doing.CLIMBING, now + _SPINNING_UP, up, yaw_of(seen.body.q_world_body))
+        self._go(Doing.CLIMBING, now + _SPINNING_UP, up, yaw_of(observed.body.q_world_body))
 
     def hover(self, now: float) -> None:
         """Come to a hover from whatever it does. Raises SpecError where it does nothing."""
@@ -124,22 +126,22 @@ class Commander:
 
     def land(self, now: float) -> None:
         """Go down to the ground from a hover. Raises SpecError where it does not hover."""
-        seen = self.require_hover(now)
-        here, yaw = np.array(seen.body.position), yaw_of(seen.body.q_world_body)
-        if self._way is not None:  # from the end of the way that it hovers at
-            here, yaw = self._way.path.evaluate(self._way.path.duration), self._way.yaw
+        observed = self.require_hover(now)
+        here, yaw = np.array(observed.body.position), yaw_of(observed.body.q_world_body)
+        if self.route is not None:  # from its end, where it hovers
+            here, yaw = self.route.end, self.route.yaw
         down = straight_down(here, self.ground)
         self._there_by, self._leapt = now + down.duration + _PATIENCE, False
         self._go(Doing.LANDING, now, down, yaw)
 
     def require_hover(self, now: float) -> Observed:
         """Return the state of a vehicle that hovers, ours or left to itself. Raises SpecError for another."""
-        seen = self._recent(now)
-        speed, height = hypot(*seen.body.velocity), seen.body.position[2] - self.ground
+        observed = self._recent(now)
+        speed, height = hypot(*observed.body.velocity), observed.body.position[2] - self.ground
         if self.doing is Doing.HOVERING and speed <= _STILL:
-            return seen
+            return observed
         if self.doing is Doing.NOTHING and speed <= _STILL and height >= _ALOFT:
-            return seen
+            return observed
         if self.doing is Doing.NOTHING and height < _ALOFT:
             raise SpecError("the vehicle stands on the ground; have it take off first")
         doing = self.doing if self.doing is not Doing.HOVERING else f"moving at {speed:.1f} m/s"
@@ -148,7 +150,7 @@ class Commander:
     def begin(self, now: float, mission: Mission[PathGoal]) -> None:
         """Fly a mission from a hover. Raises SpecError where it does not hover."""
         mission.join(now, self.require_hover(now))
-        self.mission, self.log, self._way = mission, [], None
+        self.mission, self.log, self.route = mission, [], None
         self.doing = Doing.MANEUVERING
 
     def step(self, now: float, late: float = 0.0) -> PathGoal | None:
@@ -157,26 +159,27 @@ class Commander:
         It is given `late` [s].
         """
         if self.doing is Doing.MANEUVERING:
-            return self._upright(self._of_mission(now, late))
-        if self._way is None or self._leave_unseen(now):
+            goal = self._of_mission(now, late)
+            return PathGoal.upright(goal, self._gravity) if isinstance(goal, PositionGoal) else goal
+        if self.route is None or self._leave_silent(now):
             return None
         if self._begins_anew and not self._begin_anew(now):
             return None
         if self._leave_astray():
             return None
-        since = now + self._period - self._way.began
-        if self.doing is not Doing.LANDING and since >= self._way.path.duration:
+        since = now + self._period - self.route.began
+        if self.doing is not Doing.LANDING and since >= self.route.path.duration:
             self.doing = Doing.HOVERING
-        if self.doing is Doing.LANDING and since > self._way.path.duration + _STANDING:
-            self.doing, self._way = Doing.NOTHING, None
+        if self.doing is Doing.LANDING and since > self.route.path.duration + _STANDING:
+            self.doing, self.route = Doing.NOTHING, None
             return None
-        return self._upright(self._on_way(now))
+        return PathGoal.upright(self._goal_on_route(now), self._gravity)
 
     def _of_mission(self, now: float, late: float) -> PathGoal | PositionGoal | None:
         """The goal of the mission, or of what follows it."""
         assert self.mission is not None, "maneuvers are missions"
-        assert self.seen is not None, "a vehicle is seen before it is flown"
-        phase, goal = self.mission.phase, self.mission.step(now, self.seen, self._period, late)
+        assert self.observed is not None, "a vehicle is observed before it is flown"
+        phase, goal = self.mission.phase, self.mission.step(now, self.observed, self._period, late)
         if self.mission.phase not in (phase, Phase.LAND):
             reason = f": {self.mission.reason}" if self.mission.reason else ""
             self._say(f"{self.mission.phase}{reason}")
@@ -184,34 +187,34 @@ class Commander:
             end = self.mission.end
             at_end = rest_to_rest(end.position, end.position)
             self._go(Doing.HOVERING, now, at_end, end.yaw)
-            return self._on_way(now)
+            return self._goal_on_route(now)
         if self.mission.phase is Phase.ABORTED:
-            off = self.mission.error(self.seen) if phase is Phase.MANEUVER else 0.0
+            off = self.mission.error(self.observed) if phase is Phase.MANEUVER else 0.0
             if off > self.mission.settings.max_error + _ASTRAY:  # it is seen to jump, and goals would too
                 self._leave(f"the vehicle is {length(off)} off its goal")
                 return None
-            self._brake(now, self.seen)
-            silent = self._leave_unseen(now, self.mission.settings.max_silence)
-            return None if silent else self._on_way(now)
+            self._brake(now, self.observed)
+            silent = self._leave_silent(now, self.mission.settings.max_silence)
+            return None if silent else self._goal_on_route(now)
         return goal
 
-    def _brake(self, now: float, seen: Observed) -> None:
-        body, floor = seen.body, self.ground + MIN_FLOOR
+    def _brake(self, now: float, observed: Observed) -> None:
+        body, floor = observed.body, self.ground + MIN_FLOOR
         motion = np.array(body.position), np.array(body.velocity)
-        way = Braking.of(*motion, self._vehicle, self._gravity, floor).trajectory
-        self._go(Doing.BRAKING, now, way, float(nearest_heading(np.array(body.q_world_body))))
+        path = Braking.of(*motion, self._vehicle, self._gravity, floor).trajectory
+        self._go(Doing.BRAKING, now, path, float(nearest_heading(np.array(body.q_world_body))))
 
-    def _leave_unseen(self, now: float, allowed: float = _LONG) -> bool:
-        """True where nothing was seen for longer than allowed [s]: the vehicle is left to itself then."""
-        assert self.seen is not None, "a vehicle is seen before it is flown"
-        silence = now - self.seen.time
+    def _leave_silent(self, now: float, allowed: float = _LONG) -> bool:
+        """True where no state came for longer than allowed [s]: the vehicle is left to itself then."""
+        assert self.observed is not None, "a vehicle is observed before it is flown"
+        silence = now - self.observed.time
         if silence <= allowed:
             return False
         self._leave(f"no news of the vehicle for {silence:.1f} s")
         return True
 
     def _leave_astray(self) -> bool:
-        """True where a vehicle does not follow its way: it is left to itself then."""
+        """True where a vehicle does not follow its route: it is left to itself then."""
         off = self._off()
         if off <= _ASTRAY:
             return False
@@ -226,8 +229,8 @@ class Commander:
         """
         if self.doing not in (Doing.CLIMBING, Doing.LANDING) or self._off() <= _BEHIND:
             return False
-        assert self.seen is not None, "a vehicle is seen before it is flown"
-        return self.doing is Doing.CLIMBING or self.seen.body.position[2] > self.ground + _ALOFT
+        assert self.observed is not None, "a vehicle is observed before it is flown"
+        return self.doing is Doing.CLIMBING or self.observed.body.position[2] > self.ground + _ALOFT
 
     def _begin_anew(self, now: float) -> bool:
         """Lead it on from where it is.
@@ -235,40 +238,35 @@ class Commander:
         False where it is left to itself: where that has lasted too long, or it was seen to leap, since goals
         would leap too.
         """
-        assert self.seen is not None and self._way is not None, "asked on a way only"  # noqa: PT018
+        assert self.observed is not None and self.route is not None, "it is on a route"  # noqa: PT018
         if self._leapt or now > self._there_by:
             order = "climb" if self.doing is Doing.CLIMBING else "land"
             why = ", it is seen to leap" if self._leapt else ""
             self._leave(f"the vehicle does not {order} as it is told{why}")
             return False
-        end, here = self._way.path.evaluate(self._way.path.duration), np.array(self.seen.body.position)
+        end, here = self.route.end, np.array(self.observed.body.position)
         speed = DESCENT_SPEED if self.doing is Doing.LANDING else SPEED
-        self._go(self.doing, now, rest_to_rest(here, end, speed), self._way.yaw)
+        self._go(self.doing, now, rest_to_rest(here, end, speed), self.route.yaw)
         return True
 
     def _leave(self, reason: str) -> None:
-        self.doing, self._way = Doing.NOTHING, None
+        self.doing, self.route = Doing.NOTHING, None
         self._say(f"{reason}; it is left to itself")
 
     def _off(self) -> float:
-        """How far the vehicle is off its way [m], when it was seen."""
-        assert self.seen is not None and self._way is not None, "asked on a way only"  # noqa: PT018
-        path, began, yaw = self._way
-        asked = goal_on(path, max(self.seen.time - began, 0.0), yaw).position
-        return float(np.linalg.norm(np.array(self.seen.body.position) - asked))
+        """How far the vehicle was off its route [m] when it was last observed."""
+        assert self.observed is not None and self.route is not None, "it is on a route"  # noqa: PT018
+        goal = self.route.goal(self.observed.time).position
+        return float(np.linalg.norm(np.array(self.observed.body.position) - goal))
 
     def _recent(self, now: float) -> Observed:
-        if self.seen is None or now - self.seen.time > _RECENT:
+        if self.observed is None or now - self.observed.time > _RECENT:
             raise SpecError("nothing was heard of the vehicle lately; see that its odometry comes")
-        return self.seen
+        return self.observed
 
     def _go(self, doing: Doing, now: float, path: Trajectory, yaw: float) -> None:
-        self.doing, self._way = doing, _Way(path, now, yaw)
+        self.doing, self.route = doing, Route(path, now, yaw)
 
-    def _on_way(self, now: float) -> PositionGoal:
-        assert self._way is not None, "asked on a way only"
-        path, began, yaw = self._way
-        return goal_on(path, max(now + self._period - began, 0.0), yaw)
-
-    def _upright(self, goal: PathGoal | PositionGoal | None) -> PathGoal | None:
-        return PathGoal.upright(goal, self._gravity) if isinstance(goal, PositionGoal) else goal
+    def _goal_on_route(self, now: float) -> PositionGoal:
+        assert self.route is not None, "it is on a route"
+        return self.route.goal(now + self._period)

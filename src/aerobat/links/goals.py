@@ -57,7 +57,7 @@ class PathGoal(NamedTuple):
 
     @classmethod
     def upright(cls, goal: PositionGoal, gravity: float) -> PathGoal:
-        """A point of a way near a hover, leaning as its acceleration asks; its rates change slowly."""
+        """A point of a route near a hover, leaning as its acceleration asks; its rates change slowly."""
         thrust = goal.acceleration + gravity * so3.UP
         size = float(np.linalg.norm(thrust))
         heading = so3.about_axis(so3.UP, goal.yaw)

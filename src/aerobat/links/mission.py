@@ -59,7 +59,7 @@ GoalT_co = TypeVar("GoalT_co", covariant=True)
 
 
 class Follower(Protocol[GoalT_co]):
-    """Goals along a path, from what is seen of the vehicle; times are since the path's start [s]."""
+    """Goals along a path, from observed states of the vehicle; times are since the path's start [s]."""
 
     def observe(self, observed: Observed) -> None:
         """Take note of a state."""
@@ -69,7 +69,7 @@ class Follower(Protocol[GoalT_co]):
 
 
 class Mission(Generic[GoalT_co]):
-    """The course of a flight: the goal of each tick, from what is seen of the vehicle."""
+    """The course of a flight: the goal of each tick, from observed states of the vehicle."""
 
     def __init__(
         self, plan: Plan, settings: MissionSettings, stream: SetpointStream, follower: Follower[GoalT_co]
@@ -109,43 +109,43 @@ class Mission(Generic[GoalT_co]):
         self._routes: list[Trajectory] = []
         self._turn = (0.0, 0.0)  # [rad] the yaw at first, and by how much to turn while climbing
 
-    def begin(self, now: float, seen: Observed) -> None:
-        """Leave the ground, the vehicle being armed and obedient; `seen` is how it stands."""
-        here = np.array(seen.body.position)
+    def begin(self, now: float, observed: Observed) -> None:
+        """Leave the ground, the vehicle being armed and obedient; `observed` is how it stands."""
+        here = np.array(observed.body.position)
         above = np.array([here[0], here[1], max(self._start[2], here[2] + _CLIMB)])
         limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
         self._routes = [rest_to_rest(here, above, *limits), rest_to_rest(above, self._start, *limits)]
-        self._turn = self._turn_from(seen)
+        self._turn = self._turn_from(observed)
         self._enter(Phase.CLIMB, now)
 
-    def join(self, now: float, seen: Observed) -> None:
-        """Go to the plan's start from a hover; `seen` is where."""
+    def join(self, now: float, observed: Observed) -> None:
+        """Go to the plan's start from a hover; `observed` is where."""
         limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
-        self._routes = [rest_to_rest(np.array(seen.body.position), self._start, *limits)]
-        self._turn = self._turn_from(seen)
+        self._routes = [rest_to_rest(np.array(observed.body.position), self._start, *limits)]
+        self._turn = self._turn_from(observed)
         self._enter(Phase.APPROACH, now)
 
     def step(
-        self, now: float, seen: Observed, delay: float, late: float = 0.0
+        self, now: float, observed: Observed, delay: float, late: float = 0.0
     ) -> PositionGoal | GoalT_co | None:
         """The goal at this time; None where the vehicle is to look after itself: to hold, or to land.
 
         Args:
             now: the time [s].
-            seen: the latest of the vehicle.
+            observed: the latest state of the vehicle.
             delay: how long a goal is on its way to it [s].
             late: by how much this goal misses its time [s], beside what it is after the one before.
         """
-        self._watch(now, seen, late)
+        self._watch(now, observed, late)
         self._last_tick = now
         if self.phase is Phase.CLIMB:
             return self._along(now, Phase.APPROACH)
         if self.phase is Phase.APPROACH:
             return self._along(now, Phase.SETTLE)
         if self.phase is Phase.SETTLE:
-            self._settle(now, seen)
+            self._settle(now, observed)
         if self.phase is Phase.MANEUVER:
-            return self._maneuver(now, seen, delay)
+            return self._maneuver(now, observed, delay)
         if self.phase is Phase.HOLD and now - self.began > self._after.duration + self.settings.settling:
             self._enter(Phase.LAND, now)
         return self._hovering(now)
@@ -161,25 +161,25 @@ class Mission(Generic[GoalT_co]):
         """The hover after the plan."""
         return goal_on(self._after, self._after.duration, self._final_yaw)
 
-    def error(self, seen: Observed) -> float:
-        """Return the distance of the vehicle from the plan at the time that it was seen [m]."""
-        expected = self.stream.flat(seen.time - self.maneuver_began).position
-        return float(np.linalg.norm(np.array(seen.body.position) - expected))
+    def error(self, observed: Observed) -> float:
+        """Return the distance of the vehicle from the plan at the time that it was observed [m]."""
+        expected = self.stream.flat(observed.time - self.maneuver_began).position
+        return float(np.linalg.norm(np.array(observed.body.position) - expected))
 
-    def _turn_from(self, seen: Observed) -> tuple[float, float]:
+    def _turn_from(self, observed: Observed) -> tuple[float, float]:
         """The yaw of a vehicle [rad], and how far it has to turn to the plan's."""
-        yaw = yaw_of(seen.body.q_world_body)
+        yaw = yaw_of(observed.body.q_world_body)
         return yaw, (self._heading - yaw + pi) % (2 * pi) - pi
 
     def _enter(self, phase: Phase, now: float) -> None:
         self.phase, self.began = phase, now
 
-    def _watch(self, now: float, seen: Observed, late: float) -> None:
+    def _watch(self, now: float, observed: Observed, late: float) -> None:
         """Abort where something is over its bound."""
         flying = self.phase is Phase.MANEUVER
         if self.phase in (Phase.READY, Phase.ABORTED, Phase.LAND):
             return
-        silence = now - seen.time
+        silence = now - observed.time
         allowed = self.settings.max_silence if flying else self.settings.max_silence_outside
         late = max(late, now - self._last_tick)
         if flying:
@@ -188,7 +188,7 @@ class Mission(Generic[GoalT_co]):
             self.abort(now, f"no news of the vehicle for {silence:.2f} s")
         elif flying and late > self.settings.max_lateness:
             self.abort(now, f"a set-point was {late:.2f} s late")
-        elif flying and (error := self.error(seen)) > self.settings.max_error:
+        elif flying and (error := self.error(observed)) > self.settings.max_error:
             self.abort(now, f"the vehicle is {length(error)} off its path")
 
     def _along(self, now: float, following: Phase) -> PositionGoal:
@@ -202,9 +202,9 @@ class Mission(Generic[GoalT_co]):
             self._enter(following, now)
         return goal_on(route, since, yaw + turn * since / route.duration)
 
-    def _settle(self, now: float, seen: Observed) -> None:
+    def _settle(self, now: float, observed: Observed) -> None:
         """Begin the plan once the vehicle has been at rest at its start for long enough."""
-        body = seen.body
+        body = observed.body
         off = float(np.linalg.norm(np.array(body.position) - self._start))
         if off > _NEAR or hypot(*body.velocity) > _SLOW:
             self._rested_since = np.nan
@@ -216,12 +216,12 @@ class Mission(Generic[GoalT_co]):
         elif now - self.began > self.settings.patience:
             self.abort(now, f"the vehicle does not come to rest at the plan's start, it is {length(off)} off")
 
-    def _maneuver(self, now: float, seen: Observed, delay: float) -> PositionGoal | GoalT_co:
+    def _maneuver(self, now: float, observed: Observed, delay: float) -> PositionGoal | GoalT_co:
         since = now - self.maneuver_began + delay
         if since >= self.stream.duration:
             self._enter(Phase.HOLD, now)
             return goal_on(self._after, 0.0, self._final_yaw)
-        self._follower.observe(seen._replace(time=seen.time - self.maneuver_began))
+        self._follower.observe(observed._replace(time=observed.time - self.maneuver_began))
         return self._follower.command(since)
 
     def _hovering(self, now: float) -> PositionGoal | None:

@@ -93,14 +93,14 @@ class PathFollower:
     def _predicted(self, time: float, reference: ReferencePoint) -> Body:
         """The body at a time, as far from its reference as what was seen, and commanded since, makes it."""
         assert self._observed is not None, "a vehicle is observed before it is commanded"
-        seen, body = self._observed.time, self._observed.body
-        then = self._stream.at(seen)
+        observed_at, body = self._observed.time, self._observed.body
+        then = self._stream.at(observed_at)
         position = subtract(then.position, body.position)
         velocity = subtract(then.velocity, body.velocity)
-        while len(self._commanded) > 1 and self._commanded[1][0] <= seen:
+        while len(self._commanded) > 1 and self._commanded[1][0] <= observed_at:
             self._commanded.popleft()
         ends = [*(begin for begin, _ in self._commanded), time][1:]
-        reached = seen
+        reached = observed_at
         for (_, acceleration), end in zip(self._commanded, ends, strict=False):
             step = max(min(end, time) - reached, 0.0)
             position = add_scaled(add_scaled(position, step, velocity), -0.5 * step**2, acceleration)

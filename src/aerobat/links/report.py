@@ -85,12 +85,12 @@ def link_report(
         delay: of a message, either way [s].
         late: by how much the latest set-point missed its time [s].
     """
-    inside = [seen for seen in log if 0.0 <= seen.time <= stream.duration]
+    inside = [observed for observed in log if 0.0 <= observed.time <= stream.duration]
     if len(inside) < 2:
         return LinkReport(aborted, ended, delay, late, len(inside))
-    times = np.array([seen.time for seen in inside])
+    times = np.array([observed.time for observed in inside])
     position, velocity, q = (
-        np.array([getattr(seen.body, name) for seen in inside])
+        np.array([getattr(observed.body, name) for observed in inside])
         for name in ("position", "velocity", "q_world_body")
     )
     points = [stream.at(t) for t in times]

@@ -1,4 +1,4 @@
-"""Ways outside a maneuver, from hover to hover."""
+"""Routes outside a maneuver, from hover to hover."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _PEAK_ACCELERATION = 10.0 / sqrt(3.0)  # [-] likewise, times duration squared ov
 def rest_to_rest(
     start: Array, goal: Array, max_speed: float = SPEED, max_acceleration: float = 2.0
 ) -> Trajectory:
-    """Return the straight way between two hovers, of least jerk.
+    """Return the straight route between two hovers, of least jerk.
 
     Args:
         start: from where [m], (3,).
@@ -37,7 +37,7 @@ def rest_to_rest(
 
 
 def straight_down(start: Array, ground: float) -> Trajectory:
-    """Return the way of a landing from a hover at `start` [m], (3,), to the ground at a height [m].
+    """Return the route of a landing from a hover at `start` [m], (3,), to the ground at a height [m].
 
     It ends 0.3 m under the ground, so that the ground is reached in motion.
     """

@@ -46,7 +46,7 @@ class SimulatedVehicle:
         self.time = 0.0  # [s]
         self.mode = Mode.HOLD
         self.armed, self.landed, self.crashed = False, True, False
-        self.told: list[str] = []  # sentences for whoever listens, who empties it
+        self.notices: list[str] = []  # sentences for whoever listens, who empties it
         self._body = LiveBody(vehicle, environment)
         self._route = Route(rest_to_rest(np.zeros(3), np.zeros(3)), self.time, 0.0)
         self._then: tuple[Array, float | None] | None = None  # [m], [rad] where to go once it hovers
@@ -197,7 +197,7 @@ class SimulatedVehicle:
         stays = stays or (isinstance(self._goal, PathReference) and not self._goal.leads_away)
         allowed = POINT_TIMEOUT if stays else ATTITUDE_TIMEOUT
         if silence > allowed + 1e-9:
-            self.told.append(f"no set-points for {silence:.2f} s: holding")
+            self.notices.append(f"no set-points for {silence:.2f} s: holding")
             self.hold()
 
     def _restart_position_loop(self) -> None:
@@ -214,7 +214,7 @@ class SimulatedVehicle:
         speed = float(np.linalg.norm(state.velocity))
         if not self.landed and (speed > _HARD_SPEED or tilt > _HARD_TILT):
             self.crashed = True
-            self.told.append(f"hit the ground at {speed:.1f} m/s, tilted by {degrees(tilt):.0f}°")
+            self.notices.append(f"hit the ground at {speed:.1f} m/s, tilted by {degrees(tilt):.0f}°")
         has_landed = self.mode is Mode.LAND or self.crashed
         self.landed = True
         self._body.stand()

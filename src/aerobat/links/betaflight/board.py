@@ -103,30 +103,30 @@ class Board:
         self._last = 0.0  # [s] when the law stepped
         self._ground: float | None = None  # [m] where it was armed
 
-    def take(self, piece: PathPiece | None, seen: Observed | None, now: float) -> None:
+    def take(self, piece: PathPiece | None, observed: Observed | None, now: float) -> None:
         """Send the channels of a tick.
 
         Args:
             piece: Of the path from now on; None where there is no goal.
-            seen: The last state, None before the first.
+            observed: The last state, None before the first.
             now: [s].
 
         Raises SpecError where the line is cut.
         """
-        height = 0.0 if seen is None or self._ground is None else seen.body.position[2] - self._ground
-        if piece is None or seen is None:
+        height = 0.0 if observed is None or self._ground is None else observed.body.position[2] - self._ground
+        if piece is None or observed is None:
             if height < _ALOFT:
                 self._stop()
             return
         if self._ground is None:
-            self._ground = seen.body.position[2]
+            self._ground = observed.body.position[2]
         above = float(piece.end.position[2]) - self._ground
         if above < 0.0 and height < _DOWN:
             self._stop()
         elif self._state is None and above < _LIFT:
             self._line.send(self._sticks.idle(armed=True))
         else:
-            self._line.send(self._flown(piece, seen, now))
+            self._line.send(self._flown(piece, observed, now))
 
     def close(self) -> None:
         """Give up the line."""
@@ -136,16 +136,16 @@ class Board:
         self._state = self._ground = None
         self._line.send(self._sticks.idle(armed=False))
 
-    def _flown(self, piece: PathPiece, seen: Observed, now: float) -> bytes:
+    def _flown(self, piece: PathPiece, observed: Observed, now: float) -> bytes:
         """The frame of rates and thrust along a piece, as they hold on average until the next."""
         middle = now + 0.5 * self._period
         points = PathReference(piece).reference(np.array([middle]), self._period, self._gravity)
         reference: ReferencePoint = first_numbers(points)
-        told = Seen(_carried_on(seen, reference, middle, self._gravity), (), reference)
+        law_input = Seen(_carried_on(observed, reference, middle, self._gravity), (), reference)
         if self._state is None or now - self._last > _PAUSE:
-            self._state = self._law.init(FloatOps, self._model, told)
+            self._state = self._law.init(FloatOps, self._model, law_input)
         else:
-            self._state, _ = self._law.step(FloatOps, self._model, self._state, told, now - self._last)
+            self._state, _ = self._law.step(FloatOps, self._model, self._state, law_input, now - self._last)
         assert self._state is not None, "it was made just now"
         self._last = now
         setpoint = self._state.setpoint
@@ -171,9 +171,9 @@ def board_at(address: str, vehicle: Vehicle, environment: Environment, period: f
     return Board(SerialLine(place, protocol.baud), protocol, vehicle, environment, period)
 
 
-def _carried_on(seen: Observed, reference: ReferencePoint, time: float, gravity: float) -> Body:
-    """The body at a time [s], moving since it was seen as its reference does."""
-    age, body = time - seen.time, seen.body
+def _carried_on(observed: Observed, reference: ReferencePoint, time: float, gravity: float) -> Body:
+    """The body at a time [s], moving since it was observed as its reference does."""
+    age, body = time - observed.time, observed.body
     acceleration = subtract(reference.specific_thrust, (0.0, 0.0, gravity))
     turning = to_body(axes(body.q_world_body), reference.omega_dot)
     mean = add_scaled(body.omega_body, 0.5 * age, turning)

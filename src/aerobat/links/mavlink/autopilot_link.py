@@ -45,7 +45,7 @@ class AutopilotLink:
         self.systems: set[int] = set()  # of all autopilots that are heard
         self._sent: dict[object, float] = {}  # [s] when an order, or a question, was sent last
         self._mark = randrange(10**6)  # [ns] by which our questions for the time differ from others'
-        self._asked: dict[int, float] = {}  # [s] when those were asked that are unanswered
+        self._requested: dict[int, float] = {}  # [s] when those were asked that are unanswered
         self._times: deque[tuple[float, float]] = deque(maxlen=_SYNCHRONIZATIONS)  # [s] round trip, offset
         self._now = 0.0
         self.heard = self.beat = -inf  # [s] when the last message came, and the last heartbeat
@@ -78,13 +78,13 @@ class AutopilotLink:
     def receive(self, now: float) -> list[Observed]:
         """Take what has come by this time [s], keep the link up, and return the states among it."""
         self._now = now
-        seen = []
+        states = []
         for message in self._connection.receive():
             if not self._is_ours(message):
                 continue
             self.heard = now
             if message.get_type() in ("ODOMETRY", "LOCAL_POSITION_NED"):
-                seen += self._state(message)
+                states += self._state(message)
             take = getattr(self, f"_take_{message.get_type().lower()}", None)
             if take is not None:
                 take(message)
@@ -96,7 +96,7 @@ class AutopilotLink:
             if self.observed is None or now - self.observed.time > 1.0:
                 for name, every in self.dialect.states.items():
                     self.command(511, message_class(name.lower()).id, every * _INTERVAL)
-        return seen
+        return states
 
     def ask_parameter(self, name: str) -> None:
         """Ask for a parameter, now and then until it is there."""
@@ -178,12 +178,12 @@ class AutopilotLink:
     def _ask_time(self) -> None:
         """Ask for the time, by a number that no other client's question has."""
         question = round(1e9 * self._now) + self._mark
-        self._asked = dict([*self._asked.items(), (question, self._now)][-_SYNCHRONIZATIONS:])
+        self._requested = dict([*self._requested.items(), (question, self._now)][-_SYNCHRONIZATIONS:])
         self._send("timesync", 0, question)
 
     def _take_timesync(self, message: MavlinkMessage) -> None:
         """Take the answer to a question of ours; those to other clients come here too."""
-        sent = self._asked.pop(message.ts1, None)
+        sent = self._requested.pop(message.ts1, None)
         if sent is not None and message.tc1 > 0:
             self._times.append((self._now - sent, 1e-9 * message.tc1 - 0.5 * (self._now + sent)))
 
@@ -209,24 +209,24 @@ class AutopilotLink:
             return []
         _, offset = min(self._times)
         if message.get_type() == "ODOMETRY":
-            seen = _of_odometry(message, offset)
+            state = _of_odometry(message, offset)
         elif self._attitude is None:
             return []
         else:
             age = 1e-3 * (message.time_boot_ms - self._attitude.time_boot_ms)
             if abs(age) > _MAX_APART:
                 return []
-            seen = _of_position(message, self._attitude, age, offset)
-        if seen is None:
+            state = _of_position(message, self._attitude, age, offset)
+        if state is None:
             self._leave_out("not finite, or their attitude is no unit quaternion")
             return []
-        if seen.time > self._now + self.delay + _MAX_AHEAD:
+        if state.time > self._now + self.delay + _MAX_AHEAD:
             self._leave_out("stamped later than now")
             return []
-        if self.observed is not None and seen.time <= self.observed.time:
+        if self.observed is not None and state.time <= self.observed.time:
             return []  # one that was overtaken, or a copy
-        self.observed = seen
-        return [seen]
+        self.observed = state
+        return [state]
 
     def _leave_out(self, reason: str) -> None:
         """Tell once that states of a kind are left out."""
@@ -251,8 +251,8 @@ def _of_position(
 ) -> Observed | None:
     """A state that two messages tell: the attitude turns on by its rates to when the position was so."""
     rates = swap_body((attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed))
-    told = np.array(swap_attitude((attitude.q1, attitude.q2, attitude.q3, attitude.q4)))
-    q = so3.multiply(told, so3.exp(age * np.array(rates)))
+    attitude_then = np.array(swap_attitude((attitude.q1, attitude.q2, attitude.q3, attitude.q4)))
+    q = so3.multiply(attitude_then, so3.exp(age * np.array(rates)))
     velocity = so3.unrotate(q, np.array(swap_world((position.vx, position.vy, position.vz))))
     w, x, y, z = q.tolist()
     forward, left, up = velocity.tolist()

@@ -120,9 +120,9 @@ class Client:
         now = round(now, 3)  # goals are stamped in whole milliseconds, and are those of their stamps
         if self._began is None:
             self._began = now
-        seen = self.link.receive(now)
+        states = self.link.receive(now)
         if self.mission.phase is Phase.MANEUVER:
-            self.log += seen
+            self.log += states
         getattr(self, f"_while_{self.stage.name.lower()}")(now)
 
     def abort(self, now: float, reason: str) -> None:
@@ -139,7 +139,7 @@ class Client:
         return link_report(
             self._plan,
             self.mission.stream,
-            [seen._replace(time=seen.time - began) for seen in self.log],
+            [state._replace(time=state.time - began) for state in self.log],
             offset=self._offset,
             aborted=self.mission.reason or self._lost,
             ended=str(self.stage),

@@ -78,10 +78,10 @@ class FrontEnd:
             take = getattr(self, f"_take_{message.get_type().lower()}", None)
             if take is not None:
                 take(message)
-        for sentence in self.vehicle.told:
+        for sentence in self.vehicle.notices:
             self._say(sentence)
             self._send("statustext", 4, sentence.encode()[:50])
-        self.vehicle.told.clear()
+        self.vehicle.notices.clear()
         for identity, (name, fields, interval) in self._streams.items():
             if self._due[identity] <= now + 1e-9:
                 self._send(name, *fields())

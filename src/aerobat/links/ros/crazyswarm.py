@@ -1,6 +1,6 @@
 """A Crazyflie behind crazyswarm2's server of ROS 2: what its services and its topic of full states are told.
 
-Ways to a hover and to the ground are the firmware's own: it hovers by itself where nobody tells it anything.
+Routes to a hover and to the ground are the firmware's own. It hovers by itself where it is told nothing.
 Maneuvers are streamed as full states, or, where the plan has the pieces, uploaded and flown by itself.
 """
 
@@ -32,7 +32,7 @@ SERVICES = {
 }
 _PIECE = "crazyflie_interfaces/msg/TrajectoryPolynomialPiece"
 _VALID = 100  # [ms] for which the last full state counts once no more come
-_SHORTEST = 0.5  # [s] of a way, however near its end is
+_SHORTEST = 0.5  # [s] of a route, however near its end is
 _TRAJECTORY = 1  # the number of the trajectory that is flown
 
 
@@ -58,13 +58,13 @@ class Crazyflie:
         self._streams = self._flies = False  # whether full states are sent, and a trajectory is flown
 
     def take(self, tick: Tick) -> None:
-        """Tell what is due: an order where another way begins, else the full state of a maneuver's goal."""
+        """Tell what is due: an order where another route begins, else the full state of a maneuver's goal."""
         enters, self._doing = tick.doing is not self._doing, tick.doing
         own = tick.flown is not None and tick.flown.pieces is not None
-        if tick.way is None and tick.doing is Doing.NOTHING:
+        if tick.route is None and tick.doing is Doing.NOTHING:
             if enters and self._streams:  # in the air: the firmware stops the rotors where full states stop
                 self._order("go_to", relative=True, duration=self._duration(_SHORTEST))
-        elif tick.way is not None and tick.doing is not Doing.BRAKING:
+        elif tick.route is not None and tick.doing is not Doing.BRAKING:
             if enters:
                 self._go(tick)
         elif own and tick.flown is not None and tick.is_flown:
@@ -79,9 +79,9 @@ class Crazyflie:
             self._publish(self._full_state(tick.piece, tick.stamp))
 
     def _go(self, tick: Tick) -> None:
-        """Order the way that begins."""
-        assert tick.way is not None, "asked on a way only"
-        end, yaw, left = tick.way
+        """Order the route that begins."""
+        assert tick.route is not None, "it is on a route"
+        end, left = tick.route.end, tick.route.began + tick.route.path.duration - tick.now
         duration = self._duration(max(left, _SHORTEST))
         if tick.doing is Doing.CLIMBING:
             self._order("takeoff", height=float(end[2]), duration=duration)
@@ -89,10 +89,10 @@ class Crazyflie:
             self._order("land", height=tick.ground, duration=duration)
         else:
             goal = self._messages.vector("Point", end)
-            self._order("go_to", relative=False, goal=goal, yaw=yaw, duration=duration)
+            self._order("go_to", relative=False, goal=goal, yaw=tick.route.yaw, duration=duration)
 
     def _order(self, service: str, **given: Any) -> None:
-        """Ask for a way of the firmware's own, in place of full states."""
+        """Ask for a route of the firmware's own, in place of full states."""
         if self._streams:
             self._ask["notify_setpoints_stop"](group_mask=0, remain_valid_millisecs=_VALID)
         self._streams = False

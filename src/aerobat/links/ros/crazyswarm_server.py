@@ -113,10 +113,10 @@ class CrazyswarmServer(VehicleNode):
             self._say("trajectories are flown once uploaded, forwards, in their own time; none begins")
             return
         pieces = np.zeros(len(uploaded), dtype=PIECE)
-        for piece, told in zip(pieces, uploaded, strict=True):
-            piece["duration"] = topics.nanoseconds(told.duration) / NANOSECONDS
+        for piece, part in zip(pieces, uploaded, strict=True):
+            piece["duration"] = topics.nanoseconds(part.duration) / NANOSECONDS
             for numbers, axis in zip(piece["polynomials"], AXES, strict=True):
-                polynomial = getattr(told, f"poly_{axis}")
+                polynomial = getattr(part, f"poly_{axis}")
                 numbers[: len(polynomial)] = polynomial
         path = as_path(pieces, heading=float(pieces["polynomials"][0, 3, 0]))
         here = self.vehicle.state.position

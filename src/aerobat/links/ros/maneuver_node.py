@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, RosMessage
-from aerobat.links.commander import Commander, Doing
+from aerobat.links.commander import Commander, Doing, Route
 from aerobat.links.goals import Observed, PathGoal, PathPiece, yaw_of
 from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.path_follower import PathForwarder
@@ -50,11 +49,11 @@ class Tick(NamedTuple):
     """The orders that are due at one tick, for what flies the vehicle."""
 
     piece: PathPiece | None  # of the path, that begins; None where there is no goal
-    seen: Observed | None  # the last state, None before the first
+    observed: Observed | None  # the last state, None before the first
     now: float  # [s]
     stamp: int  # [ns] when the piece begins, by ROS time
     doing: Doing
-    way: tuple[Array, float, float] | None  # see `Commander.way`
+    route: Route | None
     ground: float  # [m] where it took off
     flown: Prepared | None  # the maneuver that is flown
     is_flown: bool  # whether its plan is: neither the way to its start nor the hover at its end
@@ -128,11 +127,11 @@ class ManeuverNode:
         maneuvers = commander.doing is Doing.MANEUVERING
         return Tick(
             piece,
-            commander.seen,
+            commander.observed,
             now,
             self.origin + round((now if piece is None else piece.stamp) * NANOSECONDS),
             commander.doing,
-            commander.way(now),
+            commander.route,
             commander.ground,
             self._flown if maneuvers else None,
             maneuvers and mission is not None and mission.phase is Phase.MANEUVER,
@@ -167,13 +166,13 @@ class ManeuverNode:
 
     def _take_odometry(self, message: RosMessage) -> None:
         """Take a state, unless it cannot be one."""
-        seen = topics.read_odometry(message, self.origin)
-        if seen is None:
+        observed = topics.read_odometry(message, self.origin)
+        if observed is None:
             self._leave_out("is not finite, or its attitude no unit quaternion; see to the estimator")
-        elif seen.time > (self._ros.time() - self.origin) / NANOSECONDS + _MAX_AHEAD:
+        elif observed.time > (self._ros.time() - self.origin) / NANOSECONDS + _MAX_AHEAD:
             self._leave_out("is stamped later than now; set the clocks alike")
         else:
-            self.commander.observe(seen)
+            self.commander.observe(observed)
 
     def _leave_out(self, reason: str) -> None:
         """Say once that odometry of a kind is left out."""
@@ -204,14 +203,14 @@ class ManeuverNode:
 
     def _plan(self, name: str, answer: Answer) -> None:
         """Have a maneuver planned from where the vehicle hovers."""
-        seen = self.commander.require_hover(self._now)
+        observed = self.commander.require_hover(self._now)
         problem, planner = self._maneuvers[name]
         request = ManeuverRequest(
             problem,
             self._vehicle,
             planner,
-            np.array(seen.body.position),
-            yaw_of(seen.body.q_world_body),
+            np.array(observed.body.position),
+            yaw_of(observed.body.q_world_body),
             self.commander.ground,
             self.settings.in_world,
             self.settings.in_pieces,

@@ -70,20 +70,20 @@ def _prepared(request: ManeuverRequest) -> Prepared:
     if way_back.no_return:
         raise SpecError(f"{way_back}; climb, or raise its gates")
     through = f" through {len(problem.gates)} gate(s)" if problem.gates else ""
-    told = f"'{problem.name}' in {found.duration:.2f} s{through}, {found.planner}; {way_back}"
+    announcement = f"'{problem.name}' in {found.duration:.2f} s{through}, {found.planner}; {way_back}"
     assert found.vehicle is not None, "it was planned for one"
     stream = SetpointStream(found.trajectory, found.vehicle, problem.environment, offset)
     pieces = fitted_pieces(found)[0] if request.in_pieces else None
-    return Prepared(found, offset, stream, told, pieces)
+    return Prepared(found, offset, stream, announcement, pieces)
 
 
 def _from_here(request: ManeuverRequest) -> tuple[Problem, Array]:
     """The problem that begins where the vehicle hovers, and where its origin lies in the world [m]."""
-    asked = replace(request.problem, heading=replace(request.problem.heading, start=request.yaw))
+    problem = replace(request.problem, heading=replace(request.problem.heading, start=request.yaw))
     if request.in_world:
-        return replace(asked, start=at_rest(request.position)), np.zeros(3)
-    offset = request.position - asked.start.position
-    if asked.environment.ground is None:
-        return asked, offset
+        return replace(problem, start=at_rest(request.position)), np.zeros(3)
+    offset = request.position - problem.start.position
+    if problem.environment.ground is None:
+        return problem, offset
     below = request.ground - float(offset[2])
-    return replace(asked, environment=replace(asked.environment, ground=below)), offset
+    return replace(problem, environment=replace(problem.environment, ground=below)), offset

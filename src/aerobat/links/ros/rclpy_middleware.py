@@ -95,11 +95,11 @@ class RclpyMiddleware:
 
     def client(self, service: str, kind: str) -> Callable[..., None]:
         """See `crazyswarm.Ros2.client`. Raises SpecError where nobody offers it."""
-        asked = interface_class(kind)
-        client = self._waiting.create_client(asked, service, callback_group=self._services)
+        interface = interface_class(kind)
+        client = self._waiting.create_client(interface, service, callback_group=self._services)
         if not client.wait_for_service(_OFFERED):
             raise SpecError(f"nobody offers the service {service}; start crazyswarm2's server first")
-        return lambda **given: client.call_async(asked.Request(**given))
+        return lambda **given: client.call_async(interface.Request(**given))
 
     def serve(self, service: str, kind: str, take: Callable[[Any], None]) -> None:
         """See `crazyswarm.Ros2.serve`."""

@@ -55,7 +55,7 @@ class VehicleNode:
         self._period, self._due = 1.0 / rate, 0.0
         self._send_odometry = ros.publisher(odometry, topics.KIND_OF_ODOMETRY)
         self._clock = clock
-        self._told = self.origin  # [ns] the last time that was told
+        self._published = self.origin  # [ns] the last time that was told
         if clock is not None:
             self._send_clock = ros.publisher(topics.CLOCK, topics.KIND_OF_CLOCK)
             clock.tell_again = self._tell_time
@@ -65,19 +65,19 @@ class VehicleNode:
     def tick(self, now: float) -> None:
         """Go on to this time [s], and send what is due."""
         self.vehicle.advance(now)
-        for sentence in self.vehicle.told:
+        for sentence in self.vehicle.notices:
             self._say(sentence)
-        self.vehicle.told.clear()
+        self.vehicle.notices.clear()
         if now >= self._due - 1e-9:
             stamp = self._stamp(self.vehicle.time)
             self._send_odometry(self._messages.odometry(stamp, self.vehicle.state))
             self._due = max(self._due + self._period, now)
             if self._clock is not None:
-                self._told = self._stamp(now)
+                self._published = self._stamp(now)
                 self._tell_time()
 
     def _tell_time(self) -> None:
-        time = self._messages.time("Time", self._told)
+        time = self._messages.time("Time", self._published)
         self._send_clock(self._messages.make(topics.KIND_OF_CLOCK, clock=time))
 
     def _stamp(self, time: float) -> int:
