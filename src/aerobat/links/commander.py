@@ -54,7 +54,7 @@ class Route(NamedTuple):
 
     @property
     def end(self) -> Array:
-        """Where it leads [m], (3,)."""
+        """The position that it leads to [m], (3,)."""
         return self.path.evaluate(self.path.duration)
 
     def goal(self, now: float) -> PositionGoal:

@@ -1,4 +1,4 @@
-"""Headings that are asked beside a path: directions of the body's x axis along the way."""
+"""Headings: the direction that the body's x axis follows along a path."""
 
 from __future__ import annotations
 
@@ -63,11 +63,11 @@ Knots = Annotated[
 
 @declared
 class Heading:
-    """The direction of the body's x axis along the way, by a turn about the thrust axis.
+    """The direction of the body's x axis along the path, as a turn about the thrust axis.
 
     A heading is an angle about the thrust axis from where the smallest rotation from upright would leave the
-    body's x axis. A plan follows it as closely as the rotors allow, and smoothly across where nothing is
-    asked: upside down, beside the point, or without a velocity.
+    body's x axis. A plan follows it as closely as the rotors allow, and turns smoothly where there is no
+    direction to follow: upside down, beside the point, or without a velocity.
     """
 
     start: Angle = 0.0  # [rad] about the thrust axis at the start
@@ -79,12 +79,12 @@ class Heading:
 
     def __post_init__(self) -> None:
         """Check."""
-        for name, mode, given in (
+        for name, mode, is_given in (
             ("point", HeadingMode.TOWARDS, not np.isnan(self.point).any()),
             ("knots_deg", HeadingMode.SPLINE, len(self.knots_deg) > 0),
         ):
-            if given != (self.mode is mode):
-                complaint = f'is for mode = "{mode}"; drop it' if given else f"is missing for {mode}; add it"
+            if is_given != (self.mode is mode):
+                complaint = f'is for mode = "{mode}"; drop it' if is_given else f"is missing for {mode}; add it"
                 raise FieldError(name, complaint)
         knots = self.knots_deg
         if len(knots) and knots[0, 0] == 0.0 and not isclose(radians(knots[0, 1]), self.start, abs_tol=1e-9):
@@ -95,8 +95,8 @@ class Heading:
         """The start [rad]."""
         return self.start
 
-    def asked(self, fractions: Array, flat: FlatState, b3: Array) -> Array:
-        """Directions that the body's x axis shall have, world, (T, 3), the shorter the less they matter.
+    def reference_axes(self, fractions: Array, flat: FlatState, b3: Array) -> Array:
+        """Reference directions of the body's x axis, world, (T, 3); their lengths, 0 to 1, are weights.
 
         Args:
             fractions: Of the duration that have passed, (T,).

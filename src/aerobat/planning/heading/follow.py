@@ -111,7 +111,7 @@ def _asked(heading: Heading, limits: YawLimits) -> tuple[Array, Array]:
     setpoint, duration = limits.carried, limits.path.duration
     axes = so3.axes(setpoint.q_world_body)
     flat: FlatState = setpoint.flat
-    wanted = heading.asked(limits.times / duration, flat, axes[..., 2])
+    wanted = heading.reference_axes(limits.times / duration, flat, axes[..., 2])
     x, y = (np.sum(wanted * axes[..., k], axis=-1) for k in (0, 1))
     return np.arctan2(y, x), np.hypot(x, y)
 
