@@ -44,8 +44,6 @@ COMMANDS: dict[str, dict[str, str | dict[str, str]]] = {
     },
 }
 
-LINK = "Fly by MAVLink or ROS, or simulate a vehicle for either."
-
 app = App(
     name="aerobat",
     help="""Plan, fly and prove aggressive maneuvers for multirotors.
@@ -71,7 +69,8 @@ for title, commands in COMMANDS.items():
         if isinstance(help, str):
             app.command(f"aerobat.cli.commands.{name}:{name}", name=name, help=help, group=group)
             continue
-        inner = App(name=name, help=LINK, group=group)
+        summary = "Fly by MAVLink or ROS, or simulate a vehicle for either."
+        inner = App(name=name, help=summary, group=group)
         app.command(inner)
         for each, its_help in help.items():
             file, place = each.partition("-")[0], each.replace("-", "_")

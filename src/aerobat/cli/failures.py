@@ -12,9 +12,7 @@ from enum import IntEnum
 from aerobat.cli.terminal import print_json, say
 from aerobat.errors import AerobatError, BackendMissing, Infeasible, OwnCodeError, SpecError, chain_of
 
-EXPLAIN = "add --explain to `aerobat plan` to try changes that would help"
 IMPORT_FLAG = "--import"
-JSON_FLAG = "--json"
 TRACEBACK_FLAG = "--traceback"
 
 _FLAG = re.compile(r"(?<![\w-])--[a-z][\w-]*")
@@ -43,7 +41,7 @@ class Failure:
     def tell(self, arguments: Sequence[str]) -> None:
         """Say the sentence on standard error; where JSON is asked for, write all to standard output."""
         say(self.message)
-        if JSON_FLAG in arguments:
+        if "--json" in arguments:
             print_json(json.dumps({"error": asdict(self)}, indent=2, ensure_ascii=False))
 
 
@@ -56,13 +54,13 @@ def stopped_by(code: ExitCode) -> Failure:
 def foreseen(error: AerobatError) -> Failure:
     """The failure that an error of ours stands for."""
     if isinstance(error, Infeasible):
-        return Failure("no_plan", error.with_remedy(EXPLAIN), next(iter(error.limits), None))
+        sentence = error.with_remedy("add --explain to `aerobat plan` to try changes that would help")
+        return Failure("no_plan", sentence, next(iter(error.limits), None))
     if isinstance(error, BackendMissing):
         return Failure("missing_backend", str(error))
     from aerobat.declaration.registry import placed
 
-    sentence = placed(error) if isinstance(error, SpecError) else error
-    return Failure("bad_input", str(sentence), _field(error))
+    return Failure("bad_input", str(placed(error) if isinstance(error, SpecError) else error), _field(error))
 
 
 def of_plugins(error: BaseException, arguments: Sequence[str]) -> Failure | None:

@@ -79,12 +79,12 @@ class Heading:
 
     def __post_init__(self) -> None:
         """Check."""
-        for name, mode, is_given in (
+        for name, mode, given in (
             ("point", HeadingMode.TOWARDS, not np.isnan(self.point).any()),
             ("knots_deg", HeadingMode.SPLINE, len(self.knots_deg) > 0),
         ):
-            if is_given != (self.mode is mode):
-                complaint = f'is for mode = "{mode}"; drop it' if is_given else f"is missing for {mode}; add it"
+            if given != (self.mode is mode):
+                complaint = f'is for mode = "{mode}"; drop it' if given else f"is missing for {mode}; add it"
                 raise FieldError(name, complaint)
         knots = self.knots_deg
         if len(knots) and knots[0, 0] == 0.0 and not isclose(radians(knots[0, 1]), self.start, abs_tol=1e-9):

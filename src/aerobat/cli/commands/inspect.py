@@ -22,8 +22,6 @@ from aerobat.simulation import load_flight
 from aerobat.storage import write_whole
 from aerobat.studies.inspection import inspect_flight
 
-CSV = ".csv"  # a log of another system
-
 
 @dataclass(frozen=True, kw_only=True)
 class InspectOptions(VehicleOptions):
@@ -51,7 +49,7 @@ def inspect(log: Path, options: Annotated[InspectOptions, Parameter(name="*")] =
         see docs/how-to/inspect.md.
     """
     file = log / FLIGHT if os.path.isdir(log) else log
-    flight = None if file.suffix.lower() == CSV else load_flight(file)
+    flight = None if file.suffix.lower() == ".csv" else load_flight(file)
     plan = whole_plan(options.plan or file.parent, "give the flight's .plan file as --plan")
     vehicle = None if options.vehicle is None else named_vehicle(options.vehicle)
     if flight is None:

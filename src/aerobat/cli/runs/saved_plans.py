@@ -21,7 +21,6 @@ from aerobat.problem import EndState, Heading, Problem, problem_names
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
 
-FILES = (".plan", ".csv", ".npz")
 MADE_BY = "file"  # in the place of a planner's name
 
 
@@ -29,7 +28,7 @@ def plan_source(name: str) -> Path | None:
     """The file or folder that holds a plan, where a command names one, and no problem."""
     path = Path(name)
     is_folder = name not in problem_names() and path.suffix != ".toml" and os.path.isdir(path)
-    return path if path.suffix in FILES or is_folder else None
+    return path if path.suffix in (".plan", ".csv", ".npz") or is_folder else None
 
 
 def read_saved_plan(path: Path, options: PlanningOptions) -> Plan:

@@ -26,8 +26,6 @@ MAX_ERROR = 2e-3  # [m] a fortieth of the vehicle's width: more is another path
 MAX_EXTENT = 100.0  # [m] float32 tells 8 µm apart there
 PIECES = ("trajectory.bin", "trajectory.csv")
 AXES = ("x", "y", "z", "yaw")
-HEADER = ",".join(["duration", *(f"{axis}^{power}" for axis in AXES for power in range(POWERS))])
-READING = "pieces of float32 coefficients"
 Pieces: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.void]]"  # of the type PIECE
 
 
@@ -78,10 +76,11 @@ def _loss(plan: Plan, path: Trajectory, yaw: YawFit) -> Loss:
         velocity=peak_difference(plan.trajectory, 1, path, 1),
         attitude=yaw.attitude_error,
         thrust_axis=yaw.thrust_axis_error,
-        reading=READING,
+        reading="pieces of float32 coefficients",
     )
 
 
 def _csv(pieces: Pieces) -> bytes:
+    header = ",".join(["duration", *(f"{axis}^{power}" for axis in AXES for power in range(POWERS))])
     rows = np.column_stack([pieces["duration"], pieces["polynomials"].reshape(len(pieces), -1)])
-    return "\n".join([HEADER, *(",".join(map(repr, row)) for row in rows.tolist()), ""]).encode()
+    return "\n".join([header, *(",".join(map(repr, row)) for row in rows.tolist()), ""]).encode()

@@ -27,7 +27,6 @@ from aerobat.problem.gate import Gate
 from aerobat.vehicle import Vehicle
 
 Floats = NDArray[np.float32]
-MAGIC, VERSION, JSON_CHUNK, BINARY_CHUNK = b"glTF", 2, b"JSON", b"BIN\0"
 FLOAT, UNSIGNED_INT, LINES, LINE_STRIP, TRIANGLES = 5126, 5125, 1, 3, 4  # as the format numbers them
 BEAM = 0.05  # [m] of a gate's frame
 CORNERS = 24  # of a rotor's disc
@@ -148,8 +147,8 @@ class _Scene:
             "buffers": [{"byteLength": len(self.buffer)}],
         }
         text = json.dumps(description, ensure_ascii=False).encode()
-        chunks = _chunk(JSON_CHUNK, text, b" ") + _chunk(BINARY_CHUNK, bytes(self.buffer), b"\0")
-        return MAGIC + struct.pack("<II", VERSION, 12 + len(chunks)) + chunks
+        chunks = _chunk(b"JSON", text, b" ") + _chunk(b"BIN\0", bytes(self.buffer), b"\0")
+        return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
 
 
 def _y_up(vectors: Floats) -> Floats:

@@ -24,9 +24,7 @@ ERRORS = (  # columns of the table, and what people call them
     ("max_attitude_error_deg", "attitude, max"),
     ("rms_attitude_error_deg", "attitude, RMS"),
 )
-PASSAGE = (("miss_m", "off its centre"), ("attitude_error_deg", "attitude"))
 WIDTHS = (0.01, 0.02, 0.05, 0.1)  # [m] off a gate's centre
-NEVER = "not passed"
 
 
 @facts.register
@@ -64,7 +62,7 @@ def _outcome(outcome: Outcome, share: Share) -> Fact:
 def _passage(sweep: Sweep, name: str) -> Iterator[Fact]:
     passed = sweep.passed(name)
     yield Fact("passed", passed, "passed", str(passed))
-    for column, label in PASSAGE:
+    for column, label in (("miss_m", "off its centre"), ("attitude_error_deg", "attitude")):
         yield replace(_quantiles(sweep, f"{name}_{column}", label), key=column)
     shares = {width: sweep.within(f"{name}_miss_m", width) for width in WIDTHS}
     text = ", ".join(f"{length(width)} {shares[width]}" for width in WIDTHS[1:3])
@@ -99,5 +97,5 @@ def _quantiles(sweep: Sweep, column: str, label: str) -> Fact:
 
 def _shown(value: float, column: str) -> str:
     if not isfinite(value):
-        return NEVER
+        return "not passed"
     return length(value) if column.endswith("_m") else f"{value:.2f}°"

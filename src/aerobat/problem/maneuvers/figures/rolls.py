@@ -12,8 +12,6 @@ from aerobat.problem.maneuvers.figures.figure import Figure
 from aerobat.problem.maneuvers.maneuver import maneuver
 from aerobat.problem.stage import StageSequence
 
-QUARTERS_DEG = (90, 180, 270, 360)  # of a roll
-
 
 @maneuver("barrel-roll")
 class BarrelRoll(Figure):
@@ -27,7 +25,7 @@ class BarrelRoll(Figure):
         forward = place.heads((1.0, 0.0, 0.0), self.speed)
         there = () if place.gate else place.near((0.0, 0.0, 0.0), 0.0)
         stages = [place.stage("entry", (0.0, 0.0, 1.0), *there, forward, at_gate=True)]
-        for angle_deg in _quarters(self.count):
+        for angle_deg in range(90, 360 * self.count + 1, 90):
             up = (0.0, -sin(radians(angle_deg)), cos(radians(angle_deg)))
             stages.append(place.stage(f"{angle_deg}°", up, forward))
         return StageSequence(tuple(stages))
@@ -47,7 +45,7 @@ class Corkscrew(Figure):
         """Return the entry below the axis, upright, and the quarters of every turn."""
         place = self.place(gates, max_specific_thrust)
         stages = []
-        for angle_deg in (0, *_quarters(self.count)):
+        for angle_deg in range(0, 360 * self.count + 1, 90):
             sine, cosine = sin(radians(angle_deg)), cos(radians(angle_deg))
             point = (self.lead * angle_deg / 360.0, self.radius * sine, self.radius * (1.0 - cosine))
             there = () if angle_deg == 0 and place.gate else place.near(point, self.MARGIN * self.radius)
@@ -55,8 +53,3 @@ class Corkscrew(Figure):
             name = f"{angle_deg}°" if angle_deg else "entry"
             stages.append(place.stage(name, (0.0, -sine, cosine), *there, forward, at_gate=angle_deg == 0))
         return StageSequence(tuple(stages))
-
-
-def _quarters(count: int) -> list[int]:
-    """The quarters of so many turns [deg]."""
-    return [360 * turn + angle_deg for turn in range(count) for angle_deg in QUARTERS_DEG]
