@@ -19,8 +19,7 @@ from aerobat.cli.terminal import open_in_browser, print_json
 from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
-from aerobat.interchange import read_plan
-from aerobat.planning import Plan
+from aerobat.planning import Plan, load_plan
 from aerobat.reporting.motion.video import write_video
 from aerobat.reporting.plain_data import to_json
 from aerobat.simulation import Flight, load_flight
@@ -205,8 +204,8 @@ def _plan_beside(file: Path, flight: Flight) -> Plan | None:
     plans = list(file.parent.glob("*.plan"))
     if len(plans) != 1:
         return None
-    plan = read_plan(plans[0])
-    return plan if isinstance(plan, Plan) and plan_fits(plan, flight) else None
+    plan = load_plan(plans[0])
+    return plan if plan_fits(plan, flight) else None
 
 
 def _default_page(source: Path) -> Path:
