@@ -10,6 +10,7 @@ import pytest
 import aerobat as ab
 from aerobat.planning.around.cells import Cells
 from aerobat.planning.around.routes import routes
+from aerobat.planning.passages import gaps_at_ends, require_clear_ends
 from aerobat.planning.planners import suited_planner
 from aerobat.planning.task import Task
 from places import ROOT
@@ -140,6 +141,16 @@ def test_what_is_kept_clear_is_no_more_than_the_ends_leave() -> None:
     near, far = (Task.of(hall(box), QUAD, clearance=0.1).clearance for box in beside)
     assert 0.0 < near < 0.03
     assert far == 0.1
+
+
+def test_an_end_in_free_fall_is_clear_in_every_attitude_or_refused() -> None:
+    falling = ab.EndState(ENDS[0].position, acceleration=(0.0, 0.0, -ab.Environment().gravity))
+    reach = QUAD.bounding_ellipsoid.revolved.reach
+    boxes = [ab.Box(position=(0.0, 0.0, 1.4 - reach - gap), size=(1.0, 1.0, 0.2)) for gap in (0.03, -0.03)]
+    clear, hit = (replace(hall(box), start=falling) for box in boxes)
+    assert gaps_at_ends(clear, QUAD)[0][0] == pytest.approx(0.03)
+    with pytest.raises(ab.SpecError, match=r"start\.position: the body of agile-quad reaches 3\.\d* cm into"):
+        require_clear_ends(hit, QUAD)
 
 
 @pytest.mark.slow

@@ -75,12 +75,17 @@ class Clearance:
 
         Args:
             positions: Of the centre of mass [m], (m, 3).
-            thrusts: Along the thrust axis there, of any length, (m, 3).
+            thrusts: Along the thrust axis there, of any length, (m, 3). Where it is zero no attitude is
+                determined, and the body counts in every attitude.
             times: [s], (m,).
         """
-        axes = thrusts / np.linalg.norm(thrusts, axis=-1, keepdims=True)
+        length, revolved = np.linalg.norm(thrusts, axis=-1, keepdims=True), self.body.revolved
+        is_falling = length == 0.0
+        axes = thrusts / np.where(is_falling, 1.0, length)
         bodies, numbers, found = self._separated(positions, axes, times, inf)
-        gaps = found.gaps - self.body.revolved.aside
+        # without a thrust axis `turned` makes a ball as wide as the body, and the body reaches farther
+        beyond = np.where(is_falling[:, 0], revolved.reach - revolved.wide, revolved.aside)
+        gaps = found.gaps - beyond[bodies]
         least, names = [inf] * len(positions), [""] * len(positions)
         for body, number, gap in zip(bodies.tolist(), numbers.tolist(), gaps.tolist(), strict=True):
             if gap < least[body]:
