@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 import aerobat as ab
-from aerobat.planning import Plan, with_second_opinion
+from aerobat.planning import Plan, SecondOpinion, with_second_opinion
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.reporting.figures import report_figure
 from aerobat.reporting.plain_data import plain
@@ -108,6 +108,15 @@ def test_a_line_that_takes_twice_the_time_it_need_says_so_and_names_what_does_be
     assert found.assessment.opinion.duration < found.duration / 2.0
     assert str(found.assessment).startswith("poor: ")
     assert f"{found.assessment.opinion.duration:.3f} s ({found.assessment.opinion.options})" in str(found)
+
+
+@pytest.mark.parametrize("fraction", [0.5, 0.9])
+def test_a_second_opinion_names_the_planner_that_its_options_choose(fraction: float) -> None:
+    own = line().assessment
+    assert own is not None
+    duration = fraction * own.duration
+    found = replace(own, opinion=SecondOpinion("--planner time-optimal", duration))
+    assert found.sentence.endswith(f"; time-optimal finds {duration:.3f} s (--planner time-optimal)")
 
 
 def test_a_plan_that_is_proven_near_the_best_is_given_no_second_opinion() -> None:

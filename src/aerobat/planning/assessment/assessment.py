@@ -107,11 +107,10 @@ class Assessment:
             return f"{at_most}; no second opinion: {self.opinion.missing}"
         if self.opinion.duration is None:
             return f"{at_most}; {self.opinion.options} finds none that is shorter"
-        found = f"{self.opinion.duration:.3f} s ({self.opinion.options})"
         if self.poor:
-            times = self.duration / self.opinion.duration
-            return f"poor: {times:.1f} times as long as need be; free-knots finds {found}"
-        return f"{at_most}; free-knots finds {found}"
+            at_most = f"poor: {self.duration / self.opinion.duration:.1f} times as long as need be"
+        planner = self.opinion.options.removeprefix("--planner ")
+        return f"{at_most}; {planner} finds {self.opinion.duration:.3f} s ({self.opinion.options})"
 
     @property
     def warnings(self) -> tuple[str, ...]:
