@@ -66,13 +66,13 @@ def _linear(stage: Stage) -> list[Condition]:
 
 
 def _contradiction(stage: Stage, asked: list[LinearBound], limits: Limits) -> Contradiction:
-    binding = [k for k in range(KNOWN) if is_possible(asked, limits.without(k))]
-    names = tuple(f"limits.{DERIVATIVES[k]}" if k else "limits.lower and limits.upper" for k in binding)
     if not is_possible(asked, Limits()):
         sentence = (
             f"the conditions of the stage '{stage.name}' exclude each other; change or drop one of them"
         )
         return Contradiction(stage.name, (), sentence)
+    binding = [k for k in range(KNOWN) if is_possible(asked, limits.without(k))]
+    names = tuple(f"limits.{DERIVATIVES[k]}" if k else "limits.lower and limits.upper" for k in binding)
     bound = " or ".join(_with_value(k, name, limits) for k, name in zip(binding, names, strict=True))
     return Contradiction(
         stage.name,
