@@ -2,39 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from math import inf
+from typing import Any, Protocol
 
 import numpy as np
 
+from aerobat.arrays import Array
 from aerobat.optimization.assignment import AssignmentProgram, unit_rows
 from aerobat.optimization.result import AssignmentResult
 
 StageSlot = tuple[int, int]  # (stage, slot), the key of a binary
 
 
+class Model(Protocol):
+    """A general solver's model. Its variables can be added, multiplied and compared to make constraints."""
+
+    def variable(self, is_binary: bool = False) -> Any:
+        """Add a variable that is 0 or 1, or one without bounds."""
+        ...
+
+    def total(self, terms: Iterable[Any]) -> Any:
+        """Return the sum of expressions."""
+        ...
+
+    def add(self, constraint: Any) -> None:
+        """Add a constraint."""
+        ...
+
+    def add_indicator(self, binary: Any, constraint: Any) -> None:
+        """Add a constraint that holds while a binary is 1."""
+        ...
+
+    def minimize(self, quadratic: Any, linear: Any, constant: float) -> None:
+        """Set the cost, the sum of a quadratic and a linear expression and a constant."""
+        ...
+
+
 @dataclass(frozen=True)
-class BinaryConstraint:
-    """The sum of coefficient · binary is `bound`, or at most that."""
+class Variables:
+    """The variables of a program in a model."""
 
-    terms: tuple[tuple[int, StageSlot], ...]  # (coefficient, binary)
-    bound: int
-    is_equality: bool = False
+    x: list[Any]
+    binaries: dict[StageSlot, Any]
 
-
-@dataclass(frozen=True)
-class IndicatorConstraint:
-    """A bound that a binary switches on: sign · (A x)[row] <= bound while it is 1, root_bound while it is 0.
-
-    Where the root bound is finite, that is row <= root_bound + (bound − root_bound) · binary, the smallest
-    big-M there is without further knowledge; where it is infinite, the solver's own indicator constraint.
-    """
-
-    binary: StageSlot
-    row: int
-    sign: int  # 1: an upper bound, -1: a lower bound
-    bound: float
-    root_bound: float
+    def values(self, value: Callable[[Any], float]) -> tuple[Array, tuple[int, ...]]:
+        """Return x and the slot of each stage, from the values that a solver gives the variables."""
+        rising = sorted((value(binary), slot, stage) for (stage, slot), binary in self.binaries.items())
+        chosen = {stage: slot for _, slot, stage in rising}  # the last one, whose binary is the largest
+        return np.array([value(each) for each in self.x]), tuple(chosen[stage] for stage in sorted(chosen))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,41 +95,64 @@ def scaled(program: AssignmentProgram) -> ScaledProgram:
     return ScaledProgram(scaled_program, float(unit))
 
 
-def binaries(program: AssignmentProgram) -> list[StageSlot]:
-    """Return the keys of all binaries."""
-    return [(i, slot) for i, stage in enumerate(program.stages) for slot in stage.slots]
+def build(model: Model, program: AssignmentProgram) -> Variables:
+    """Put a program into an empty model: its rows, its binaries, the bounds that they switch on, its cost."""
+    x = [model.variable() for _ in range(program.num_variables)]
+
+    def product(row: Array) -> Any:
+        """The expression row · x."""
+        terms = [weight * each for weight, each in zip(row.tolist(), x, strict=True) if weight]
+        return model.total(terms) if terms else 0.0 * x[0]
+
+    for row, value in zip(program.equality, program.target.tolist(), strict=True):
+        model.add(product(row) == value)
+    for sign, bounds in zip((-1, 1), program.root_bounds, strict=True):
+        for row, bound in zip(program.rows, bounds.tolist(), strict=True):
+            if abs(bound) < inf:
+                model.add(product(sign * row) <= sign * bound)
+    binaries = _add_binaries(model, program)
+    for key, row, bound, root_bound in _stage_bounds(program):
+        if root_bound < inf:  # the smallest big-M there is without further knowledge
+            model.add(product(row) <= root_bound + (bound - root_bound) * binaries[key])
+        else:
+            model.add_indicator(binaries[key], product(row) <= bound)
+    if program.hessian is None:
+        quadratic = model.total(each * each for each in x)
+    else:
+        pairs = zip(*np.nonzero(program.hessian), strict=True)
+        quadratic = model.total(0.5 * float(program.hessian[i, j]) * x[i] * x[j] for i, j in pairs)
+    linear = 0.0 if program.gradient is None else product(program.gradient)
+    model.minimize(quadratic, linear, program.constant)
+    return Variables(x, binaries)
 
 
-def binary_constraints(program: AssignmentProgram) -> Iterator[BinaryConstraint]:
-    """Yield what makes binaries an assignment: one slot a stage, one stage a slot, stages in order."""
-    users: dict[int, list[StageSlot]] = {}
-    for i, stage in enumerate(program.stages):
-        yield BinaryConstraint(tuple((1, (i, slot)) for slot in stage.slots), 1, is_equality=True)
+def _add_binaries(model: Model, program: AssignmentProgram) -> dict[StageSlot, Any]:
+    """Add what makes binaries an assignment: one slot a stage, one stage a slot, stages in order."""
+    stages = program.stages
+    keys = ((i, slot) for i, stage in enumerate(stages) for slot in stage.slots)
+    binaries = {key: model.variable(is_binary=True) for key in keys}
+    users: dict[int, list[Any]] = {}
+    for i, stage in enumerate(stages):
+        model.add(model.total(binaries[i, slot] for slot in stage.slots) == 1)
         for slot in stage.slots:
-            users.setdefault(slot, []).append((i, slot))
+            users.setdefault(slot, []).append(binaries[i, slot])
     for sharing in users.values():
         if len(sharing) > 1:
-            yield BinaryConstraint(tuple((1, key) for key in sharing), 1)
+            model.add(model.total(sharing) <= 1)
     for i, j in program.precedence:
-        first = tuple((slot, (i, slot)) for slot in program.stages[i].slots)
-        second = tuple((-slot, (j, slot)) for slot in program.stages[j].slots)
-        yield BinaryConstraint(first + second, -1)
+        first = [slot * binaries[i, slot] for slot in stages[i].slots]
+        second = [-slot * binaries[j, slot] for slot in stages[j].slots]
+        model.add(model.total(first + second) <= -1)
+    return binaries
 
 
-def indicator_constraints(program: AssignmentProgram) -> Iterator[IndicatorConstraint]:
-    """Yield all bounds of stages that are tighter than the root's."""
+def _stage_bounds(program: AssignmentProgram) -> Iterator[tuple[StageSlot, Array, float, float]]:
+    """Yield what stages tighten: row · x <= bound where the binary is 1, <= root_bound where it is 0."""
     lower, upper = (bound.tolist() for bound in program.root_bounds)
     for i, stage in enumerate(program.stages):
         for slot, rows, lows, highs in zip(stage.slots, stage.rows, stage.lower, stage.upper, strict=True):
-            for row, low, high in zip(rows.tolist(), lows.tolist(), highs.tolist(), strict=True):
-                if high < upper[row]:
-                    yield IndicatorConstraint((i, slot), row, 1, high, upper[row])
-                if low > lower[row]:
-                    yield IndicatorConstraint((i, slot), row, -1, -low, -lower[row])
-
-
-def chosen_slots(program: AssignmentProgram, values: Mapping[StageSlot, float]) -> tuple[int, ...]:
-    """Return the slot of each stage, from the values of the binaries."""
-    return tuple(
-        max((values[i, slot], slot) for slot in stage.slots)[1] for i, stage in enumerate(program.stages)
-    )
+            for k, low, high in zip(rows.tolist(), lows.tolist(), highs.tolist(), strict=True):
+                if high < upper[k]:
+                    yield (i, slot), program.rows[k], high, upper[k]
+                if low > lower[k]:
+                    yield (i, slot), -program.rows[k], -low, -lower[k]

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from math import inf
 from typing import Any, ClassVar
 
-import numpy as np
-
 from aerobat.errors import AerobatError
 from aerobat.optimization import big_m
 from aerobat.optimization.adapters.confirmation import confirmed
@@ -16,7 +14,6 @@ from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the licence
-_PARAMETERS = {"FeasibilityTol": 1e-9, "IntFeasTol": 1e-9, "MIPGap": 1e-9}
 
 
 class Gurobi:
@@ -54,93 +51,68 @@ class Gurobi:
                 env.setParam("Threads", 1)
                 env.start()
                 with gurobipy.Model(env=env) as model:
+                    model.Params.FeasibilityTol = model.Params.IntFeasTol = model.Params.MIPGap = 1e-9
                     limit = shorter(time_limit)
                     model.Params.TimeLimit = inf if limit is None else limit
                     model.Params.NodeLimit = inf if node_limit is None else node_limit
-                    claim = _GurobiModel(gurobipy, model, scaling.program).claim(start)
+                    claim = _claim(gurobipy, model, scaling.program, start)
         except gurobipy.GurobiError as error:
             raise AerobatError(_message(error, program)) from None
         return confirmed(program, verified(program, scaling.unscaled(claim)))
 
 
 class _GurobiModel:
-    """One program in one Gurobi model."""
+    """A model of Gurobi for `big_m.build`."""
 
-    def __init__(self, gurobipy: Any, model: Any, program: AssignmentProgram) -> None:
-        self._sum = gurobipy.quicksum
-        self._grb = gurobipy.GRB
-        self._model = model
-        self._program = program
-        for name, value in _PARAMETERS.items():
-            model.setParam(name, value)
-        self._x = model.addMVar(program.num_variables, lb=-inf)
-        model.addConstr(program.equality @ self._x == program.target)
-        for sign, bounds in zip((-1, 1), program.root_bounds, strict=True):
-            finite = np.isfinite(bounds)
-            model.addConstr((sign * program.rows[finite]) @ self._x <= sign * bounds[finite])
+    def __init__(self, gurobipy: Any, model: Any) -> None:
+        self._grb, self._model = gurobipy.GRB, model
+        self.total = gurobipy.quicksum
 
-    def claim(self, start: Sequence[int] | None) -> AssignmentResult:
-        """Build, solve, read."""
-        variables = self._add_binaries(start)
-        for indicator in big_m.indicator_constraints(self._program):
-            self._add_indicator(indicator, variables[indicator.binary])
-        self._set_cost()
-        model = self._model
-        model.optimize()
-        if model.Status == self._grb.INTERRUPTED:
-            raise KeyboardInterrupt
-        meaning: dict[int, Status] = {
-            self._grb.OPTIMAL: "optimal",
-            self._grb.INFEASIBLE: "infeasible",
-            self._grb.INF_OR_UNBD: "infeasible",  # the cost has a minimum
-        }
-        slots = x = None
-        if model.SolCount:
-            slots = big_m.chosen_slots(self._program, {key: binary.X for key, binary in variables.items()})
-            x = self._x.X
-        return AssignmentResult(
-            status=meaning.get(model.Status, "time_limit"),
-            backend=Gurobi.name,
-            bound=-inf if x is None else model.ObjBound,
-            x=x,
-            slots=slots,
-            nodes=int(model.NodeCount) if model.IsMIP else 0,
-            time=model.Runtime,
-        )
+    def variable(self, is_binary: bool = False) -> Any:
+        return self._model.addVar(vtype=self._grb.BINARY) if is_binary else self._model.addVar(lb=-inf)
 
-    def _set_cost(self) -> None:
-        program, x = self._program, self._x
-        cost = x @ x if program.hessian is None else 0.5 * (x @ program.hessian @ x)
-        if program.gradient is not None:
-            cost = cost + program.gradient @ x
-        self._model.setObjective(cost + program.constant, self._grb.MINIMIZE)
+    def add(self, constraint: Any) -> None:
+        self._model.addConstr(constraint)
 
-    def _add_binaries(self, start: Sequence[int] | None) -> dict[big_m.StageSlot, Any]:
-        model = self._model
-        variables = {key: model.addVar(vtype=self._grb.BINARY) for key in big_m.binaries(self._program)}
-        if start is not None:
-            for (stage, slot), variable in variables.items():
-                variable.Start = float(slot == start[stage])
-        for constraint in big_m.binary_constraints(self._program):
-            total = self._sum(coefficient * variables[key] for coefficient, key in constraint.terms)
-            model.addConstr(
-                total == constraint.bound if constraint.is_equality else total <= constraint.bound
-            )
-        return variables
+    def add_indicator(self, binary: Any, constraint: Any) -> None:
+        self._model.addGenConstrIndicator(binary, True, constraint)
 
-    def _add_indicator(self, indicator: big_m.IndicatorConstraint, binary: Any) -> None:
-        row = (indicator.sign * self._program.rows[indicator.row]) @ self._x
-        bound, root_bound = indicator.bound, indicator.root_bound
-        if root_bound < inf:
-            self._model.addConstr(row <= root_bound + (bound - root_bound) * binary)
-        else:
-            self._model.addGenConstrIndicator(binary, True, row.item() <= bound)
+    def minimize(self, quadratic: Any, linear: Any, constant: float) -> None:
+        self._model.setObjective(quadratic + linear + constant, self._grb.MINIMIZE)
+
+
+def _claim(
+    gurobipy: Any, model: Any, program: AssignmentProgram, start: Sequence[int] | None
+) -> AssignmentResult:
+    """Build, solve, read."""
+    variables, grb = big_m.build(_GurobiModel(gurobipy, model), program), gurobipy.GRB
+    if start is not None:
+        for (stage, slot), binary in variables.binaries.items():
+            binary.Start = float(slot == start[stage])
+    model.optimize()
+    if model.Status == grb.INTERRUPTED:
+        raise KeyboardInterrupt
+    meaning: dict[int, Status] = {
+        grb.OPTIMAL: "optimal",
+        grb.INFEASIBLE: "infeasible",
+        grb.INF_OR_UNBD: "infeasible",  # the cost has a minimum
+    }
+    x, slots = variables.values(lambda each: float(each.X)) if model.SolCount else (None, None)
+    return AssignmentResult(
+        status=meaning.get(model.Status, "time_limit"),
+        backend=Gurobi.name,
+        bound=-inf if x is None else model.ObjBound,
+        x=x,
+        slots=slots,
+        nodes=int(model.NodeCount) if model.IsMIP else 0,
+        time=model.Runtime,
+    )
 
 
 def _message(error: Any, program: AssignmentProgram) -> str:
     if error.errno != _TOO_LARGE:
         return f"Gurobi failed: {error}"
-    size = program.num_variables + len(big_m.binaries(program))
+    size = program.num_variables + sum(len(stage.slots) for stage in program.stages)
     return (
         f"Gurobi's free licence takes {Gurobi.free_variables} variables with a quadratic objective and this "
         f"program has {size}; use fewer intervals, a full licence, or the 'builtin' backend"
