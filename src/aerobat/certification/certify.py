@@ -20,7 +20,6 @@ from aerobat.certification.body_path import BodyPath
 from aerobat.certification.certificate import Certificate, Finding, Side
 from aerobat.certification.clearance import clearance_finding, frame_findings
 from aerobat.certification.continuity import discontinuities, seam
-from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.interpolation_error import accuracy
 from aerobat.certification.enclosure.queries import (
     SUMMATION_ROUNDING,
@@ -35,6 +34,7 @@ from aerobat.certification.envelope import Envelope
 from aerobat.certification.path.ends import end_findings
 from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
+from aerobat.certification.quantities import Columns
 from aerobat.certification.subdivision import Subdivision, subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.certification.unequal_drag import interpolated_with_unequal_drag
@@ -102,12 +102,10 @@ def certify(
     derived = [limit for limit in on_measures if not _is_stated(limit)]
     has_obstacles = len(environment.pieces) > 0
     is_near = has_obstacles or len(envelope.passages) > 0
-    series, lost = _series(curve, found, derived, on_thrust, is_near)
+    columns = Columns(derived, on_thrust, with_axis=is_near)
+    series, lost = _series(curve, found, columns)
     if series is not None:
-        queries = _queries(vehicle, envelope, on_measures)
-        first = len(quantities.scales(vehicle)) + len(derived)
-        queries += [query for i, limit in enumerate(on_thrust, first) for query in within(limit, i)]
-        findings += series.answers(queries)
+        findings += series.answers(_queries(vehicle, envelope, on_measures, columns))
     findings += kinematic_findings(trajectory, envelope.speed, [x for x in on_path if x not in on_thrust])
     bodies = _bodies(curve, series, whole.bounding_ellipsoid.revolved) if is_near else None
     if bodies and has_obstacles:
@@ -124,25 +122,15 @@ def certify(
 
 
 def _series(
-    curve: ThrustCurve,
-    found: Subdivision,
-    derived: Sequence[Limit],
-    on_thrust: Sequence[Limit],
-    with_axis: bool,
+    curve: ThrustCurve, found: Subdivision, columns: Columns
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
-    """All quantities along the pieces, if there are any, and where unequal drag leaves the attitude open.
-
-    Where it is asked for, with the components of the thrust axis behind all others.
-    """
+    """All quantities along the pieces, if there are any, and where unequal drag leaves the attitude open."""
     whole = not found.vanishing
     if not len(found.pieces):
         return None, ()
     if has_unequal_drag(curve.vehicle):
-        return interpolated_with_unequal_drag(
-            curve, found.pieces, whole, TIGHTNESS, derived, on_thrust, with_axis
-        )
-    series = interpolated(curve, found.pieces, whole, derived)
-    return (_with_axis(curve, series) if with_axis else series), ()
+        return interpolated_with_unequal_drag(curve, found.pieces, whole, TIGHTNESS, columns)
+    return interpolated(curve, found.pieces, whole, columns), ()
 
 
 def _bodies(
@@ -173,27 +161,31 @@ def _is_stated(limit: Limit) -> bool:
     return is_thrust or used.tolist() in ([UPRIGHT], [BODY_RATE])
 
 
-def _queries(vehicle: Vehicle, envelope: Envelope, limits: Sequence[Limit]) -> list[ExtremumQuery]:
-    """The extrema that a certificate states, of the columns of `interpolated`.
+def _queries(
+    vehicle: Vehicle, envelope: Envelope, limits: Sequence[Limit], columns: Columns
+) -> list[ExtremumQuery]:
+    """The extrema that a certificate states.
 
     Args:
         vehicle: What flies, with n rotors.
         envelope: What it shall stay within beside `limits`.
         limits: On measures, those of the rotors among them.
+        columns: Of the series.
     """
     count = len(vehicle.rotors)
+    behind = count + 4 + len(columns.derived)
     thrusts = [limit for limit in limits if limit.rotor is not None and _is_stated(limit)]
-    derived = [limit for limit in limits if not _is_stated(limit)]
     low, high = (sum(ends) for ends in zip(*((limit.lower, limit.upper) for limit in thrusts), strict=True))
     tilt = ExtremumQuery("tilt", "rad", Side.MAX, envelope.tilt, count + 1, -1, angle)
     rate = ExtremumQuery("body rate", "rad/s", Side.MAX, envelope.body_rate, count + 2, 1, root)
     return [
         *(query for i, limit in enumerate(thrusts) for query in within(limit, i)),
-        *(query for i, limit in enumerate(derived, count + 4) for query in within(limit, i)),
+        *(query for i, limit in enumerate(columns.derived, count + 4) for query in within(limit, i)),
         *both_sides("collective thrust", "N", count, low, high),
         _nearest(tilt, [(acos(limit.lower), limit) for limit in limits if _is_of(limit, UPRIGHT)]),
         _nearest(rate, [(limit.upper, limit) for limit in limits if _is_of(limit, BODY_RATE)]),
         ExtremumQuery("moment", "N·m", Side.MAX, envelope.moment, count + 3, 1, root),
+        *(query for i, limit in enumerate(columns.on_thrust, behind) for query in within(limit, i)),
     ]
 
 
@@ -208,13 +200,17 @@ def _nearest(query: ExtremumQuery, limits: Sequence[tuple[float, Limit]]) -> Ext
 
 
 def interpolated(
-    curve: ThrustCurve, pieces: Subintervals, everywhere: bool, derived: Sequence[Limit] = ()
+    curve: ThrustCurve, pieces: Subintervals, everywhere: bool, columns: Columns | None = None
 ) -> ChebyshevSeries:
     """All quantities along pieces that follow each other, in the frame that is carried along them.
 
-    The columns of `quantities.values`, and behind them what derived limits are about, such as the commands of
-    rotors that lag.
+    Args:
+        curve: What is flown, without unequal drag.
+        pieces: In their order, on which interpolation is accurate.
+        everywhere: Whether they make up the whole trajectory.
+        columns: Of the series, by default those of `quantities.values` alone.
     """
+    columns = Columns() if columns is None else columns
     vehicle, basis = curve.vehicle, curve.basis
     values = curve.on(pieces)
     series = curve.series(values)
@@ -228,63 +224,48 @@ def interpolated(
     own_error = (bound.twist_remainder + basis.lebesgue * bound.twist_rounding)[:, None]
     angle_error = np.cumsum(own_error, axis=0)
     error = bound.remainder + basis.lebesgue * (bound.rounding + angle_error * bound.per_radian)
-    columns = basis.analysis @ quantities.values(vehicle, values, omega, omega_dot)
-    scale = quantities.scales(vehicle)
-    found = ChebyshevSeries(curve.trajectory, pieces, columns, error, scale, TIGHTNESS, everywhere)
-    if not derived:
-        return found
-    # what is interpolated is off by so much, and its derivative by what that makes of it
-    noise = bound.rounding + own_error * bound.per_radian + SUMMATION_ROUNDING * np.abs(columns).sum(axis=1)
-    rate_error = bound.rate_remainder + (angle_error - own_error) * bound.rate_per_radian
-    rate_error += 2 / seconds[:, None] * basis.steepening * noise
-    return _with_derived(found, rate_error, vehicle, basis, derived)
+    found = [basis.analysis @ quantities.values(vehicle, values, omega, omega_dot)]
+    errors = [error]
+    if columns.derived:
+        per_second, thrusts = 2 / seconds[:, None], found[0][..., : len(vehicle.rotors)]
+        # what is interpolated is off by so much, and its derivative by what that makes of it
+        noise = bound.rounding + own_error * bound.per_radian
+        noise += SUMMATION_ROUNDING * np.abs(found[0]).sum(axis=1)
+        rate_error = bound.rate_remainder + (angle_error - own_error) * bound.rate_per_radian
+        rate_error += per_second * basis.steepening * noise
+        weights = _weights(columns.derived, vehicle)
+        found.append(_derived(weights, found[0], per_second[..., None] * (basis.derivative @ thrusts)))
+        errors.append(_derived([np.abs(each) for each in weights], error, rate_error))
+    if columns.with_axis:  # each component as exact as that along z
+        thrust = values[:, :, 1]
+        found.append(basis.analysis @ (thrust / np.linalg.norm(thrust, axis=-1, keepdims=True)))
+        errors.append(np.tile(error[:, len(vehicle.rotors) + 1, None], 3))
+    series, error = (np.concatenate(each, axis=-1) for each in (found, errors))
+    scale = columns.scale(vehicle)
+    return ChebyshevSeries(curve.trajectory, pieces, series, error, scale, TIGHTNESS, everywhere)
 
 
-def _with_axis(curve: ThrustCurve, found: ChebyshevSeries) -> ChebyshevSeries:
-    """The series with the components of the thrust axis b3 behind them, each as exact as that along z."""
-    thrust = curve.on(found.pieces)[:, :, 1]
-    axis = curve.basis.analysis @ (thrust / np.linalg.norm(thrust, axis=-1, keepdims=True))
-    upright = len(curve.vehicle.rotors) + 1
-    return replace(
-        found,
-        series=np.concatenate([found.series, axis], axis=-1),
-        error=np.concatenate([found.error, np.tile(found.error[:, upright, None], 3)], axis=-1),
-        scale=np.concatenate([found.scale, np.tile(found.scale[upright], 3)]),
-    )
-
-
-def _with_derived(
-    found: ChebyshevSeries,
-    rate_error: Array,
-    vehicle: Vehicle,
-    basis: chebyshev.Basis,
-    derived: Sequence[Limit],
-) -> ChebyshevSeries:
-    """The series with what limits on wrenches and their derivatives are about behind them.
+def _derived(weights: Sequence[Array], values: Array, rates: Array) -> Array:
+    """What derived limits are about, or how far it is off, from `quantities.values` and their derivatives.
 
     A wrench is what the rotors' thrusts make, so that whatever is linear in it is linear in them.
 
     Args:
-        found: The thrusts of n rotors first, the cosine of the tilt behind them and their sum.
-        rate_error: Of the derivatives of its series [1/s], (P, Q).
-        vehicle: What flies, with n rotors.
-        basis: Of interpolation.
-        derived: D limits.
+        weights: Of `_weights`; for errors their absolute values.
+        values: The thrusts of n rotors first, the cosine of the tilt behind them and their sum, (..., n + 4).
+        rates: Their derivatives [1/s], those of the thrusts first.
     """
-    count = len(vehicle.rotors)
-    thrusts, upright = found.series[..., :count], found.series[..., count + 1, None]
-    per_second = 2 / found.pieces.seconds(found.trajectory)[:, None, None]
-    plain, rates = np.array([_on_rotors(limit, vehicle) for limit in derived]).transpose(1, 2, 0)  # (n, D)
-    tilting = np.array([limit.quantity.measured[UPRIGHT] for limit in derived])
-    series = thrusts @ plain + per_second * (basis.derivative @ thrusts) @ rates + upright * tilting
-    error = found.error[:, :count] @ np.abs(plain) + rate_error[:, :count] @ np.abs(rates)
-    error += found.error[:, count + 1, None] * np.abs(tilting)
-    return replace(
-        found,
-        series=np.concatenate([found.series, series], axis=-1),
-        error=np.concatenate([found.error, error], axis=-1),
-        scale=np.concatenate([found.scale, [limit.size for limit in derived]]),
+    plain, change, tilting = weights
+    count = len(plain)
+    return np.asarray(
+        values[..., :count] @ plain + rates[..., :count] @ change + values[..., count + 1, None] * tilting
     )
+
+
+def _weights(derived: Sequence[Limit], vehicle: Vehicle) -> tuple[Array, Array, Array]:
+    """What D limits weigh n rotors' thrusts by, their derivatives, (n, D) each, and cos tilt by, (D,)."""
+    plain, change = np.array([_on_rotors(limit, vehicle) for limit in derived]).transpose(1, 2, 0)
+    return plain, change, np.array([limit.quantity.measured[UPRIGHT] for limit in derived])
 
 
 def _on_rotors(limit: Limit, vehicle: Vehicle) -> tuple[Array, Array]:

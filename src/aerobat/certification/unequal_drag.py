@@ -16,10 +16,10 @@ import numpy as np
 from numpy.polynomial import chebyshev as series_of
 
 from aerobat.arrays import Array, Mask
-from aerobat.certification import quantities
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.bounded import Bounded, Polynomials
 from aerobat.certification.enclosure.queries import ChebyshevSeries
+from aerobat.certification.quantities import Columns
 from aerobat.certification.subdivision import MAX_COMMAND_REMAINDER, MAX_REMAINDER, MIN_DURATION
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.flatness import TimeInterval, reference
@@ -28,7 +28,6 @@ from aerobat.kernels import flatness
 from aerobat.kernels import unequal_drag as kernel
 from aerobat.kernels.ops import Scalar, Vector
 from aerobat.kernels.vectors import dot
-from aerobat.limits.limit import Limit
 from aerobat.limits.quantity import UPRIGHT, WRENCH, WRENCH_RATE
 from aerobat.so3 import UP
 from aerobat.trajectory import polynomial
@@ -46,9 +45,7 @@ def interpolated_with_unequal_drag(
     pieces: Subintervals,
     everywhere: bool,
     tightness: float,
-    derived: Sequence[Limit],
-    on_thrust: Sequence[Limit],
-    with_axis: bool,
+    columns: Columns,
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
     """Return the series of `certify.interpolated`, and where no attitude is determined.
 
@@ -57,37 +54,32 @@ def interpolated_with_unequal_drag(
         pieces: In their order, on which quantities of the mean drag are interpolated accurately.
         everywhere: Whether they make up the whole trajectory.
         tightness: Of enclosures.
-        derived: Limits on measures, behind what a certificate states anyway.
-        on_thrust: Conditions on the specific thrust, behind those.
-        with_axis: Whether the components of the thrust axis are wanted, behind all others.
+        columns: Of the series.
     """
     pieces = pieces.halves()
     for _ in range(HALVINGS):
         pieces = pieces.in_order()
         motion = _Motion.of(curve, pieces)
         with np.errstate(invalid="ignore", over="ignore"):
-            columns = motion.columns(derived, on_thrust)
-            columns += [motion.axis(each) for each in np.eye(3)] if with_axis else []
-        rough = _is_rough(columns, motion, derived) & (pieces.seconds(curve.trajectory) > MIN_DURATION)
+            bounded = motion.columns(columns)
+        rough = _is_rough(bounded, motion, columns) & (pieces.seconds(curve.trajectory) > MIN_DURATION)
         if not rough.any():
             break
         pieces = Subintervals.joined([pieces[~rough], pieces[rough].halves()])
     with np.errstate(invalid="ignore"):
-        error = np.stack([_remainder(x, motion) + motion.basis.lebesgue * x.error for x in columns], axis=1)
-    values = np.stack([x.values for x in columns], axis=-1)
+        error = np.stack([_remainder(x, motion) + motion.basis.lebesgue * x.error for x in bounded], axis=1)
+    values = np.stack([x.values for x in bounded], axis=-1)
     proven = np.isfinite(error).all(axis=1) & np.isfinite(values).all(axis=(1, 2))
     count = len(pieces) if proven.all() else int(np.argmin(proven))
     lost = _from(curve, motion.pieces, count)
     if count == 0:
         return None, lost
-    scale = [*quantities.scales(curve.vehicle), *(limit.size for limit in (*derived, *on_thrust))]
-    scale += [scale[len(curve.vehicle.rotors) + 1]] * (3 if with_axis else 0)
     found = ChebyshevSeries(
         curve.trajectory,
         motion.pieces[:count],
         motion.basis.analysis @ values[:count],
         error[:count],
-        np.array(scale),
+        columns.scale(curve.vehicle),
         tightness,
         everywhere and not lost,
     )
@@ -253,11 +245,11 @@ class _Motion:
         sine = np.minimum(np.linalg.norm(after - before, axis=-1), np.linalg.norm(after + before, axis=-1))
         return np.asarray(4 * np.arcsin(np.minimum(sine / 2, 1.0)))
 
-    def columns(self, derived: Sequence[Limit], on_thrust: Sequence[Limit]) -> list[Bounded]:
-        """The quantities of `quantities.values`, and what limits are about."""
+    def columns(self, columns: Columns) -> list[Bounded]:
+        """All quantities, in the order of the columns."""
         vehicle = self.curve.vehicle
         cx, cy, cz = self.drag.tolist()
-        rated = any(limit.quantity.measured[WRENCH_RATE].any() for limit in derived)
+        rated = any(limit.quantity.measured[WRENCH_RATE].any() for limit in columns.derived)
         alpha, beta = ([self.body(*self.dragged(c, k)) for k in range(4 if rated else 3)] for c in (cx, cy))
         gamma = [self.body(*self.dragged(cz, k)) for k in range(2)]
         inverse = self._inverse(cx, alpha[0][2]), self._inverse(cy, beta[0][2])
@@ -272,12 +264,13 @@ class _Motion:
         upright, wrench = self.axis(UP), (thrust, *moment)
         found = [_weighted(share, wrench) for share in mixer(vehicle)]
         found += [thrust, upright, dot(omega, omega), dot(moment, moment)]
-        for limit in derived:
+        for limit in columns.derived:
             measured = limit.quantity.measured
             weights = [*measured[WRENCH], *measured[WRENCH_RATE], measured[UPRIGHT]]
             found.append(_weighted(weights, (*wrench, *rate, upright)))
         along = 0.5 * (alpha[0][2] + beta[0][2])
-        return found + [along * self.axis(limit.quantity.path[2]) for limit in on_thrust]
+        found += [along * self.axis(limit.quantity.path[2]) for limit in columns.on_thrust]
+        return found + [self.axis(each) for each in np.eye(3) if columns.with_axis]
 
     def axis(self, direction: Array) -> Bounded:
         """The component of the thrust axis along a direction (3,)."""
@@ -304,12 +297,13 @@ def _remainder(column: Bounded, motion: _Motion) -> Array:
     return np.asarray((column.bound[:, 1:] * decay).min(axis=1))
 
 
-def _is_rough(columns: Sequence[Bounded], motion: _Motion, derived: Sequence[Limit]) -> Mask:
-    """Tell on which pieces interpolation leaves more open than it may, (P,)."""
-    scales = [*quantities.scales(motion.curve.vehicle), *(limit.size for limit in derived)]
+def _is_rough(bounded: Sequence[Bounded], motion: _Motion, columns: Columns) -> Mask:
+    """Tell on which pieces interpolation of values and derived limits leaves more open than it may, (P,)."""
+    stated = len(motion.curve.vehicle.rotors) + 4
+    scales = columns.scale(motion.curve.vehicle)[: stated + len(columns.derived)]
     rough = np.zeros(len(motion.pieces), dtype=bool)
-    for i, (column, scale) in enumerate(zip(columns, scales, strict=False)):
-        part = MAX_REMAINDER if i < len(scales) - len(derived) else MAX_COMMAND_REMAINDER
+    for i, (column, scale) in enumerate(zip(bounded, scales, strict=False)):
+        part = MAX_REMAINDER if i < stated else MAX_COMMAND_REMAINDER
         size = np.maximum(scale, column.bound[:, 0])
         rough |= ~(_remainder(column, motion) <= part * size)
     return rough
