@@ -45,21 +45,11 @@ def waypoint_findings(trajectory: Trajectory, waypoints: Sequence[PlannedWaypoin
 
 
 def _met(trajectory: Trajectory, waypoint: PlannedWaypoint) -> Finding:
-    time = min(waypoint.time, trajectory.duration)
-    ball = waypoint.ball
+    ball, time = waypoint.ball, min(waypoint.time, trajectory.duration)
     distance = float(np.linalg.norm(trajectory.evaluate(time) - ball.centre))
     verdict = Verdict.HOLDS if distance <= ball.radius + PASSAGE_TOLERANCE else Verdict.VIOLATED
-    return Finding(
-        "distance",
-        "m",
-        Side.MAX,
-        distance,
-        distance,
-        waypoint.time,
-        ball.radius,
-        verdict,
-        waypoint=waypoint.name,
-    )
+    asked = waypoint.time, ball.radius, verdict
+    return Finding("distance", "m", Side.MAX, distance, distance, *asked, waypoint=waypoint.name)
 
 
 @dataclass(frozen=True)
