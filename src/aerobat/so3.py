@@ -80,6 +80,15 @@ def angle_between(p: ArrayLike, q: ArrayLike) -> Array:
     return np.asarray(np.linalg.norm(box_minus(q, p), axis=-1))
 
 
+def twist(p: ArrayLike, q: ArrayLike) -> Array:
+    """The angle [rad] by which the rotation from p to q turns about the body's z, (...).
+
+    It is that of the swing-twist decomposition of p* ⊗ q: what is left is a rotation about an axis across z.
+    """
+    turn = multiply(conjugate(p), q)
+    return np.asarray(2.0 * np.arctan2(turn[..., 3], turn[..., 0]))
+
+
 def axes(q: ArrayLike) -> Array:
     """The rotation matrix of q, (..., 4) -> (..., 3, 3); its columns are the body axes in the world."""
     b1, b2, b3 = (_joined(axis) for axis in quaternions.axes(_quaternion(q)))

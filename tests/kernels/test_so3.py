@@ -84,6 +84,16 @@ def test_the_cross_product_is_numpys(a: np.ndarray, b: np.ndarray) -> None:
     np.testing.assert_allclose(so3.cross(a, b), np.cross(a, b), atol=1e-12)
 
 
+@given(quaternions, st.floats(-3.0, 3.0), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
+def test_the_twist_is_the_turn_about_z_whatever_swing_is_beside_it(
+    p: np.ndarray, angle: float, x: float, y: float
+) -> None:
+    turn, swing = so3.about_axis(so3.UP, angle), so3.exp(np.array([x, y, 0.0]))
+    for both in (so3.multiply(turn, swing), so3.multiply(swing, turn)):
+        off = so3.twist(p, so3.multiply(p, both)) - angle
+        assert abs((off + np.pi) % (2 * np.pi) - np.pi) < 1e-9
+
+
 def test_leading_axes_broadcast() -> None:
     rng = np.random.default_rng(0)
     q, v = so3.normalize(rng.normal(size=(5, 1, 4))), rng.normal(size=(7, 3))

@@ -70,8 +70,7 @@ def _carry(directions: Array, control: Array, heading: float) -> Array:
     # any frame of the right direction differs from the chart's by an angle about it: angles add up
     arcs = so3.multiply(so3.smallest_rotation(directions[:-1], directions[1:]), chart[:-1])
     carried = np.concatenate([first[None], arcs])
-    turns = so3.multiply(so3.conjugate(chart), carried)
-    angles = np.asarray(2 * np.arctan2(turns[..., 3], turns[..., 0]))
+    angles = so3.twist(chart, carried)
     angles[1:] += _area(directions[:-1], control)
     q = so3.multiply(chart, so3.about_axis(UP, np.cumsum(angles)))
     turned = np.append(np.dot(q[0], first), np.sum(q[1:] * q[:-1], axis=-1)) < 0

@@ -114,8 +114,7 @@ class PathRows:
         if self.attitude is None or not np.linalg.norm(thrust) > 0.0:
             return 0.0
         upright = so3.smallest_rotation(so3.UP, thrust / np.linalg.norm(thrust))
-        turn = so3.multiply(so3.conjugate(upright), self.attitude)
-        return float(2.0 * np.arctan2(turn[3], turn[0]))
+        return float(so3.twist(upright, self.attitude))
 
 
 def _known_numbers(knots: Array) -> int:

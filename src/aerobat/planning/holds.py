@@ -103,8 +103,7 @@ def _heading_at_end(plan: Plan, vehicle: Vehicle) -> float:
     end = reference(plan.trajectory, vehicle, [plan.duration], environment=plan.problem.environment)
     q_world_body = end.setpoint.q_world_body[-1]
     tilt = so3.smallest_rotation(so3.UP, so3.thrust_axis(q_world_body))
-    turn = so3.multiply(so3.conjugate(tilt), q_world_body)
-    return float(2.0 * np.arctan2(turn[3], turn[0]))
+    return float(so3.twist(tilt, q_world_body))
 
 
 def _joined(problem: Problem, found: Sequence[Plan | Stage]) -> Plan:

@@ -155,8 +155,7 @@ class _YawProgram:
             return every[:, PER_KNOT : count - PER_KNOT + 1], added
         path = self.spline.cut_path
         first, last = YawLimits(self.task, path, np.array([0.0, path.duration])).carried.q_world_body
-        turned = so3.multiply(so3.conjugate(last), first)
-        lag = 2.0 * np.arctan2(turned[3], turned[0])
+        lag = so3.twist(last, first)
         target = self._target[0]
         added[-PER_KNOT] = lag + 2 * np.pi * np.round((target[-1] - target[0] - lag) / (2 * np.pi))
         free = every[:, : count - PER_KNOT].copy()
