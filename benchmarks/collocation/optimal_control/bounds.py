@@ -51,13 +51,14 @@ class Bounds:
     @classmethod
     def of(cls, task: Task) -> Bounds:
         """Return a task's."""
-        held, plain = task.held, [limit for limit in task.held if limit.quantity.magnitude is None]
+        held, magnitudes = task.held, ((SPECIFIC_THRUST,), (BODY_RATE,))
+        plain = [limit for limit in held if limit.quantity.measures not in magnitudes]
         return cls(
             task,
             path=tuple(limit for limit in plain if limit.quantity.is_of_path),
             driven=tuple(limit for limit in plain if not limit.quantity.is_of_path),
-            rate=next((limit for limit in held if limit.quantity.magnitude == BODY_RATE), None),
-            floor=next(limit for limit in held if limit.quantity.magnitude == SPECIFIC_THRUST),
+            rate=next((limit for limit in held if limit.quantity.measures == (BODY_RATE,)), None),
+            floor=next(limit for limit in held if limit.quantity.measures == (SPECIFIC_THRUST,)),
         )
 
     @property

@@ -156,9 +156,9 @@ def _is_of_thrust(limit: Limit, conditions: Sequence[Condition]) -> bool:
 
 def _is_stated(limit: Limit) -> bool:
     """True of limits on what a certificate states anyway: plain thrusts of rotors, tilt and body rate."""
-    used = np.flatnonzero(limit.quantity.measured)
-    is_thrust = limit.rotor is not None and used.max() < WRENCH.stop
-    return is_thrust or used.tolist() in ([UPRIGHT], [BODY_RATE])
+    used = limit.quantity.measures
+    is_thrust = limit.rotor is not None and max(used) < WRENCH.stop
+    return is_thrust or used in ((UPRIGHT,), (BODY_RATE,))
 
 
 def _queries(
@@ -176,21 +176,19 @@ def _queries(
     behind = count + 4 + len(columns.derived)
     thrusts = [limit for limit in limits if limit.rotor is not None and _is_stated(limit)]
     low, high = (sum(ends) for ends in zip(*((limit.lower, limit.upper) for limit in thrusts), strict=True))
+    tilts = [(acos(limit.lower), limit) for limit in limits if limit.quantity.measures == (UPRIGHT,)]
+    rates = [(limit.upper, limit) for limit in limits if limit.quantity.measures == (BODY_RATE,)]
     tilt = ExtremumQuery("tilt", "rad", Side.MAX, envelope.tilt, count + 1, -1, angle)
     rate = ExtremumQuery("body rate", "rad/s", Side.MAX, envelope.body_rate, count + 2, 1, root)
     return [
         *(query for i, limit in enumerate(thrusts) for query in within(limit, i)),
         *(query for i, limit in enumerate(columns.derived, count + 4) for query in within(limit, i)),
         *both_sides("collective thrust", "N", count, low, high),
-        _nearest(tilt, [(acos(limit.lower), limit) for limit in limits if _is_of(limit, UPRIGHT)]),
-        _nearest(rate, [(limit.upper, limit) for limit in limits if _is_of(limit, BODY_RATE)]),
+        _nearest(tilt, tilts),
+        _nearest(rate, rates),
         ExtremumQuery("moment", "N·m", Side.MAX, envelope.moment, count + 3, 1, root),
         *(query for i, limit in enumerate(columns.on_thrust, behind) for query in within(limit, i)),
     ]
-
-
-def _is_of(limit: Limit, measure: int) -> bool:
-    return np.flatnonzero(limit.quantity.measured).tolist() == [measure]
 
 
 def _nearest(query: ExtremumQuery, limits: Sequence[tuple[float, Limit]]) -> ExtremumQuery:

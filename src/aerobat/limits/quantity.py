@@ -21,7 +21,6 @@ SPECIFIC_THRUST = 8  # |f| [m/s²]
 BODY_RATE = 9  # |ω| [rad/s]
 UPRIGHT = 10  # cosine of the tilt, the angle between the thrust axis and the vertical [-]
 MEASURES = 11
-MAGNITUDES = (SPECIFIC_THRUST, BODY_RATE)  # which are smooth when squared
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +49,11 @@ class PathQuantity:
         return tuple(np.flatnonzero(self.path.any(axis=1)).tolist())
 
     @property
+    def measures(self) -> tuple[int, ...]:
+        """The indices of the measures that it is linear in."""
+        return tuple(np.flatnonzero(self.measured).tolist())
+
+    @property
     def is_of_path(self) -> bool:
         """True if it is linear in position and its derivatives."""
         return not self.measured.any()
-
-    @property
-    def magnitude(self) -> int | None:
-        """The index of the magnitude that it is, which is smooth when squared; None if it is none."""
-        used = np.flatnonzero(self.measured)
-        return int(used[0]) if len(used) == 1 and used[0] in MAGNITUDES else None
