@@ -222,7 +222,7 @@ def test_jerk_may_jump_along_the_thrust_axis_only(vehicle, across):
     before = np.array([[0.0, 0.0, 0.0], [3.0, 1.0, 0.0], [4.0, -2.0, 1.0], [2.0, 0.0, -3.0], [0.0, 0.5, 1.0]])
     first = Trajectory([1.0], before[None])
     ends = [first.on_segments([1.0], k)[0, 0] for k in range(4)]
-    thrust = specific_thrust(vehicle, Environment(), *ends[1:], np.zeros(3))[0]
+    thrust = specific_thrust(FlatState(*ends, snap=np.zeros(3)), vehicle, Environment())[0]
     axis = thrust / np.linalg.norm(thrust)
     after = [*ends[:3], ends[3] + 40.0 * axis + across * 40.0 * np.cross(axis, UP), np.zeros(3)]
     after = np.array(after) * (0.2 ** np.arange(5) / [1, 1, 2, 6, 24])[:, None]

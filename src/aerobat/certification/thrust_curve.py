@@ -12,7 +12,7 @@ from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.interpolation_error import Turns
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flatness.references import lateral_drag, specific_thrust
+from aerobat.flatness.references import lateral_drag
 from aerobat.kernels import flatness
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
@@ -66,8 +66,9 @@ class ThrustCurve:
         rates = polynomial.evaluate(self.rates[segment][..., None, :, :], s)
         v, a, j, snap = np.moveaxis(rates.reshape(*s.shape, 4, 3), -2, 0)
         airspeed = v - self.environment.wind
-        thrust = specific_thrust(self.vehicle, self.environment, airspeed, a, j, snap)
-        return np.concatenate([airspeed[..., None, :], thrust], axis=-2)
+        weight, drag = self.environment.weight, lateral_drag(self.vehicle)
+        thrust = flatness.specific_thrust(weight, drag, airspeed, a, j, snap)
+        return np.stack([airspeed, *thrust], axis=-2)
 
     def on(self, pieces: Subintervals) -> Array:
         """v, f, f', f'' at the basis's nodes on pieces of segments, (P, K + 1, 4, 3)."""

@@ -119,7 +119,7 @@ def reference_of(
     flat = FlatState(**{name: frozen(x, name, (len(times), 3)) for name, x in parts.items()})
     if any(series.ndim != 2 for series in vars(flat).values()):
         raise SpecError("the flat states must be one series, with a row for each time and no further axes")
-    path = _frames(times, _thrust(flat, vehicle, environment), environment, heading)
+    path = _frames(times, specific_thrust(flat, vehicle, environment), environment, heading)
     angle = None
     if has_unequal_drag(vehicle):
         angle = np.zeros(len(times))
@@ -160,28 +160,11 @@ def wrench_for(thrust: Array, airspeed: Array, omega: Array, omega_dot: Array, v
     return Wrench(collective, np.stack(moment, axis=-1))
 
 
-def specific_thrust(
-    vehicle: Vehicle,
-    environment: Environment,
-    airspeed: Array,
-    acceleration: Array,
-    jerk: Array,
-    snap: Array,
-) -> Array:
-    """Specific thrust f and its derivatives f', f'' [m/s²] and so on, world, (..., 3, 3).
-
-    Args:
-        vehicle: Its drag counts.
-        environment: Its gravity counts; the wind is in the airspeed.
-        airspeed: Velocity relative to the wind [m/s], world, (..., 3).
-        acceleration: [m/s²] world, (..., 3).
-        jerk: [m/s³] world, (..., 3).
-        snap: [m/s⁴] world, (..., 3).
-    """
-    drag = lateral_drag(vehicle)
-    return np.stack(
-        kernel.specific_thrust(environment.weight, drag, airspeed, acceleration, jerk, snap), axis=-2
-    )
+def specific_thrust(flat: FlatState, vehicle: Vehicle, environment: Environment) -> Array:
+    """Specific thrust f and its derivatives f', f'' [m/s²] and so on, world, (..., 3, 3)."""
+    airspeed, drag = flat.velocity - environment.wind, lateral_drag(vehicle)
+    motion = airspeed, flat.acceleration, flat.jerk, flat.snap
+    return np.stack(kernel.specific_thrust(environment.weight, drag, *motion), axis=-2)
 
 
 def lateral_drag(vehicle: Vehicle) -> float:
@@ -205,11 +188,6 @@ def force_balance(environment: Environment, vehicle: Vehicle | None = None) -> F
     return ForceBalance(environment.gravity, drag, environment.wind)
 
 
-def _thrust(flat: FlatState, vehicle: Vehicle, environment: Environment) -> Array:
-    airspeed = flat.velocity - environment.wind
-    return specific_thrust(vehicle, environment, airspeed, flat.acceleration, flat.jerk, flat.snap)
-
-
 def _nodes_for_quintics(trajectory: Trajectory, vehicle: Vehicle) -> list[float]:
     """Normalised times within each segment between which the thrust is all but a quintic, if it is none."""
     degree = trajectory.degree - (1 if lateral_drag(vehicle) > 0.0 else 2)
@@ -224,8 +202,8 @@ def _mean_frames(
     # both sides of every knot join the times, which show the later side, and what quintics need between
     inner = _nodes_for_quintics(trajectory, vehicle)
     parts = [1.0, 0.0, *inner]
-    curve = [_thrust_on_segments(trajectory, vehicle, environment, s) for s in parts]
-    thrust = np.concatenate([*curve, _thrust(flat, vehicle, environment)])
+    curve = [FlatState(*(trajectory.on_segments([s], k)[:, 0] for k in range(5))) for s in parts]
+    thrust = np.concatenate([specific_thrust(each, vehicle, environment) for each in (*curve, flat)])
     joining = np.concatenate([trajectory.knots[:-1] + s * trajectory.durations for s in parts])
     joining[: trajectory.segments] = trajectory.knots[1:]
     nodes = np.concatenate([joining, times])
@@ -245,14 +223,6 @@ def _turned_frames(
     at, between = np.split(at, [len(times)])
     q = path.q_world_body[between].reshape(*inner.shape, 4)
     return path, at, FrameAngle.along(trajectory, drag, pieces, q)
-
-
-def _thrust_on_segments(
-    trajectory: Trajectory, vehicle: Vehicle, environment: Environment, s: float
-) -> Array:
-    """f, f', f'' at one normalised time on each segment, (S, 3, 3)."""
-    v, a, j, snap = (trajectory.on_segments([s], k)[:, 0] for k in (1, 2, 3, 4))
-    return specific_thrust(vehicle, environment, v - environment.wind, a, j, snap)
 
 
 def _frames(times: Array, thrust: Array, environment: Environment, heading: float) -> TransportedFrames:
@@ -281,7 +251,7 @@ def _assembled(
         angle: From these frames to those of unequal drag [rad], yaw included, (T,); None of equal drag.
         yaw: Beside these frames [rad], with two derivatives, (T, 3); None without.
     """
-    thrust = _thrust(flat, vehicle, environment)
+    thrust = specific_thrust(flat, vehicle, environment)
     q, determined = path.q_world_body[nodes], path.determined[nodes]
     airspeed = flat.velocity - environment.wind
     spin = None if yaw is None else yaw.T[1:]

@@ -148,13 +148,11 @@ class LimitValues:
         """Body axes in the world, as columns, (m, 3, 3)."""
         vehicle, environment = self.task.vehicle, self.task.environment
         heading = self.task.problem.heading.start
-        position, velocity, acceleration, jerk, snap = np.moveaxis(derivatives[:, :5], 1, 0)
+        flat = FlatState(*np.moveaxis(derivatives[:, :5], 1, 0))
         if has_unequal_drag(vehicle):
-            flat = FlatState(position, velocity, acceleration, jerk, snap)
             found = reference_of(times, flat, vehicle, environment, heading)
             return so3.axes(found.setpoint.q_world_body)
-        airspeed = velocity - environment.wind
-        thrust = specific_thrust(vehicle, environment, airspeed, acceleration, jerk, snap)
+        thrust = specific_thrust(flat, vehicle, environment)
         path = frames(times, thrust, UNDETERMINED * environment.gravity, heading)
         return so3.axes(path.q_world_body[path.samples])
 
