@@ -10,9 +10,10 @@ from numpy.polynomial import chebyshev as npcheb
 
 from aerobat.certification import Certificate, certify, quantities
 from aerobat.certification.attitude import ThrustDirectionRates
-from aerobat.certification.certify import TIGHTNESS, interpolated
+from aerobat.certification.certify import interpolated
 from aerobat.certification.enclosure import chebyshev, interpolation_error
 from aerobat.certification.enclosure.interpolation_error import RHO, InterpolationError
+from aerobat.certification.enclosure.queries import TIGHTNESS
 from aerobat.certification.quantities import MagnitudeBounds
 from aerobat.certification.subdivision import subdivide
 from aerobat.certification.thrust_curve import ThrustCurve

@@ -52,7 +52,6 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.ellipsoid import Revolved
 
 INTERPOLATION_DEGREE = 20  # of interpolation
-TIGHTNESS = 1e-7  # of a rotor's range: how near the proven bounds are to what is reached
 
 
 @validated
@@ -129,7 +128,7 @@ def _series(
     if not len(found.pieces):
         return None, ()
     if has_unequal_drag(curve.vehicle):
-        return interpolated_with_unequal_drag(curve, found.pieces, whole, TIGHTNESS, columns)
+        return interpolated_with_unequal_drag(curve, found.pieces, whole, columns)
     return interpolated(curve, found.pieces, whole, columns), ()
 
 
@@ -239,8 +238,7 @@ def interpolated(
         found.append(basis.analysis @ (thrust / np.linalg.norm(thrust, axis=-1, keepdims=True)))
         errors.append(np.tile(error[:, len(vehicle.rotors) + 1, None], 3))
     series, error = (np.concatenate(each, axis=-1) for each in (found, errors))
-    scale = columns.scale(vehicle)
-    return ChebyshevSeries(curve.trajectory, pieces, series, error, scale, TIGHTNESS, everywhere)
+    return ChebyshevSeries(curve.trajectory, pieces, series, error, columns.scale(vehicle), everywhere)
 
 
 def _derived(weights: Sequence[Array], values: Array, rates: Array) -> Array:

@@ -41,11 +41,7 @@ LARGEST_ERROR = 1e-3  # [rad] of attitude: first-order errors, taken twice, hold
 
 
 def interpolated_with_unequal_drag(
-    curve: ThrustCurve,
-    pieces: Subintervals,
-    everywhere: bool,
-    tightness: float,
-    columns: Columns,
+    curve: ThrustCurve, pieces: Subintervals, everywhere: bool, columns: Columns
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
     """Return the series of `certify.interpolated`, and where no attitude is determined.
 
@@ -53,7 +49,6 @@ def interpolated_with_unequal_drag(
         curve: What is flown.
         pieces: In their order, on which quantities of the mean drag are interpolated accurately.
         everywhere: Whether they make up the whole trajectory.
-        tightness: Of enclosures.
         columns: Of the series.
     """
     pieces = pieces.halves()
@@ -74,16 +69,9 @@ def interpolated_with_unequal_drag(
     lost = _from(curve, motion.pieces, count)
     if count == 0:
         return None, lost
-    found = ChebyshevSeries(
-        curve.trajectory,
-        motion.pieces[:count],
-        motion.basis.analysis @ values[:count],
-        error[:count],
-        columns.scale(curve.vehicle),
-        tightness,
-        everywhere and not lost,
-    )
-    return found, lost
+    known, series = motion.pieces[:count], motion.basis.analysis @ values[:count]
+    scale, everywhere = columns.scale(curve.vehicle), everywhere and not lost
+    return ChebyshevSeries(curve.trajectory, known, series, error[:count], scale, everywhere), lost
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from aerobat.limits.limit import Limit
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.subintervals import Subintervals
 
+TIGHTNESS = 1e-7  # of a rotor's range: how near the proven bounds are to what is reached
 SUMMATION_ROUNDING = 1e-13  # of the magnitudes of a series' terms: halving it some ten times, and summing
 
 
@@ -67,8 +68,8 @@ class ChebyshevSeries:
     series: Array  # (P, K + 1, Q)
     error: Array  # at most, (P, Q)
     scale: Array  # what is large, (Q,)
-    tightness: float  # of enclosures, as `SeriesBatch` has it
     everywhere: bool  # whether the pieces make up the whole trajectory
+    tightness: float = TIGHTNESS  # of enclosures, as `SeriesBatch` has it
 
     def ends(self) -> Array:
         """The values at both ends of the pieces, (P, 2, Q)."""
