@@ -169,7 +169,7 @@ class Certificate:
         """
         rotors = [finding for finding in self.findings if finding.rotor is not None]
         violated = [finding for finding in rotors if finding.verdict is Verdict.VIOLATED]
-        return min(violated or rotors, key=_margin, default=None)
+        return min(violated or rotors, key=proven_margin, default=None)
 
     @property
     def binding(self) -> Finding | None:
@@ -216,5 +216,6 @@ class Certificate:
         return self.why
 
 
-def _margin(finding: Finding) -> float:
-    return float("inf") if finding.margin is None else finding.margin
+def proven_margin(finding: Finding) -> float:
+    """Return the margin of a finding, infinite where it has no limit."""
+    return inf if finding.margin is None else finding.margin

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
 
 import numpy as np
 
 from aerobat.certification import Certificate, Finding, Side
+from aerobat.certification.certificate import proven_margin
 from aerobat.environment import Environment
 from aerobat.errors import Reason
 from aerobat.flatness import reference
@@ -42,7 +42,8 @@ class RotorMargin:
         """A certificate's findings about rotors, in short; None if no attitude is ever determined."""
         if certificate.worst is None:
             return None
-        low, high = (min(rotor_findings(certificate, side), key=_margin) for side in (Side.MIN, Side.MAX))
+        sides = (rotor_findings(certificate, side) for side in (Side.MIN, Side.MAX))
+        low, high = (min(found, key=proven_margin) for found in sides)
         assert low.rotor is not None
         assert high.rotor is not None
         return cls(
@@ -52,8 +53,8 @@ class RotorMargin:
             max_thrust=high.value,
             max_time=high.time,
             max_rotor=high.rotor,
-            low_margin=_margin(low),
-            high_margin=_margin(high),
+            low_margin=proven_margin(low),
+            high_margin=proven_margin(high),
         )
 
     @property
@@ -135,7 +136,7 @@ def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[Reserve
     if reserve <= 0.0:
         return []
     found = [
-        ReserveShortfall(finding, kept(reserve, finding.room), _margin(finding) / _size(finding))
+        ReserveShortfall(finding, kept(reserve, finding.room), proven_margin(finding) / _size(finding))
         for finding in rotor_findings(certificate)
     ]
     return sorted((each for each in found if each.size > 0.0), key=lambda shortfall: shortfall.kept)
@@ -144,10 +145,6 @@ def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[Reserve
 def rotor_findings(certificate: Certificate, side: Side | None = None) -> list[Finding]:
     """Findings of a certificate about each rotor's thrust, and its command if it lags, on one side or all."""
     return [f for f in certificate.findings if f.rotor is not None and side in (None, f.side)]
-
-
-def _margin(finding: Finding) -> float:
-    return inf if finding.margin is None else finding.margin
 
 
 def _size(finding: Finding) -> float:

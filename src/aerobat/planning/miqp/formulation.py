@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from math import inf
 
 import numpy as np
@@ -89,7 +90,7 @@ class Formulation:
         scale, free = dt**self._derivatives, self._free(dt)
         lower, upper = self._limits
         goal = self.problem.goal.derivatives(self.chain.order) * self.chain.scales(dt)[:, None]
-        met = self._met
+        met, stages = self._met, range(len(self.sequence.stages))
         reached = self.chain.free(self.initial, dt)[-1]
         return AssignmentProgram(
             equality=self._equality,
@@ -97,8 +98,8 @@ class Formulation:
             rows=self._matrix if not self._drags.any() else self._rows_at(dt),
             lower=lower * scale - free,
             upper=upper * scale - free,
-            stages=tuple(self._assigned(i, scale, free) for i in range(len(self.sequence.stages))),
-            precedence=self._precedence,
+            stages=tuple(self._assigned(i, scale, free) for i in stages),
+            precedence=tuple(pairwise(stages)) if self.sequence.ordered else (),
         )
 
     def inputs(self, x: Array, dt: float) -> Array:
@@ -123,11 +124,6 @@ class Formulation:
     def _met(self) -> Array:
         """The derivatives below the order that the goal fixes."""
         return self.problem.goal.fixed(self.chain.order)
-
-    @cached_property
-    def _precedence(self) -> tuple[tuple[int, int], ...]:
-        stages = len(self.sequence.stages)
-        return tuple((i, i + 1) for i in range(stages - 1)) if self.sequence.ordered else ()
 
     @cached_property
     def _rows(self) -> dict[Row, tuple[float, float]]:
