@@ -9,9 +9,12 @@ import numpy as np
 from aerobat.arrays import AXES
 from aerobat.limits.limit import Asked, Limit, size_of
 from aerobat.limits.quantity import PATH_SHAPE, PathQuantity
+from aerobat.problem import Limits
 from aerobat.problem.problem import DERIVATIVES, UNITS
 
 UP = AXES.index("z")
+# the fields that bound each derivative of position, in sentences
+FIELDS = ("limits.lower and limits.upper", *(f"limits.{name}" for name in DERIVATIVES[1:]))
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
@@ -35,3 +38,9 @@ def limits(asked: Asked) -> Iterator[Limit]:
                 fields=fields,
                 size=size_of(least, most),
             )
+
+
+def field_with_value(derivative: int, limits: Limits) -> str:
+    """Return the fields that bound a derivative of position, with the least bound where it is no place."""
+    field = FIELDS[derivative]
+    return f"{field} ({np.min(limits.of(derivative)[1]):g} {UNITS[derivative]})" if derivative else field

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerobat.flatness import force_balance
+from aerobat.limits.box import FIELDS, field_with_value
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.problem.condition import Condition, LinearBound, Quantity
-from aerobat.problem.problem import DERIVATIVES, UNITS, Limits, Problem
+from aerobat.problem.problem import Limits, Problem
 from aerobat.problem.stage import Stage
 from aerobat.vehicle import Vehicle
 
@@ -72,21 +73,13 @@ def _contradiction(stage: Stage, asked: list[LinearBound], limits: Limits) -> Co
         )
         return Contradiction(stage.name, (), sentence)
     binding = [k for k in range(KNOWN) if is_possible(asked, limits.without(k))]
-    names = tuple(f"limits.{DERIVATIVES[k]}" if k else "limits.lower and limits.upper" for k in binding)
-    bound = " or ".join(_with_value(k, name, limits) for k, name in zip(binding, names, strict=True))
+    bound = " or ".join(field_with_value(k, limits) for k in binding)
     return Contradiction(
         stage.name,
-        names,
+        tuple(FIELDS[k] for k in binding),
         f"what the stage '{stage.name}' asks lies outside {bound or 'the limits together'} at whatever time; "
         "ask less of it or widen them",
     )
-
-
-def _with_value(derivative: int, name: str, limits: Limits) -> str:
-    """A limit with its value, where it has one."""
-    if derivative == 0:
-        return name
-    return f"{name} ({np.min(limits.of(derivative)[1]):g} {UNITS[derivative]})"
 
 
 def is_possible(asked: list[LinearBound], limits: Limits) -> bool:

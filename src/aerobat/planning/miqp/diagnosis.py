@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from aerobat.errors import Reason, limits_of
+from aerobat.limits.box import FIELDS, field_with_value
 from aerobat.limits.path_condition import FIELD
 from aerobat.optimization import evenly_spread, solver
 from aerobat.optimization.deadline import out_of_time, processor, within_time
 from aerobat.planning.courses import is_placed_in_windows
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.recorder import Attempt
-from aerobat.problem.problem import DERIVATIVES, UNITS
 from aerobat.problem.stage import Stage
 
 OUT_OF_TIME = "no solution was found in time"
@@ -118,13 +118,11 @@ def _relaxations(formulation: Formulation) -> Iterator[tuple[str, str, Formulati
         return replace(formulation, task=replace(task, **changes))
 
     for derivative in range(formulation.chain.order + 1):
-        bound = problem.path_limits.of(derivative)[1]
         if np.isfinite(np.concatenate(problem.path_limits.of(derivative))).any():
-            field = f"limits.{DERIVATIVES[derivative]}" if derivative else "limits.lower and limits.upper"
-            name = f"{field} ({np.min(bound):g} {UNITS[derivative]})"
-            name = name if derivative else f"the volume between {field}"
+            name = field_with_value(derivative, problem.path_limits)
+            name = name if derivative else f"the volume between {name}"
             unlimited = replace(problem, limits=problem.path_limits.without(derivative))
-            yield name, field, without(problem=unlimited)
+            yield name, FIELDS[derivative], without(problem=unlimited)
     for i, stage in enumerate(sequence.stages):
         others = sequence.stages[:i] + sequence.stages[i + 1 :]
         name, fewer = f"stage '{stage.name}'", replace(sequence, stages=others)
