@@ -197,4 +197,4 @@ def test_conditions_are_drawn_from_the_seed_alone() -> None:
     one, again, other = (fly(trajectory, vehicle, conditions="lab", seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one.states.position, again.states.position)
     assert np.abs(one.states.position - other.states.position).max() > 1e-5
-    assert score(one, problem).max_position_error_m < 0.2
+    assert score(one, problem).max_position_error_m < 0.25

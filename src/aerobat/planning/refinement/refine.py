@@ -1,10 +1,10 @@
 """The one refinement: from a path through stages to the fastest certified polynomials near it.
 
-Limits on a path are infinitely many constraints. They are held at places. Where they turn out to be exceeded
-between, the next round has one more place (Blankenship and Falk, "Infinitely constrained optimization
-problems", 1976), and keeps some room (Mitsos, "Global optimization of semi-infinite programs via restriction
-of the right-hand side", 2011). Rough rounds, by a dense look, go on until the duration hardly falls. Fine
-rounds, which are damped so that what is mended stays mended, go on until the path is certified.
+Limits on a path are infinitely many constraints. They are held at places. Where paths exceed them between,
+the next round has one more place (Blankenship and Falk, "Infinitely constrained optimization problems",
+1976). It also keeps some room (Mitsos, "Global optimization of semi-infinite programs via restriction of the
+right-hand side", 2011). Rough rounds, by a dense look, go on until the duration hardly falls. Fine rounds,
+which are damped so that what is mended stays mended, go on until the path is certified.
 """
 
 from __future__ import annotations
@@ -85,7 +85,8 @@ MAX_BACKOFF = 0.03  # that one round adds: where much is exceeded, it moves else
 # two thirds of the time.
 PEAKED = 1e-3
 PEAKS = 16  # places that a segment gets so, at most
-BESIDE_PEAKS = 0.1  # of the room that is kept otherwise
+BESIDE_PEAKS = 0.1  # of the room that is kept otherwise,
+FALLING = 0.9  # where rounds exceed less than so much of what the round before exceeded
 MORE_BACKOFF = 1.3  # times what is exceeded, in fine rounds
 FINE_BACKOFF = 2e-4  # of a limit's size, and so much more, as for what a certificate refutes beside
 # of a limit's size, beyond what is kept from it: there a certificate may refute what dense looks do not
@@ -243,7 +244,7 @@ class Refinement:
             duration = solution.duration
             is_settled = number and solution.source.excess.largest < SETTLED
             gains_little = is_settled and duration > (1.0 - LITTLE_GAIN) * before
-            is_over = gains_little or duration > (1.0 + BEHIND) * known
+            is_over = gains_little or duration > (1.0 + BEHIND) * known or rounds.is_stuck(solution)
             if is_over or out_of_time() or not self.is_promising(solution.source):
                 break
             before = duration
@@ -380,7 +381,7 @@ class Rounds:
         jumps = not refinement.task.vehicle.lags.any()
         fractions = chebyshev(round(places * (MORE_PLACES if jumps else 1.0)))
         self._fractions = np.tile(fractions, (guess.trajectory.segments, 1))
-        self._most_places = len(fractions) + PEAKS
+        self._most_places, self._exceeded = len(fractions) + PEAKS, np.inf
         self._radius, self._stretch = radius, stretch
         trajectory = guess.trajectory
         self._segments = tuple(_segment_that_ends(trajectory, time) for time in guess.times)
@@ -406,9 +407,9 @@ class Rounds:
 
     def tighten(self, solution: Solution[RefinedPath], certificate: Certificate | None) -> bool:
         """Go on from a path with more room where it exceeds limits, or where its certificate refutes it."""
-        if out_of_time() or not self._refinement.is_promising(solution.source):
-            return False
         excess = solution.source.excess
+        if out_of_time() or self.is_stuck(solution) or not self._refinement.is_promising(solution.source):
+            return False
         self.back_off(excess, MORE_BACKOFF, FINE_BACKOFF)
         if certificate is not None:
             refuted, times = _refuted(certificate, self._refinement.task.reserve)
@@ -418,6 +419,11 @@ class Rounds:
             self._backoff += (MORE_BACKOFF * refuted + FINE_BACKOFF) * is_near
         self._guess = solution.source.path
         return True
+
+    def is_stuck(self, solution: Solution[RefinedPath]) -> bool:
+        """True if a solution exceeds limits by much, and is no better than the last path, nor otherwise."""
+        stands_still = abs(solution.duration / self._guess.trajectory.duration - 1.0) < LITTLE_GAIN
+        return stands_still and solution.source.excess.largest > max(SETTLED, FALLING * self._exceeded)
 
     def go_on(self, path: RefinedPath) -> None:
         """Go on from a path in a smaller region, with more room where it exceeds limits."""
@@ -436,7 +442,9 @@ class Rounds:
         exceeded = np.clip(excess.nearby, 0.0, MAX_BACKOFF)
         if excess.largest > PEAKED:
             self._hold_at(excess.peaks)
-            factor *= BESIDE_PEAKS
+            if excess.largest < FALLING * self._exceeded:
+                factor *= BESIDE_PEAKS
+        self._exceeded = excess.largest
         self._backoff += factor * exceeded + more * (exceeded > 0.0)
 
     def _hold_at(self, peaks: Array) -> None:
