@@ -98,6 +98,9 @@ def test_what_is_needed_is_written_with_its_plans_and_repeated(capsys) -> None:
     out, err = capsys.readouterr()
     assert json.loads(out) == facts
     assert "bit for bit" in err
+    (folder / "need.json").write_text("3")
+    assert code("repeat", str(folder)) == 2
+    assert "need.json holds other facts than were written" in capsys.readouterr().err
 
 
 REFUSED = (

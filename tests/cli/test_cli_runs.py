@@ -107,6 +107,9 @@ def test_a_comparison_is_repeated_too(capsys, monkeypatch) -> None:
     assert code("compare", "line") == 0
     assert code("repeat", "out/line-compare") == 0
     assert "the same as in out/line-compare/" in capsys.readouterr().err
+    Path("out/line-compare/compare.json").write_text("3")
+    assert code("repeat", "out/line-compare") == 2
+    assert "compare.json holds other facts than were written" in capsys.readouterr().err
 
 
 def test_a_repetition_that_comes_to_something_else_says_what_and_exits_with_1(kept: Path, capsys) -> None:

@@ -152,7 +152,7 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
 
 
 def planner_for(problem: Problem, vehicle: Vehicle | None) -> Planner:
-    """The planner of that name, as the command line makes it without options: for plans that are flown."""
+    """The planner that suits a problem, as the command line makes it without options: to be flown."""
     cls = planner_class(suited_planner(problem, vehicle))
     return cls(**command_settings(cls))
 

@@ -101,15 +101,15 @@ def _results(folder: Path, record: RunRecord) -> Mapping[str, Any]:
         facts = read_json(folder / name)
     except SpecError:
         raise SpecError(f"{folder}/ has no {name} that can be read; run anew") from None
-    if record.command == "need":
-        return dict(facts)
     try:
+        if record.command == "need":
+            return dict(facts)
         return {
             f"the duration by {row['planner']} {k}": row["duration_s"]
             for k, row in enumerate(facts["planners"])
         }
-    except (TypeError, KeyError):
-        raise SpecError("compare.json is no comparison; compare anew") from None
+    except (TypeError, ValueError, KeyError):
+        raise SpecError(f"{folder}/{name} holds other facts than were written; run anew") from None
 
 
 def _told(folder: Path, record: RunRecord, difference: str, code: ExitCode) -> ExitCode:

@@ -85,8 +85,8 @@ MAX_BACKOFF = 0.03  # that one round adds: where much is exceeded, it moves else
 # two thirds of the time.
 PEAKED = 1e-3
 PEAKS = 16  # places that a segment gets so, at most
-BESIDE_PEAKS = 0.1  # of the room that is kept otherwise,
-FALLING = 0.9  # where rounds exceed less than so much of what the round before exceeded
+BESIDE_PEAKS = 0.1  # of the room that is kept otherwise
+FALLING = 0.9  # of what one round exceeds, what the next one exceeds at most, or it stands still
 MORE_BACKOFF = 1.3  # times what is exceeded, in fine rounds
 FINE_BACKOFF = 2e-4  # of a limit's size, and so much more, as for what a certificate refutes beside
 # of a limit's size, beyond what is kept from it: there a certificate may refute what dense looks do not
@@ -442,8 +442,7 @@ class Rounds:
         exceeded = np.clip(excess.nearby, 0.0, MAX_BACKOFF)
         if excess.largest > PEAKED:
             self._hold_at(excess.peaks)
-            if excess.largest < FALLING * self._exceeded:
-                factor *= BESIDE_PEAKS
+            factor *= BESIDE_PEAKS
         self._exceeded = excess.largest
         self._backoff += factor * exceeded + more * (exceeded > 0.0)
 
