@@ -69,21 +69,18 @@ class Rescue:
 
         It is poor where it is not certified or a program's own answer, or paths that nearly held are faster.
         """
-        with_these = f"miqp with {self.asked.intervals} intervals"
-        more = with_more_intervals(self.asked, self.problem, self.vehicle)
-        if plan.bound is not None:
-            return self._first(more, f"no path of {with_these} settled", plan.duration, share=1.0) or plan
         # programs have a dt; of paths those that nearly hold have a cost
         paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
         fastest = min((path.duration for path in paths), default=inf)
-        if plan.certified and plan.duration <= POOR * fastest:
+        if plan.certified and plan.bound is None and plan.duration <= POOR * fastest:
             return plan
-        longest = plan.duration if plan.certified else inf
         cls: Any = planner_class(FREE_KNOTS)
         others = cls(reserve=self.asked.reserve, clearance=self.asked.clearance)
-        ways = chain([(others, f"by {FREE_KNOTS}")], more)
+        more = with_more_intervals(self.asked, self.problem, self.vehicle)
+        said = f"no fast path of miqp with {self.asked.intervals} intervals settled"
+        longest = plan.duration if plan.certified else inf
         with within_time(PROMISING_TIME, processor):
-            return self._first(ways, f"no fast path of {with_these} settled", longest) or plan
+            return self._first(chain([(others, f"by {FREE_KNOTS}")], more), said, longest) or plan
 
     def __str__(self) -> str:
         """The ways that were tried in vain, in a part of a sentence."""
@@ -100,7 +97,6 @@ class Rescue:
         ways: Iterator[tuple[Planner, str]],
         failed: str,
         shorter_than: float = inf,
-        share: float = ONE_WAY,
     ) -> Plan | None:
         """The first certified plan of several ways, which says what failed; None where none is short enough.
 
@@ -108,10 +104,9 @@ class Rescue:
             ways: Planners, and how they plan in words.
             failed: Why they are asked.
             shorter_than: The duration that a plan must fall short of [s].
-            share: Of the time that is left, for each.
         """
         for planner, how in ways:
-            with within_share(share):
+            with within_share(ONE_WAY):
                 plan = self._planned(planner, how)
             kept = min(self.asked.reserve, getattr(planner, "reserve", self.asked.reserve))
             if plan is not None and plan.keeps(kept) and plan.duration < shorter_than:

@@ -86,7 +86,7 @@ MAX_BACKOFF = 0.03  # that one round adds: where much is exceeded, it moves else
 PEAKED = 1e-3
 PEAKS = 16  # places that a segment gets so, at most
 BESIDE_PEAKS = 0.1  # of the room that is kept otherwise
-FALLING = 0.9  # of what one round exceeds, what the next one exceeds at most, or it stands still
+STILL = 0.02  # of a duration, and of what is exceeded: rounds that differ by less stand still
 MORE_BACKOFF = 1.3  # times what is exceeded, in fine rounds
 FINE_BACKOFF = 2e-4  # of a limit's size, and so much more, as for what a certificate refutes beside
 # of a limit's size, beyond what is kept from it: there a certificate may refute what dense looks do not
@@ -421,9 +421,10 @@ class Rounds:
         return True
 
     def is_stuck(self, solution: Solution[RefinedPath]) -> bool:
-        """True if a solution exceeds limits by much, and is no better than the last path, nor otherwise."""
-        stands_still = abs(solution.duration / self._guess.trajectory.duration - 1.0) < LITTLE_GAIN
-        return stands_still and solution.source.excess.largest > max(SETTLED, FALLING * self._exceeded)
+        """True if a solution exceeds limits by much, as the last path does, and takes as long."""
+        excess = solution.source.excess.largest
+        pairs = (solution.duration, self._guess.trajectory.duration), (excess, self._exceeded)
+        return excess > SETTLED and all(abs(new - old) < STILL * old for new, old in pairs)
 
     def go_on(self, path: RefinedPath) -> None:
         """Go on from a path in a smaller region, with more room where it exceeds limits."""
