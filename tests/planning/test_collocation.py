@@ -22,10 +22,10 @@ JERKY = with_lags(QUAD, 0.0)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["A", "B"])
 def test_section_v_takes_its_least_time_and_a_rigid_body_without_control_arrives(name):
-    """Feed-forward alone, in the plane."""
+    """Feed-forward alone, in the plane, for which multiple shooting found those times."""
     vehicle, problem = section_v(name), load_problem("section-v")
     found = Collocation(starts=1, planar=True).plan(problem, vehicle)
-    assert found.duration == pytest.approx(LEAST_TIMES[name], rel=5e-3)
+    assert found.duration < 1.005 * LEAST_TIMES[name]
     assert found.certificate.certified
     assert np.abs(np.array(found.trajectory.component_range(0))[:, 1]).max() < 1e-5
     position, velocity = replayed(found.trajectory, vehicle, problem.environment)

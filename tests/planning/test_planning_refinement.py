@@ -96,22 +96,27 @@ def test_what_too_few_intervals_miss_is_rescued_and_said(quad: Vehicle) -> None:
 def test_a_path_that_is_certified_far_from_a_rough_one_gets_more_segments() -> None:
     """A random problem whose best known plan takes 3.13 s; 3.37 s were returned once."""
     case = random_case(46, 23)
-    assert plan(case.problem, Miqp(reserve=FLYING_RESERVE), case.vehicle).duration < 3.2
+    assert plan(case.problem, Miqp(reserve=FLYING_RESERVE), case.vehicle).duration < 1.04 * 3.13
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("seed", "k", "best", "rescued"), [(46, 89, 1.49, True), (51, 31, 2.289, False)], ids=["46-89", "51-31"]
+    ("seed", "k", "reserve", "best", "rescued"),
+    [
+        (51, 7, 0.0, 2.22, True),
+        (46, 89, FLYING_RESERVE, 1.49, False),
+        (51, 31, FLYING_RESERVE, 2.289, False),
+    ],
 )
 def test_a_plan_far_behind_a_path_that_nearly_held_is_looked_for_from_other_starts(
-    seed: int, k: int, best: float, rescued: bool
+    seed: int, k: int, reserve: float, best: float, rescued: bool
 ) -> None:
-    """Random problems for which 5.36 s and 2.577 s were returned once."""
+    """Random problems for which 3.15 s, 5.36 s and 2.577 s were returned once."""
     case = random_case(seed, k)
-    found = plan(case.problem, Miqp(reserve=FLYING_RESERVE), case.vehicle)
+    found = plan(case.problem, Miqp(reserve=reserve), case.vehicle)
     assert found.duration < 1.05 * best
     said = "no fast path of miqp with 20 intervals settled; planned by free-knots"
-    assert (said in found.rescue) is rescued  # the second is found without
+    assert (said in found.rescue) is rescued  # the others are found without
 
 
 @pytest.mark.slow
