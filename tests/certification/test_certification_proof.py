@@ -165,7 +165,7 @@ def test_it_accepts_the_plan_read_back_from_csv(name, tmp_path):
     write_csv(made, tmp_path / "plan.csv")
     again = certify(read_csv(tmp_path / "plan.csv"), VEHICLE)
     assert again.certified, again.why
-    assert again.margin == pytest.approx(certificate.margin, abs=0.05)
+    assert again.margin == pytest.approx(certificate.margin, abs=0.1)
 
 
 def test_a_plan_whose_jerk_jumps_is_refused_for_its_body_rates():

@@ -13,6 +13,7 @@ from aerobat.errors import Infeasible
 from aerobat.planning import FreeKnots, MinSnap, Miqp, Planner, TimeOptimal, plan
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.miqp import rescue
+from aerobat.planning.recorder import Recorder
 from aerobat.problem import GatePassage, Limits, Line, load_problem, tilted_gate
 from aerobat.studies.feasibility import min_requirements
 from aerobat.vehicle import Vehicle, load_vehicle
@@ -139,8 +140,10 @@ def test_a_stage_that_asks_more_tilt_than_the_limit_allows_is_refused_as_proven(
 
 @pytest.mark.slow
 def test_a_reserve_is_kept_by_free_knots_before_it_is_given_up() -> None:
-    """In drag that slows a dive, where the MIQP's paths keep none."""
+    """In drag that slows a dive, from a plan that keeps none."""
     draggy = load_vehicle(str(CASES / "draggy-vehicle.toml"))
-    found = plan("split-s", Miqp(reserve=0.15), draggy)
+    plain = plan("split-s", Miqp(), draggy)
+    assert not plain.keeps(0.15)
+    found = rescue.Rescue(Miqp(reserve=0.15), plain.problem, draggy, Recorder(None))._with_reserve(plain)
     assert found.keeps(0.15)
     assert "planned by free-knots" in found.rescue

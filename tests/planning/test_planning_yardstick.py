@@ -131,7 +131,7 @@ def test_a_faster_plan_is_a_start_of_its_own_and_compare_says_so():
         def plan(self, problem, vehicle=None, progress=None):
             return replace(TimeOptimal().plan(problem, vehicle), planner="other")
 
-    planners = (("time-optimal", TimeOptimal(segments=8, starts=1)), ("other", Other()))
+    planners = (("time-optimal", TimeOptimal(segments=4, starts=1)), ("other", Other()))
     entry, other = compare(problem, vehicle, planners).entries
     alone = float(entry.note.removesuffix(" s alone").split()[-1])
     assert other.plan.duration < 0.995 * alone

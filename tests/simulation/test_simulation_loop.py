@@ -1,6 +1,7 @@
 """A flight is a loop of components: cut, stepped, resumed or branched it is the same flight; periods hold."""
 
 import pickle
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -16,6 +17,7 @@ from aerobat.kernels.rigid_body import Body
 from aerobat.simulation import FlightConfig, fly, prepare
 from aerobat.simulation.components import StateObserver
 from aerobat.simulation.loop import Due, LoopInput, LoopParameters, StepClock, compose
+from aerobat.simulation.reference_source import _block
 from aerobat.simulation.setup import FlightSetup
 from aerobat.vehicle import load_vehicle
 from looping_flights import HEXA, QUAD, assert_same, loops, near
@@ -80,6 +82,15 @@ def test_a_flight_branched_in_the_air_goes_both_ways() -> None:
     assert_equal(calm, loop.scan(carry, rest)[1])
 
 
+@pytest.fixture
+def no_known_blocks() -> Iterator[None]:
+    """Blocks of set-points made anew, then forgotten, for the test makes others of the same plan."""
+    _block.cache_clear()
+    yield
+    _block.cache_clear()
+
+
+@pytest.mark.usefixtures("no_known_blocks")
 @pytest.mark.parametrize(
     "log_rate", [100.0, *(pytest.param(rate, marks=pytest.mark.slow) for rate in (None, 3.125))]
 )
@@ -93,6 +104,7 @@ def test_neither_blocks_of_references_nor_chunks_of_noise_change_a_flight(
     assert_same(fly(path, HEXA, **options), whole)
     for module in ("setup", "reference_source"):
         monkeypatch.setattr(f"aerobat.simulation.{module}.BLOCK", 130)
+    _block.cache_clear()
     assert_same(fly(path, HEXA, **options), whole, atol=1e-12)
 
 

@@ -34,7 +34,7 @@ from aerobat.certification.envelope import Envelope
 from aerobat.certification.path.ends import end_findings
 from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
-from aerobat.certification.quantities import Columns
+from aerobat.certification.quantities import SeriesColumns
 from aerobat.certification.subdivision import Subdivision, subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.certification.unequal_drag import interpolated_with_unequal_drag
@@ -101,7 +101,7 @@ def certify(
     derived = [limit for limit in on_measures if not _is_stated(limit)]
     has_obstacles = len(environment.pieces) > 0
     is_near = has_obstacles or len(envelope.passages) > 0
-    columns = Columns(derived, on_thrust, with_axis=is_near)
+    columns = SeriesColumns(derived, on_thrust, with_axis=is_near)
     series, lost = _series(curve, found, columns)
     if series is not None:
         findings += series.answers(_queries(vehicle, envelope, on_measures, columns))
@@ -121,7 +121,7 @@ def certify(
 
 
 def _series(
-    curve: ThrustCurve, found: Subdivision, columns: Columns
+    curve: ThrustCurve, found: Subdivision, columns: SeriesColumns
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
     """All quantities along the pieces, if there are any, and where unequal drag leaves the attitude open."""
     whole = not found.vanishing
@@ -161,7 +161,7 @@ def _is_stated(limit: Limit) -> bool:
 
 
 def _queries(
-    vehicle: Vehicle, envelope: Envelope, limits: Sequence[Limit], columns: Columns
+    vehicle: Vehicle, envelope: Envelope, limits: Sequence[Limit], columns: SeriesColumns
 ) -> list[ExtremumQuery]:
     """The extrema that a certificate states.
 
@@ -197,7 +197,7 @@ def _nearest(query: ExtremumQuery, limits: Sequence[tuple[float, Limit]]) -> Ext
 
 
 def interpolated(
-    curve: ThrustCurve, pieces: Subintervals, everywhere: bool, columns: Columns | None = None
+    curve: ThrustCurve, pieces: Subintervals, everywhere: bool, columns: SeriesColumns | None = None
 ) -> ChebyshevSeries:
     """All quantities along pieces that follow each other, in the frame that is carried along them.
 
@@ -207,7 +207,7 @@ def interpolated(
         everywhere: Whether they make up the whole trajectory.
         columns: Of the series, by default those of `quantities.values` alone.
     """
-    columns = Columns() if columns is None else columns
+    columns = SeriesColumns() if columns is None else columns
     vehicle, basis = curve.vehicle, curve.basis
     values = curve.on(pieces)
     series = curve.series(values)

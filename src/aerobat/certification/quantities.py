@@ -68,7 +68,7 @@ def scales(vehicle: Vehicle) -> Array:
 
 
 @dataclass(frozen=True)
-class Columns:
+class SeriesColumns:
     """The columns of a certificate's series: those of `values`, and these behind them, in this order."""
 
     derived: Sequence[Limit] = ()  # on measures that follow from `values`

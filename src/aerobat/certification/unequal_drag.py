@@ -19,7 +19,7 @@ from aerobat.arrays import Array, Mask
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.bounded import Bounded, Polynomials
 from aerobat.certification.enclosure.queries import ChebyshevSeries
-from aerobat.certification.quantities import Columns
+from aerobat.certification.quantities import SeriesColumns
 from aerobat.certification.subdivision import MAX_COMMAND_REMAINDER, MAX_REMAINDER, MIN_DURATION
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.flatness import TimeInterval, reference
@@ -41,7 +41,7 @@ LARGEST_ERROR = 1e-3  # [rad] of attitude: first-order errors, taken twice, hold
 
 
 def interpolated_with_unequal_drag(
-    curve: ThrustCurve, pieces: Subintervals, everywhere: bool, columns: Columns
+    curve: ThrustCurve, pieces: Subintervals, everywhere: bool, columns: SeriesColumns
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
     """Return the series of `certify.interpolated`, and where no attitude is determined.
 
@@ -233,7 +233,7 @@ class _Motion:
         sine = np.minimum(np.linalg.norm(after - before, axis=-1), np.linalg.norm(after + before, axis=-1))
         return np.asarray(4 * np.arcsin(np.minimum(sine / 2, 1.0)))
 
-    def columns(self, columns: Columns) -> list[Bounded]:
+    def columns(self, columns: SeriesColumns) -> list[Bounded]:
         """All quantities, in the order of the columns."""
         vehicle = self.curve.vehicle
         cx, cy, cz = self.drag.tolist()
@@ -285,7 +285,7 @@ def _remainder(column: Bounded, motion: _Motion) -> Array:
     return np.asarray((column.bound[:, 1:] * decay).min(axis=1))
 
 
-def _is_rough(bounded: Sequence[Bounded], motion: _Motion, columns: Columns) -> Mask:
+def _is_rough(bounded: Sequence[Bounded], motion: _Motion, columns: SeriesColumns) -> Mask:
     """Tell on which pieces interpolation of values and derived limits leaves more open than it may, (P,)."""
     stated = len(motion.curve.vehicle.rotors) + 4
     scales = columns.scale(motion.curve.vehicle)[: stated + len(columns.derived)]

@@ -20,7 +20,7 @@ _SLOW = 0.5  # [m/s] and [m/s²] of a path that hardly leads away from where it 
 _SMOOTHING = 0.002  # [s] time constant of the low-pass on the change of commanded rates and thrust
 
 
-class Route(NamedTuple):
+class RouteReference(NamedTuple):
     """A way to go, at whose end the vehicle hovers."""
 
     path: Trajectory

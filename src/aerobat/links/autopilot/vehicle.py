@@ -10,7 +10,12 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.links.autopilot.live_body import LiveBody
-from aerobat.links.autopilot.references import AttitudeReference, PathReference, PointReference, Route
+from aerobat.links.autopilot.references import (
+    AttitudeReference,
+    PathReference,
+    PointReference,
+    RouteReference,
+)
 from aerobat.links.goals import AttitudeGoal, Mode, PathPiece, PositionGoal
 from aerobat.links.routes import rest_to_rest, straight_down
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading
@@ -48,7 +53,7 @@ class SimulatedVehicle:
         self.armed, self.landed, self.crashed = False, True, False
         self.notices: list[str] = []  # sentences for whoever listens, who empties it
         self._body = LiveBody(vehicle, environment)
-        self._route = Route(rest_to_rest(np.zeros(3), np.zeros(3)), self.time, 0.0)
+        self._route = RouteReference(rest_to_rest(np.zeros(3), np.zeros(3)), self.time, 0.0)
         self._then: tuple[Array, float | None] | None = None  # [m], [rad] where to go once it hovers
         self._goal: PointReference | PathReference | AttitudeReference | None = None
         self._heard = -np.inf  # [s] when the last goal came
@@ -164,7 +169,7 @@ class SimulatedVehicle:
             self.landed = False
 
     @property
-    def _followed(self) -> Route | PointReference | PathReference | AttitudeReference:
+    def _followed(self) -> RouteReference | PointReference | PathReference | AttitudeReference:
         """The present goal."""
         if self.mode is Mode.OFFBOARD and self._goal is not None:
             return self._goal
@@ -174,7 +179,7 @@ class SimulatedVehicle:
         """Take a way of its own."""
         own = float(nearest_heading(self.state.q_world_body)) if yaw is None else yaw
         self.mode, self._then = mode, None
-        self._route = Route(path, self.time, own)
+        self._route = RouteReference(path, self.time, own)
         self._restart_position_loop()
 
     def _go_on(self) -> None:
