@@ -34,7 +34,7 @@ from aerobat.certification.envelope import Envelope
 from aerobat.certification.path.ends import end_findings
 from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
-from aerobat.certification.quantities import SeriesColumns
+from aerobat.certification.series_columns import SeriesColumns
 from aerobat.certification.subdivision import Subdivision, subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.certification.unequal_drag import interpolated_with_unequal_drag

@@ -6,7 +6,6 @@ Magnitudes are squared and the tilt is taken by its cosine, so that no kink spoi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,7 +13,6 @@ import numpy as np
 
 from aerobat.arrays import Array, frozen
 from aerobat.flatness.references import wrench_for
-from aerobat.limits.limit import Limit
 from aerobat.vehicle import Vehicle, mixer, rotor_thrusts
 
 
@@ -65,21 +63,6 @@ def scales(vehicle: Vehicle) -> Array:
     ranges = vehicle.thrust_ranges
     moment = float((ranges / np.linalg.norm(mixer(vehicle)[:, 1:], axis=1)).max())
     return frozen([*ranges, ranges.sum(), 0.01, 1.0, moment**2], "scales")
-
-
-@dataclass(frozen=True)
-class SeriesColumns:
-    """The columns of a certificate's series: those of `values`, and these behind them, in this order."""
-
-    derived: Sequence[Limit] = ()  # on measures that follow from `values`
-    on_thrust: Sequence[Limit] = ()  # on the specific thrust, where drag is unequal along body x and y
-    with_axis: bool = False  # whether the three components of the thrust axis are among them
-
-    def scale(self, vehicle: Vehicle) -> Array:
-        """Return the magnitudes that count as large, (Q,); of the thrust axis that of the tilt's cosine."""
-        stated, limits = scales(vehicle), (*self.derived, *self.on_thrust)
-        cos_tilt = stated[len(vehicle.rotors) + 1]
-        return np.array([*stated, *(limit.size for limit in limits), *[cos_tilt] * (3 * self.with_axis)])
 
 
 def _stacked(vehicle: Vehicle, thrust: Array, moment: Array, *others: Array) -> Array:

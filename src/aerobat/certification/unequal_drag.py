@@ -19,7 +19,7 @@ from aerobat.arrays import Array, Mask
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.bounded import Bounded, Polynomials
 from aerobat.certification.enclosure.queries import ChebyshevSeries
-from aerobat.certification.quantities import SeriesColumns
+from aerobat.certification.series_columns import SeriesColumns
 from aerobat.certification.subdivision import MAX_COMMAND_REMAINDER, MAX_REMAINDER, MIN_DURATION
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.flatness import TimeInterval, reference
