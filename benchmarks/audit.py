@@ -33,6 +33,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.planning import FreeKnots, GridSearch, Miqp, plan
+from aerobat.planning.miqp.miqp import INTERVALS
 from audit_advice import followed
 from audit_measures import ALL_PLANNERS, Attempted, attempted, plan_facts, with_passage
 from audit_tables import HARD, TABLES, defect
@@ -197,7 +198,7 @@ def smallest_dt(task: Task, case: Case) -> Row:
     shorter = []
     for fraction in SHORTER:
         wanted = made.plan.duration * (1.0 - fraction)
-        found = planned_by_miqp(case, at_duration(wanted, Miqp().intervals))
+        found = planned_by_miqp(case, at_duration(wanted, INTERVALS))
         if found is not None and found["duration"] < made.plan.duration * (1.0 - SHORTER[0] / 2):
             shorter.append(found["duration"])
     return row | {"shorter": shorter}

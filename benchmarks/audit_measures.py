@@ -47,11 +47,12 @@ def attempted(call: Callable[[], Plan], patience: float = PATIENCE) -> Attempted
     signal.signal(signal.SIGVTALRM, _give_up)
     signal.setitimer(signal.ITIMER_VIRTUAL, patience)
     try:
-        found = call()
-    except Infeasible as error:
-        status, message = "infeasible", str(error)
-    except AerobatError as error:
-        status, message = "refused", str(error)
+        try:
+            found = call()
+        except Infeasible as error:
+            status, message = "infeasible", str(error)  # which takes time: it says what binds
+        except AerobatError as error:
+            status, message = "refused", str(error)
     except Exception as error:
         status, message = type(error).__name__, str(error)
     finally:

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aerobat.errors import Infeasible
+from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import force_balance
 from aerobat.optimization import solver
-from aerobat.planning import GridSearch, Miqp, plan
+from aerobat.planning import GridSearch, Miqp, plan, planner_class
 from aerobat.planning.evidence import Evidence
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.miqp.rescue import with_more_intervals
@@ -127,6 +127,30 @@ def test_a_narrow_window_at_an_end_is_rescued_by_many_intervals(quad: Vehicle) -
     found = plan(passing(aside, still, level, at=(0.9, 0.96)), Miqp(intervals=13), quad)
     assert found.certified
     assert "planned with 40" in found.rescue
+
+
+@pytest.mark.parametrize("name", ["miqp", "free-knots", pytest.param("time-optimal", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("at", [(0.515, 0.535), pytest.param((0.01, 0.02), marks=pytest.mark.slow)])
+def test_a_window_narrower_than_an_interval_is_met_unless_intervals_are_asked_for(
+    at: tuple[float, float], name: str, quad: Vehicle
+) -> None:
+    problem = passing(Condition(Quantity.SPECIFIC_THRUST, AXES[1], 8.0, 12.0), at=at)
+    found = plan(problem, planner_class(name)(), quad)
+    assert found.certified
+    assert at[0] - 1e-5 <= found.stages[0].time / found.duration <= at[1] + 1e-5
+    with pytest.raises(SpecError, match="none of 20 intervals"):
+        plan(problem, Miqp(intervals=20), quad)
+
+
+@pytest.mark.parametrize("name", ["free-knots", pytest.param("time-optimal", marks=pytest.mark.slow)])
+def test_what_more_intervals_lead_to_is_a_start_of_every_planner(name: str, quad: Vehicle) -> None:
+    """Of 20 intervals none that may end in its window is early enough for the stage."""
+    aside = Condition(Quantity.POSITION, AXES[1], 0.2, 0.2)
+    still, level = (Condition(q, AXES[1], 0.0, 0.0) for q in (Quantity.VELOCITY, Quantity.SPECIFIC_THRUST))
+    problem = passing(aside, still, level, at=(0.9, 0.96))
+    with pytest.raises(Infeasible):
+        plan(problem, Miqp(rescue=False))
+    assert plan(problem, planner_class(name)(), quad).certified
 
 
 @pytest.mark.parametrize(("asked", "more"), [(20, [26, 40]), (600, [780]), (900, []), (1000, [])])

@@ -42,6 +42,7 @@ MIN_CROSSING_SPEED = 1.0  # [m/s] through a gate, where nothing else is asked: w
 PARALLEL = 1e-6  # [-] a direction with less of a gate's normal lies in the gate's plane
 PLANNED_SHARE = 0.5  # of a gate's tolerance of attitude: the plan's
 ROUNDING = 1e-9  # [-] of an interval
+MANY_INTERVALS = 100  # one of them ends in every window of a hundredth of the duration
 
 
 @declared
@@ -207,3 +208,11 @@ class StageSequence:
     def linear(self) -> StageSequence:
         """The same, a polytope in each ball among the conditions, for who holds nothing but those."""
         return replace(self, stages=tuple(stage.linear for stage in self.stages))
+
+    def intervals_from(self, least: int) -> int:
+        """Return the fewest intervals, from `least` on, of which one ends in the window of each stage.
+
+        Where so many would be more than MANY_INTERVALS, it is `least`.
+        """
+        tried = range(least, max(least, MANY_INTERVALS) + 1)
+        return next((n for n in tried if all(stage.slots(n) for stage in self.stages)), least)

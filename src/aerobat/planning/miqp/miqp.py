@@ -35,6 +35,8 @@ from aerobat.problem.problem import Limits, Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
+INTERVALS = 20  # the paper's
+
 
 @planner("miqp")
 class Miqp(Planner):
@@ -52,7 +54,10 @@ class Miqp(Planner):
         "The derivative that is piecewise constant, 3 jerk (the paper's), 4 snap, 5 crackle. Default: 5 for "
         "rotors with lag and where a problem limits it, else 4.",
     )
-    intervals: Intervals = option(20, "N, the number of intervals.")
+    intervals: Intervals | None = option(
+        None,
+        f"N, the number of intervals. Default: {INTERVALS}, or more where a stage's window is narrower.",
+    )
     search: Annotated[Search, AS_IT_IS] | None = None
     backend: Literal["builtin", "gurobi", "scip"] = option(
         "builtin", "The solver, builtin, gurobi or scip (the last two are optional extras)."
@@ -99,21 +104,26 @@ class Miqp(Planner):
                 why = Reason(f"{infeasible.sentence}; {rescue}", infeasible.limits)
                 raise Infeasible(why, infeasible.attempts) from None
 
+    def intervals_for(self, stages: StageSequence) -> int:
+        """Return N for these stages."""
+        return stages.intervals_from(INTERVALS) if self.intervals is None else self.intervals
+
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = default_order(problem, vehicle) if self.order is None else self.order
         task = Task.of(problem, vehicle, self.reserve, self.clearance)
-        formulation = formulate(task, order, self.intervals)
+        intervals = self.intervals_for(task.stages)
+        formulation = formulate(task, order, intervals)
         attempts = Attempts(formulation, solver(self.backend), recorder)
         if vehicle is None or self.search is not None:
             found = (self.search or GridSearch()).smallest(attempts.certified)
         else:
-            first = duration_lower_bound(problem, vehicle) / self.intervals
+            first = duration_lower_bound(problem, vehicle) / intervals
             leg = leg_without_room(formulation, first)
             if leg is not None:
                 attempts.judge(attempts.solve(first, COURSE_SCAN_NODES))
                 raise Infeasible(leg, recorder.attempts)
             least = least_duration(problem, vehicle)
-            last = max(4.0, 2.0 * first, 2.0 * least / self.intervals)
+            last = max(4.0, 2.0 * first, 2.0 * least / intervals)
             return self._refined(attempts, (first, last), least)
         if found is None:
             raise self._nothing_found(attempts)

@@ -62,7 +62,13 @@ class Rescue:
 
     @property
     def _none_found(self) -> str:
-        return f"miqp found none with {self.asked.intervals} intervals"
+        return f"miqp found none with {self._intervals} intervals"
+
+    @property
+    def _intervals(self) -> int:
+        """The number of intervals of the plan that was sought."""
+        stages = self.problem.stages(self.vehicle.max_specific_thrust)
+        return int(self.asked.intervals_for(stages))
 
     def shortened(self, plan: Plan) -> Plan:
         """The plan, or where it is poor a better one by another way, which says so.
@@ -77,7 +83,7 @@ class Rescue:
         cls: Any = planner_class(FREE_KNOTS)
         others = cls(reserve=self.asked.reserve, clearance=self.asked.clearance)
         more = with_more_intervals(self.asked, self.problem, self.vehicle)
-        said = f"no fast path of miqp with {self.asked.intervals} intervals settled"
+        said = f"no fast path of miqp with {self._intervals} intervals settled"
         longest = plan.duration if plan.certified else inf
         with within_time(PROMISING_TIME, processor):
             return self._first(chain([(others, f"by {FREE_KNOTS}")], more), said, longest) or plan
@@ -187,9 +193,10 @@ class Rescue:
 
 def with_more_intervals(asked: Any, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
     """Return the planner with more intervals than were asked for, the fewest first, and how in words."""
-    stages = len(problem.stages(vehicle.max_specific_thrust).stages)
-    more = {max(round(factor * asked.intervals), A_STAGE * stages) for factor in MORE_INTERVALS}
+    sequence = problem.stages(vehicle.max_specific_thrust)
+    first, least = asked.intervals_for(sequence), A_STAGE * len(sequence.stages)
+    more = {sequence.intervals_from(max(round(factor * first), least)) for factor in MORE_INTERVALS}
     if max(more) * MORE_INTERVALS[0] < MANY_INTERVALS:
-        more.add(MANY_INTERVALS)
+        more.add(sequence.intervals_from(MANY_INTERVALS))
     for intervals in sorted(n for n in more if n <= MAX_INTERVALS):
         yield replace(asked, intervals=intervals, rescue=False), f"with {intervals} intervals"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import product
+from itertools import chain, product
 
 from aerobat.errors import Infeasible
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
+from aerobat.planning.miqp.rescue import with_more_intervals
 from aerobat.planning.planners import Planner
 from aerobat.planning.polynomial.flying_lap import flying_lap
 from aerobat.planning.polynomial.knots import start_along_normals
@@ -35,22 +36,35 @@ def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
     problem, on_course = task.problem, is_course(task.stages)
     if on_course:
         yield from closed_forms(task)
-    if task.stages.closed or (on_course and guess.intervals <= len(task.stages.stages)):
+    if task.stages.closed or (on_course and guess.intervals_for(task.stages) <= len(task.stages.stages)):
         return
     closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points and not on_course else []
-    asked = [(planner, task.vehicle_if_any) for planner in (*closed_form, guess)]
-    for planner, vehicle in asked if on_course else [*asked, (Miqp(), None)]:
-        if vehicle is None and out_of_time():
-            return
+    for planner in (*closed_form, guess):
         try:
-            plan = planner.plan(problem, vehicle)
+            plan = planner.plan(problem, task.vehicle_if_any)
         except Infeasible as infeasible:
-            # at once, or without rotors: whatever the planner
-            is_refused = vehicle is None or not infeasible.attempts
-            if is_refused and not out_of_time():
+            if not infeasible.attempts and not out_of_time():  # at once: whatever the planner
                 raise
             continue
-        yield None if vehicle is None else plan, WarmStart.of(plan, task.stages)
+        yield plan, WarmStart.of(plan, task.stages)
+    if not on_course and not out_of_time():
+        yield from ((None, WarmStart.of(plan, task.stages)) for plan in _without_rotors(task))
+
+
+def _without_rotors(task: Task) -> Iterator[Plan]:
+    """Yield the plan of a program that knows no rotors, of more intervals where few lead to none."""
+    few, refusals = Miqp(), list[Infeasible]()
+    finer = (planner for planner, _ in with_more_intervals(few, task.problem, task.vehicle))
+    for planner in chain([few], finer):
+        try:
+            plan = planner.plan(task.problem)
+        except Infeasible as infeasible:
+            refusals.append(infeasible)
+        else:
+            yield plan
+            return
+    if not out_of_time():
+        raise refusals[0]
 
 
 def closed_forms(task: Task, paces: Sequence[float] = (1.0,)) -> Iterator[tuple[None, WarmStart]]:
