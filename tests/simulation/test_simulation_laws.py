@@ -30,6 +30,8 @@ TUMBLING = BodyState(
     omega_body=np.array([3.0, -2.0, 4.0]),
 )
 
+LEVEL = BodyState(np.zeros(3), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))
+
 
 def airframe_of(vehicle: Vehicle) -> Airframe:
     return tree_map(lambda leaf: leaf[0], airframe_parameters(Fleet.of([vehicle])))
@@ -141,13 +143,15 @@ def test_the_integrator_is_of_order_four_against_dop853() -> None:
     assert ((orders > 3.9) & (orders < 4.3)).all(), orders
 
 
-def test_body_and_rotors_together_are_of_order_four() -> None:
-    vehicle = load_vehicle("hexarotor")
+@pytest.mark.parametrize("name", ["hexarotor", "section-v"])
+def test_body_and_rotors_together_are_of_order_four_with_lag_and_without(name: str) -> None:
+    vehicle = load_vehicle(name)
     airframe = airframe_of(vehicle)
-    commands = (3.0, 0.5, 2.0, 7.0, 1.0, 2.5)
+    count = len(vehicle.rotors)
+    commands = (3.0, 0.5, 2.0, 7.0, 1.0, 2.5)[:count]
 
     def after(steps: int) -> np.ndarray:
-        motion = VehicleState(body_of(TUMBLING), (1.0, 2.0, 3.0, 1.0, 2.0, 3.0))
+        motion = VehicleState(body_of(TUMBLING), (1.0, 2.0, 3.0, 1.0, 2.0, 3.0)[:count])
         for _ in range(steps):
             motion = advance(FloatOps, airframe, CALM, motion, commands, 0.2 / steps)
         return np.concatenate(motion.body)
@@ -156,6 +160,20 @@ def test_body_and_rotors_together_are_of_order_four() -> None:
     errors = [np.linalg.norm(after(steps) - reference) for steps in (25, 50, 100)]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert ((orders > 3.8) & (orders < 4.3)).all(), orders
+
+
+@pytest.mark.parametrize("lag", [0.0, 1e-5, 5e-4, 0.02, 10.0])
+def test_a_step_of_commands_gives_the_impulse_of_its_thrusts_whatever_the_lag(lag: float) -> None:
+    vehicle = load_vehicle("section-v")
+    vehicle = replace(vehicle, rotors=tuple(replace(rotor, lag=lag) for rotor in vehicle.rotors))
+    before, wanted, period = 0.5, 0.75, 0.002
+    motion = VehicleState(body_of(LEVEL), (before,) * 4)
+    for k in range(1, 51):
+        motion = advance(FloatOps, airframe_of(vehicle), CALM, motion, (wanted,) * 4, period)
+        time = k * period
+        lost = (wanted - before) * lag * -np.expm1(-time / lag) if lag else 0.0
+        climb = 4.0 * (wanted * time - lost) / vehicle.mass - 9.81 * time
+        assert motion.body.velocity[2] == pytest.approx(climb, rel=0, abs=1e-8)
 
 
 def test_a_period_of_two_milliseconds_is_integrated_to_micrometres() -> None:

@@ -15,7 +15,7 @@ from aerobat.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class SeriesColumns:
-    """Those of `quantities.values`, and these behind them, in this order."""
+    """The columns: those of `quantities.values`, and these behind them, in this order."""
 
     derived: Sequence[Limit] = ()  # on measures that follow from these
     on_thrust: Sequence[Limit] = ()  # on the specific thrust, where drag is unequal along body x and y

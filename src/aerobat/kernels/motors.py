@@ -13,6 +13,8 @@ from aerobat.kernels import rigid_body
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, RotorWrench
 
+SHORTEST = 1e-12  # of a time constant: a step that divides
+
 
 class Rotors(NamedTuple):
     """The rotors of one vehicle, one entry a rotor."""
@@ -84,16 +86,25 @@ def advance(
 ) -> VehicleState:
     """The motion after `dt` [s] under held rotor commands [N].
 
-    The rotors are solved exactly, so RK4 sees their true load at each of its stages: order four jointly.
+    The rotors are solved exactly, so RK4 sees their true load halfway and at the end. At the start it sees the
+    load with which Simpson's rule gives the step's impulse exactly. That differs from the true one by dt⁴ where
+    rotors lag, so that body and rotors are of order four jointly, and is the new command where they do not.
     """
-    wanted = clamp(ops, airframe.rotors, commands)
-    halfway = decay_factors(ops, airframe.rotors, 0.5 * dt)
+    rotors = airframe.rotors
+    wanted = clamp(ops, rotors, commands)
+    halfway = decay_factors(ops, rotors, 0.5 * dt)
     middle = first_order_response(motion.thrusts, wanted, halfway)
     end = first_order_response(middle, wanted, halfway)
-    at_start, at_middle, at_end = (
-        wrench(airframe.rotors, thrusts) for thrusts in (motion.thrusts, middle, end)
-    )
-    body = rigid_body.step(
-        ops, airframe.mass_properties, environment, motion.body, (at_start, at_middle, at_end), dt
-    )
+    mean = first_order_response(motion.thrusts, wanted, _mean_factors(ops, rotors, halfway, dt))
+    start = tuple(6.0 * m - 4.0 * f - g for m, f, g in zip(mean, middle, end, strict=True))
+    loads = tuple(wrench(rotors, thrusts) for thrusts in (start, middle, end))
+    body = rigid_body.step(ops, airframe.mass_properties, environment, motion.body, loads, dt)
     return VehicleState(body, end)
+
+
+def _mean_factors(ops: Ops, rotors: Rotors, halfway: PerRotor, dt: Scalar) -> PerRotor:
+    """Mean over `dt` [s] of what is left of each rotor's distance from a held command, (1 − e^(−dt/τ)) τ/dt."""
+    return tuple(
+        (1.0 - left * left) / ops.maximum(dt * rate, SHORTEST)
+        for left, rate in zip(halfway, rotors.inverse_time_constant, strict=True)
+    )
