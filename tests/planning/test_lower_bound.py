@@ -72,6 +72,19 @@ def test_the_least_time_is_that_of_a_motion(
     assert reached == pytest.approx(distance, rel=1e-4, abs=1e-5)
 
 
+@examples(60)
+@given(thrusts, thrusts, dampings, st.floats(-8.0, 8.0), st.sampled_from([1.0, 1.0 + 1e-9, 0.5, 2.0]))
+def test_a_velocity_is_reversed_over_no_distance_in_a_time_that_is_found(
+    forward: float, backward: float, damping: float, start: float, factor: float
+) -> None:
+    """Where ends lie at one place, rounding may make a way of what is none, and drag may be too large."""
+    found = DampedPoint(forward, backward, damping).least_time(0.0, start, -factor * start)
+    assert 0.0 <= found < inf
+    if damping == 0.0 and factor == 1.0:
+        thrust = backward if start > 0.0 else forward
+        assert found == pytest.approx(2.0 * abs(start) / thrust, rel=1e-6)
+
+
 def test_from_rest_to_rest_without_drag_it_is_the_textbooks_bang_bang() -> None:
     assert DampedPoint(4.0, 9.0).least_time(5.0) == pytest.approx(sqrt(10.0 * (1 / 4.0 + 1 / 9.0)))
 

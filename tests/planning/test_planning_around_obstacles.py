@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 import aerobat as ab
+from aerobat import so3
 from aerobat.planning.around.cells import Cells
+from aerobat.planning.around.guesses import guesses
 from aerobat.planning.around.routes import routes
 from aerobat.planning.passages import gaps_at_ends, require_clear_ends
 from aerobat.planning.planners import suited_planner
 from aerobat.planning.task import Task
-from places import ROOT
+from places import CASES, ROOT
 
 QUAD = ab.load_vehicle("agile-quad")
 EXAMPLES = ROOT / "examples" / "problems"
@@ -43,6 +45,7 @@ def least_gap(plan: ab.Plan) -> float:
     return float(world.pieces.separated(pieces, centres[bodies], shapes[bodies]).gaps.min(initial=np.inf))
 
 
+@pytest.mark.slow
 def test_a_plan_keeps_its_clearance_from_what_stands_in_its_way() -> None:
     plan = ab.plan(hall(trunk(4.0, 0.1)), ab.FreeKnots(segments=6, reserve=0.15, clearance=0.1), QUAD)
     assert plan.certified
@@ -50,6 +53,24 @@ def test_a_plan_keeps_its_clearance_from_what_stands_in_its_way() -> None:
     assert least_gap(plan) + 1e-3 >= 0.1
     assert plan.duration < 1.03 * 1.255  # of the way without the trunk
     assert least_gap(plan) < 0.25
+
+
+def test_a_round_hole_in_a_wall_is_passed_with_half_of_the_room_that_it_leaves() -> None:
+    """Of a circle the body's wide axis needs the room, however the body is turned."""
+    wide = QUAD.bounding_ellipsoid.revolved.wide
+    for room in (0.05, 0.085, 0.15, 0.5):
+        hole = ab.Gate((4.0, 0.0, 1.5), (1.0, 0.0, 0.0), so3.UP, radius=wide + room, wall=ab.Wall())
+        problem = replace(hall(gates=(hole,)), maneuver=ab.Line())
+        guess = next(guesses(Task.of(problem, QUAD, clearance=0.1)))[0]
+        assert guess.task.clearance == pytest.approx(min(0.1, 0.5 * room), rel=0.02)
+
+
+@pytest.mark.slow
+def test_where_something_stands_paths_that_knew_nothing_of_it_are_tried_too() -> None:
+    """Over a bar and back under it, the fastest way is no route's."""
+    problem = ab.load_problem(CASES / "rewind.toml")
+    fastest = ab.plan(problem, ab.Miqp(), QUAD).duration
+    assert ab.plan(problem, ab.FreeKnots(), QUAD).duration < 1.01 * fastest
 
 
 @pytest.mark.slow

@@ -86,9 +86,9 @@ def advance(
 ) -> VehicleState:
     """The motion after `dt` [s] under held rotor commands [N].
 
-    The rotors are solved exactly, so RK4 sees their true load halfway and at the end. At the start it sees the
-    load with which Simpson's rule gives the step's impulse exactly. That differs from the true one by dt⁴ where
-    rotors lag, so that body and rotors are of order four jointly, and is the new command where they do not.
+    The rotors are solved exactly, so RK4 sees their true load halfway and at the end. At the start it sees
+    the load with which Simpson's rule gives the step's impulse exactly. That differs from the true one by
+    dt⁴ where rotors lag, so that body and rotors are of order four jointly; without lag it is the command.
     """
     rotors = airframe.rotors
     wanted = clamp(ops, rotors, commands)
@@ -97,13 +97,13 @@ def advance(
     end = first_order_response(middle, wanted, halfway)
     mean = first_order_response(motion.thrusts, wanted, _mean_factors(ops, rotors, halfway, dt))
     start = tuple(6.0 * m - 4.0 * f - g for m, f, g in zip(mean, middle, end, strict=True))
-    loads = tuple(wrench(rotors, thrusts) for thrusts in (start, middle, end))
+    loads = wrench(rotors, start), wrench(rotors, middle), wrench(rotors, end)
     body = rigid_body.step(ops, airframe.mass_properties, environment, motion.body, loads, dt)
     return VehicleState(body, end)
 
 
 def _mean_factors(ops: Ops, rotors: Rotors, halfway: PerRotor, dt: Scalar) -> PerRotor:
-    """Mean over `dt` [s] of what is left of each rotor's distance from a held command, (1 − e^(−dt/τ)) τ/dt."""
+    """What is left of each rotor's distance from a held command, the mean over `dt` [s]."""
     return tuple(
         (1.0 - left * left) / ops.maximum(dt * rate, SHORTEST)
         for left, rate in zip(halfway, rotors.inverse_time_constant, strict=True)

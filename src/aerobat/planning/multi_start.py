@@ -6,6 +6,7 @@ Paths have many local optima. Where a start is does more for a plan's duration t
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from math import inf
@@ -128,8 +129,15 @@ class MultiStart:
         around = fastest_around(self.refinement, self._least_segments)
         if around is None:
             return None
-        found = _Found(FlownPath.of(around.refinement, around.judged).through_gates())
-        return self._finished(around.refinement, [around.judged.solution.source], found)
+        refinement, found = around.refinement, _Found(around.through_gates())
+        best = self._finished(refinement, [around.judged.solution.source], found)
+        if best is None or is_course(self._task.stages):
+            return best
+        with suppress(Infeasible):  # paths that know no obstacles may lead to faster ones
+            _, begun = next(self._batches())
+            rough = self._rough(refinement, [path for _, path in begun])
+            best = self._finished(refinement, rough, best)
+        return best
 
     def _batches(self) -> Iterator[tuple[Refinement, list[_Start]]]:
         """Yield starts that are tried together, the next where these lead to no path clear of frames.

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise, product
-from math import ceil, inf, sqrt
+from math import ceil, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from aerobat.arrays import Array
 from aerobat.planning.around.cells import Cells
 from aerobat.planning.around.routes import Leg, Way, routes, straightened
 from aerobat.planning.polynomial.knots import start_along_normals
-from aerobat.planning.task import Task
+from aerobat.planning.task import SHARE, Task
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.condition import Attitude, Quantity, fixed
 from aerobat.problem.gate import Gate
@@ -31,6 +32,7 @@ HURRIED = 0.5  # of the vehicle's thrust that accelerates it, by which the durat
 LATE = (1.0, 1.4, 0.7)  # times that duration, at which routes pass what moves: behind it, or in front
 BOTH_WAYS = 0.5  # of an upright's height, below which the body may turn either way
 TOLERANCE = 0.1  # [rad] of a body on its side, at first
+ROOMS = 101  # from none to as much as will do, of which the most is found that holes in walls leave
 LEAST_THRUST = 0.4  # of gravity, of a body on its side
 EFFORT = 4  # snap: of the derivatives of position whose squares are minimized
 
@@ -65,18 +67,28 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
         Cells.around(pieces, task.vehicle.bounding_ellipsoid, corners, lower, upper, late * hurried)
         for late in (LATE if pieces.moving else LATE[:1])
     ]
-    walls = [gate for gate in (_in_wall(task, stage) for stage in task.stages.stages) if gate is not None]
-    narrowest = min((gate.opening.inradius for gate in walls), default=inf)
-    body = task.vehicle.bounding_ellipsoid.revolved
+    in_holes, thin = _room_in_holes(task), min(task.vehicle.bounding_ellipsoid.revolved[:2])
     found = [(grid, way) for grid in grids for way in routes(grid, legs, ceil(count / len(grids)))]
     turns = _turned(task) if found else ()
     for turned, (slack, pace) in product(turns, (SIDEWAYS, *STARTS) if any(turns) else STARTS):
         paths = []
         for flown, clear in _different(found, slack):
-            room = min(narrowest, clear) - min(body.wide, body.high)
+            room = min(in_holes, clear - thin)
             path = _along(turned or task, flown).time_scaled(pace)
             paths.append(Guess(path, task.with_room(room), turned and turned.with_room(room)))
         yield paths
+
+
+def _room_in_holes(task: Task) -> float:
+    """The distance [m] that the body can keep from the edges of all holes in walls, or as much as will do."""
+    holes = [gate.opening for gate in (_in_wall(task, stage) for stage in task.stages.stages) if gate]
+    small, large = sorted(task.vehicle.bounding_ellipsoid.revolved[:2])
+    rooms: list[float] = np.linspace(0.0, task.clearance / SHARE, ROOMS).tolist()
+
+    def is_too_much(room: float) -> bool:
+        return not all(hole.admits_turned(small + room, large + room) for hole in holes)
+
+    return rooms[max(bisect(rooms, False, key=is_too_much) - 1, 0)]
 
 
 def _hurried(task: Task, corners: Array) -> float:

@@ -37,6 +37,8 @@ class DampedPoint:
         slowest, terminal = max(start, end), self._terminal_speed
         if min(self.forward, self.backward) <= 0.0 or slowest >= min(self.max_speed, terminal):
             return 0.0
+        if self.backward + self.damping * end <= 0.0:  # drag would have to be overcome by more than there is
+            return 0.0
         shortest = self._speeding_time(start, slowest)
         covered, time = self._by_way_of(shortest, start, end)
         if covered >= distance:
@@ -63,7 +65,8 @@ class DampedPoint:
         if self.damping < UNDAMPED:
             squared = 2.0 * distance + start**2 / self.forward + end**2 / self.backward
             return self._speeding_time(start, sqrt(squared / (1.0 / self.forward + 1.0 / self.backward)))
-        low, step = shortest, sqrt(2.0 * distance / self.forward)
+        missing = distance - self._by_way_of(shortest, start, end)[0]
+        low, step = shortest, sqrt(2.0 * missing / self.forward)
         while self._by_way_of(low + step, start, end)[0] < distance:
             low, step = low + step, 2.0 * step
         for _ in range(HALVINGS):

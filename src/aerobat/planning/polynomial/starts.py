@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import chain, product
+from contextlib import suppress
+from itertools import product
 
 from aerobat.errors import Infeasible
 from aerobat.optimization.deadline import out_of_time
@@ -48,23 +49,30 @@ def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
             continue
         yield plan, WarmStart.of(plan, task.stages)
     if not on_course and not out_of_time():
-        yield from ((None, WarmStart.of(plan, task.stages)) for plan in _without_rotors(task))
+        yield from _without_rotors(task, guess)
 
 
-def _without_rotors(task: Task) -> Iterator[Plan]:
-    """Yield the plan of a program that knows no rotors, of more intervals where few lead to none."""
-    few, refusals = Miqp(), list[Infeasible]()
-    finer = (planner for planner, _ in with_more_intervals(few, task.problem, task.vehicle))
-    for planner in chain([few], finer):
-        try:
-            plan = planner.plan(task.problem)
-        except Infeasible as infeasible:
-            refusals.append(infeasible)
-        else:
-            yield plan
+def _without_rotors(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
+    """Yield the path of a program that knows no rotors.
+
+    Where few intervals lead to none, those of more come, up to the first that the vehicle can fly.
+    """
+    problem = task.problem
+    try:
+        yield None, WarmStart.of(Miqp().plan(problem), task.stages)
+        return
+    except Infeasible as infeasible:
+        refusal = infeasible
+    found = False
+    for finer, _ in with_more_intervals(guess, problem, task.vehicle):
+        with suppress(Infeasible):
+            yield None, WarmStart.of(finer.plan(problem), task.stages)
+            found = True
+            plan = finer.plan(problem, task.vehicle)
+            yield plan, WarmStart.of(plan, task.stages)
             return
-    if not out_of_time():
-        raise refusals[0]
+    if not (found or out_of_time()):
+        raise refusal
 
 
 def closed_forms(task: Task, paces: Sequence[float] = (1.0,)) -> Iterator[tuple[None, WarmStart]]:
