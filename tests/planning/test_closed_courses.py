@@ -122,12 +122,20 @@ def test_a_flight_begins_in_the_laps_state_and_is_judged_and_timed_all_the_way_r
     assert [w.waypoint for w in score.waypoints] == ["waypoint"]
     assert plan.lap_times == (pytest.approx(plan.duration),)
     (lap,) = score.laps
-    # a flight is at the waypoint where it comes nearest, a plan where it is within reach
-    assert lap.duration == pytest.approx(plan.duration, abs=0.01)
-    assert (lap.end, plan.laps[0]) == pytest.approx((plan.duration, plan.duration), abs=0.01)
+    assert lap.end == lap.duration == pytest.approx(plan.duration, abs=1e-3)
+    assert plan.laps == (pytest.approx(plan.duration),)
     (lap_1,) = (fact.said for fact in facts(score) if fact.label == "lap 1")
     assert lap_1 == f"{lap.duration:.3f} s, until {lap.end:.3f} s"
     assert ab.score_flights(plan)[0].laps[0].duration == pytest.approx(lap.duration, abs=1e-6)
+
+
+def test_a_closed_flight_ends_with_its_last_lap_wherever_in_its_ball_a_stage_stands() -> None:
+    """A flight is at a waypoint where it comes nearest, a plan anywhere within reach."""
+    *earlier, last = planned().stages
+    for offset in (-0.03, 0.03):
+        plan = replace(planned(), stages=(*earlier, replace(last, time=last.time + offset)))
+        (lap,) = ab.score(flown(), plan).laps
+        assert lap.end == pytest.approx(plan.duration, abs=1e-3)
 
 
 def test_several_closed_laps_are_timed_each_from_the_end_of_the_one_before() -> None:

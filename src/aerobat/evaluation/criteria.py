@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from math import degrees, inf
+from math import degrees, inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import unit
+from aerobat.kernels.gates import approach
 from aerobat.planning import Plan
 from aerobat.planning.passages import timed_stages
 from aerobat.problem.ball import Ball
@@ -24,8 +25,10 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.simulation.metrics import Criteria
 from aerobat.simulation.outcome import length
+from aerobat.simulation.passages.log import log_rows, scan_log
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW
 from aerobat.simulation.passages.stage_attitude import PlannedAttitude
+from aerobat.simulation.passages.waypoint import waypoint_target
 from aerobat.so3 import thrust_axis
 
 GOAL = "the goal"  # the name of a path's end among what is come to
@@ -42,7 +45,7 @@ class SampledPath(NamedTuple):
 def criteria_of(goal: Problem | Plan, path: SampledPath) -> Criteria:
     """The criteria of flights: passages in the order of the stages, of all gates where no stage has a place.
 
-    The first lap begins with the path; a closed one's with the last passage, a whole round before that.
+    The first lap begins with the path; a closed one's a whole round before the path's own last passage.
 
     When is said by a plan's stages; otherwise by the set-points' nearest approaches to the centres, those of
     stages that follow one another in their order.
@@ -56,15 +59,28 @@ def criteria_of(goal: Problem | Plan, path: SampledPath) -> Criteria:
     passed = [(stage, time) for stage, time in placed if stage.gate is not None or stage.ball is not None]
     others = [(stage, time) for stage, time in placed if stage.gate is None and stage.ball is None]
     passed = passed or _nearest_stages(problem, path)
-    latest = max((time for _, time in passed), default=0.0)
+    gates = tuple(PlannedPassage.of(s, problem.gate(s.gate), t) for s, t in passed if s.gate is not None)
+    waypoints = tuple(PlannedWaypoint(s.name, s.ball, t, s.lap) for s, t in passed if s.ball is not None)
+    duration = goal.duration if isinstance(goal, Plan) else float(path.times[-1])
     return Criteria(
-        gates=tuple(PlannedPassage.of(s, problem.gate(s.gate), t) for s, t in passed if s.gate is not None),
-        waypoints=tuple(PlannedWaypoint(s.name, s.ball, t, s.lap) for s, t in passed if s.ball is not None),
-        lap_begin=0.0 if problem.ends else latest - float(path.times[-1]),
+        gates=gates,
+        waypoints=waypoints,
+        lap_begin=0.0 if problem.ends else _latest(gates, waypoints, path) - duration,
         places=(*_places(others, problem, path), *_goal(problem, path)),
         attitudes=tuple(_attitudes(others, problem, path)),
         path_radius=inf if passed else problem.tolerance.position,
     )
+
+
+def _latest(
+    gates: Sequence[PlannedPassage], waypoints: Sequence[PlannedWaypoint], path: SampledPath
+) -> float:
+    """The instant of the path's own last passage [s], at a waypoint its nearest approach, as in flights."""
+    rows = log_rows(path.times, path.position, np.zeros_like(path.position), path.q_world_body)
+    found = scan_log(approach, [waypoint_target(each) for each in waypoints], rows)
+    met = [float(each.time[0]) for each in found]  # infinite where the path is cut off before
+    met = [time if isfinite(time) else each.time for time, each in zip(met, waypoints, strict=True)]
+    return max([*(gate.time for gate in gates), *met], default=0.0)
 
 
 def _places(
