@@ -38,6 +38,8 @@ LAP = (
 CLOSED = ab.Problem("closed", maneuver=ab.Course(LAP, closed=True), gates=(GATE,))
 SHORT = replace(CLOSED, name="short", maneuver=ab.Course((LAP[1], LAP[3]), closed=True))
 
+CART = {"kind": "sphere", "name": "cart", "position": [9, 9, 1], "radius": 0.2, "velocity": [0.1, 0, 0]}
+
 
 @cache
 def planned(lagging: bool = True, course: str = "short") -> ab.Plan:
@@ -213,6 +215,14 @@ def test_a_plan_that_begins_in_flight_is_not_begun_from_rest() -> None:
                 }
             },
             "maneuver.elements[1].closed is for whole courses, this one is an element; drop it",
+        ),
+        (
+            {"gates": [to_table(GATE) | {"velocity": [0.1, 0, 0]}]},
+            "maneuver.closed: 'red' moves, so that no two laps are alike; drop either",
+        ),
+        (
+            {"environment": {"obstacles": [CART]}},
+            "maneuver.closed: 'cart' moves, so that no two laps are alike",
         ),
     ],
 )

@@ -210,6 +210,12 @@ class Problem:
                 raise FieldError(
                     "maneuver.closed", f": '{stage.name}' asks for its time, which no lap counts; free it"
                 )
+        moving = [gate.name for gate in self.gates if gate.motion is not None]
+        moving += [piece.name for piece in self.surroundings.pieces.pieces if piece.motion is not None]
+        if moving:
+            raise FieldError(
+                "maneuver.closed", f": '{moving[0]}' moves, so that no two laps are alike; drop either"
+            )
 
     def _check_within_limits(self) -> None:
         for derivative, quantity in enumerate(DERIVATIVES[:3]):
