@@ -12,7 +12,7 @@ import aerobat as ab
 from aerobat.reporting.plain_data import plain
 from aerobat.reporting.tables import table
 from aerobat.studies.compare import Comparison, Entry
-from reporting_cases import require_legible, simulated
+from reporting_cases import drawn_gates, require_legible, simulated, with_moving_gates
 from shared_plans import shared_plan
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
@@ -125,3 +125,16 @@ def test_the_gate_is_in_the_picture_of_the_paths():
     paths = ab.comparison_figure(flip()).axes[0]
     gate = max((c for c in paths.collections if isinstance(c, PolyCollection)), key=lambda c: c.get_zorder())
     assert len(gate.get_paths()) == 16  # four bars of four faces
+
+
+def test_a_gate_that_moves_is_drawn_where_each_plan_passes_it():
+    still = flip()
+    plan = with_moving_gates(still.entries[0].plan)
+    late = replace(plan, stages=tuple(replace(stage, time=stage.time + 0.2) for stage in plan.stages))
+
+    def frames(*plans):
+        entries = tuple(replace(still.entries[0], plan=each) for each in plans)
+        return drawn_gates(ab.comparison_figure(Comparison(plans[0].problem, still.vehicle, entries)).axes[0])
+
+    np.testing.assert_allclose(frames(plan), drawn_gates(ab.comparison_figure(still).axes[0]), atol=1e-9)
+    assert len(frames(plan, late)[0]) == 2 * len(frames(plan)[0])

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver, QuiverKey
 
 import aerobat as ab
@@ -21,10 +21,19 @@ from aerobat.reporting.figures import draw, report_figure
 from aerobat.reporting.page import png
 from aerobat.reporting.panels import path as path_panel
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
+from aerobat.reporting.panels.stages import draw_stages
 from aerobat.reporting.scene.glyphs import gate_bars
 from aerobat.reporting.style import BLUE, RED, SKY, YELLOW
-from reporting_cases import PROBLEMS, batch_of, require_legible, simulated, two_flips
-from shared_plans import shared_plan
+from reporting_cases import (
+    PROBLEMS,
+    batch_of,
+    drawn_gates,
+    require_legible,
+    simulated,
+    two_flips,
+    with_moving_gates,
+)
+from shared_plans import closed_form, shared_plan
 
 pytestmark = pytest.mark.filterwarnings("error")  # drawing warns of nothing
 YELLOW_RGBA = to_rgba(YELLOW)
@@ -60,6 +69,13 @@ def shared_page(problem, vehicle="agile-quad", number=0):
 
 def panel_of(figure, quantity):
     return next(axes for axes in figure.axes if axes.get_ylabel().startswith(quantity))
+
+
+def stages_axes(plan):
+    """The stages alone, in a tall panel."""
+    axes = Figure(figsize=(4.0, 8.0)).add_subplot()
+    draw_stages(axes, plan, ab.load_vehicle("agile-quad"))
+    return axes
 
 
 def stages_panel(figure):
@@ -355,10 +371,37 @@ def test_stages_that_would_cover_each_other_follow_one_another():
     per_metre = axes.figure.get_size_inches()[1] * axes.get_position().height / np.ptp(axes.get_ylim())
     assert len(quiver.get_offsets()) == len(plan.stages)
     assert (-np.diff(quiver.get_offsets()[:, 1]) * per_metre > 0.5).all()  # [in] downward in their order
-    gates = [c for c in axes.collections if isinstance(c, PolyCollection) and c.get_zorder() == 1.5]
-    centres = [np.mean([p.vertices.mean(axis=0) for p in gate.get_paths()], axis=0) for gate in gates]
+    centres = [np.mean(gate, axis=0) for gate in drawn_gates(axes)]
     passed = [place for place, s in zip(quiver.get_offsets(), plan.stages, strict=True) if s.gate is not None]
     np.testing.assert_allclose(centres, passed, atol=0.05)
+
+
+@lru_cache
+def half_flip_in_a_row():
+    """A gentle half-flip, with three stages at one instant as well, which would cover each other."""
+    plan = closed_form()
+    (gate,) = plan.stages
+    return replace(plan, stages=(gate, *(PlacedStage(str(k), k, gate.time) for k in range(3))))
+
+
+@pytest.mark.parametrize("make", [closed_form, half_flip_in_a_row])
+def test_the_stages_show_a_gate_that_moves_where_it_is_passed(make):
+    still, moving = (drawn_gates(stages_axes(plan)) for plan in (make(), with_moving_gates(make())))
+    assert len(still) == 1
+    np.testing.assert_allclose(moving, still, atol=1e-9)
+
+
+@pytest.mark.parametrize("make", [closed_form, half_flip_in_a_row])
+def test_the_stages_show_a_gate_as_far_off_the_vehicle_as_it_is_passed(make):
+    plan = make()
+    (gate,) = plan.problem.gates
+    higher = replace(plan.problem, gates=(replace(gate, position=gate.position + 0.2 * so3.UP),))
+    offsets = []
+    for axes in map(stages_axes, (plan, replace(plan, problem=higher))):
+        (frame,), quiver = drawn_gates(axes), next(q for q in axes.collections if isinstance(q, Quiver))
+        distances = frame.mean(axis=0) - quiver.get_offsets()
+        offsets.append(distances[np.linalg.norm(distances, axis=1).argmin()])
+    np.testing.assert_allclose(offsets[1] - offsets[0], [0.0, 0.2], atol=1e-9)
 
 
 def test_stages_in_a_row_are_each_shown_in_the_plane_of_their_thrust():

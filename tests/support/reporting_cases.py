@@ -9,10 +9,13 @@ from itertools import combinations
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 import aerobat as ab
+from aerobat.arrays import Array
 from aerobat.reporting.page import house_style
 from shared_plans import shared_plan
 
@@ -32,6 +35,22 @@ def two_flips() -> tuple[ab.Plan, ab.Flight]:
         ab.load_problem("examples/two-flips.toml"), ab.Miqp(order=4), ab.load_vehicle("agile-quad")
     )
     return plan, ab.fly(plan.trajectory, ab.load_vehicle("agile-quad"), rate=200.0)
+
+
+def with_moving_gates(plan: ab.Plan) -> ab.Plan:
+    """The plan as if its gates moved, and were where they are as they are passed."""
+    velocity, times = np.array([0.5, 0.4, 0.3]), {stage.gate: stage.time for stage in plan.stages}
+    gates = (
+        replace(gate, position=gate.position - times[gate.name] * velocity, velocity=velocity)
+        for gate in plan.problem.gates
+    )
+    return replace(plan, problem=replace(plan.problem, gates=tuple(gates)))
+
+
+def drawn_gates(axes: Axes) -> list[Array]:
+    """The corners of the frames that are drawn in a panel, (n, 2) each."""
+    frames = (c for c in axes.collections if isinstance(c, PolyCollection) and c.get_zorder() == 1.5)
+    return [np.concatenate([path.vertices for path in frame.get_paths()]) for frame in frames]
 
 
 def require_legible(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> None:

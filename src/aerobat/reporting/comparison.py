@@ -14,6 +14,7 @@ from aerobat.arrays import Array
 from aerobat.declaration import validated
 from aerobat.environment.obstacles import ConvexPiece
 from aerobat.planning import Plan
+from aerobat.planning.passages import as_passed
 from aerobat.problem.gate import Gate
 from aerobat.reporting.facts import Fact, Facts, facts, picture
 from aerobat.reporting.page import (
@@ -104,7 +105,9 @@ def comparison_figure(comparison: Comparison) -> Figure:
         fact = f"{len(paths)} of {len(entries)} planners found a plan"
         figure = blank_page(rows + AXIS + MARGIN + height + TITLES, title, [fact])
         axes = panel(figure, COLUMNS[0], rows + AXIS + MARGIN, PAGE_WIDTH - COLUMNS[0] - MARGIN, height)
-        draw_overlay(axes, paths, comparison.problem.gates, comparison.problem.surroundings.pieces.pieces)
+        problem, plans = comparison.problem, [entry.plan for entry in entries if entry.plan]
+        gates = dict.fromkeys(gate for plan in plans for gate in as_passed(problem.gates, plan.stages))
+        draw_overlay(axes, paths, tuple(gates), problem.surroundings.pieces.pieces)
         heading(axes, "Paths")
         _draw_rows(figure, comparison, colours, rows)
     return figure
@@ -211,7 +214,7 @@ def draw_overlay(
     Args:
         axes: Where to draw.
         paths: In their colours.
-        gates: All gates of the problem.
+        gates: All gates of the problem, one that moves where each path passes it.
         pieces: Of obstacles, which are drawn where they are near.
     """
     surfaces, points = surfaces_beside(pieces, [*(path.position for path in paths), gate_corners(gates)])

@@ -11,6 +11,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.planning import Plan
+from aerobat.planning.passages import as_passed
 from aerobat.problem.gate import Gate
 from aerobat.reporting.page import size_of, spread_out
 from aerobat.reporting.panels.keyframes import (
@@ -47,7 +48,7 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     shots = plan_keyframes(plan, vehicle)
     plane = maneuver_plane(plan, shots.thrust)
     camera = plane.camera
-    gates = plan.problem.gates
+    gates = as_passed(plan.problem.gates, plan.stages)
     longest_name = max(len(keyframe.name) for keyframe in shots.instants)
     column = max(0.62, 0.082 * longest_name)  # [in] kept free for names on either side of a tall panel
     frame = camera.project(np.concatenate([shots.position, *(gate.outline for gate in gates)]))
@@ -99,19 +100,23 @@ def _storyboard(
     """Stages that follow one another along the panel's longer side, each with the gate that it passes."""
     size = size_of(axes)
     downward = bool(size[1] >= size[0])
-    own = [gate for gate in gates if any(gate.name == each.gate for each in shots.instants)]
-    largest = 2.0 * max((gate.opening.circumradius for gate in own), default=0.0)  # [m]
+    passed = [
+        (k, gate, gate.position - shots.position[k])
+        for k, each in enumerate(shots.instants)
+        for gate in gates
+        if gate.name == each.gate
+    ]
+    reaches = (gate.opening.circumradius + float(np.linalg.norm(offset)) for _, gate, offset in passed)
+    largest = 2.0 * max(reaches, default=0.0)  # [m]
     pitch = max(1.0, 1.15 * largest)  # [m]
     if not downward:  # the row fills the panel
         tall = size[1] - STAGE_ROW
         pitch = max(pitch, largest * float(size[0] / max(len(shots.instants), 1) / tall))
     shown, turns = shots.storyboard(plane, downward, pitch)
     moved = []
-    for keyframe, position, turn in zip(shown.instants, shown.position, turns, strict=True):
-        for gate in gates:
-            if gate.name == keyframe.gate:
-                normal, up = so3.rotate(turn, gate.normal), so3.rotate(turn, gate.up)
-                moved.append(replace(gate, position=position, normal=normal, up=up))
+    for k, gate, offset in passed:
+        away, normal, up = (so3.rotate(turns[k], each) for each in (offset, gate.normal, gate.up))
+        moved.append(replace(gate, position=shown.position[k] + away, normal=normal, up=up))
     axes.set(xticks=[], yticks=[], ylabel="stages in order, downward" if downward else "")
     axes.set(xlabel="h: horizontal, along each stage's own angle" if downward else "stages in order")
     return shown, tuple(moved)
