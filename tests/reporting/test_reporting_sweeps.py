@@ -44,11 +44,31 @@ def lost(sweep: ab.Sweep) -> ab.Sweep:
     return replace(sweep, table=columns)
 
 
+def through_many_gates() -> ab.Sweep:
+    """The sweep as if its flights passed the gate five times, farther off its centre every time."""
+    columns = dict(rough().table)
+    passage = {name: values for name, values in columns.items() if name.startswith("gate_")}
+    for k in range(2, 6):
+        columns |= {name.replace("gate", f"gate#{k}"): values for name, values in passage.items()}
+        columns[f"gate#{k}_miss_m"] = k * columns["gate_miss_m"]
+    return replace(rough(), table=columns)
+
+
 @pytest.mark.parametrize(
-    "make", [rough, pytest.param(without_a_gate, marks=pytest.mark.slow), lambda: lost(rough())]
+    "make",
+    [rough, pytest.param(without_a_gate, marks=pytest.mark.slow), lambda: lost(rough()), through_many_gates],
 )
 def test_a_page_is_legible_whatever_becomes_of_the_flights(make, monkeypatch) -> None:
     require_legible(ab.sweep_figure(make()), monkeypatch)
+
+
+def test_the_errors_in_many_gates_are_those_in_the_worst_each_in_a_colour_of_its_own() -> None:
+    swept = through_many_gates()
+    (axes,) = (each for each in ab.sweep_figure(swept).axes if each.get_xlabel() == "position error [cm]")
+    lines, names = axes.get_legend_handles_labels()
+    assert names == ["largest", "gate#4", "gate#5"]
+    assert len({line.get_color() for line in lines}) == len(lines)
+    assert axes.get_xlim()[1] == 100.0 * swept.quantile("gate#5_miss_m", 0.99)
 
 
 def test_red_crossings_are_those_that_did_not_pass() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import cycle
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,6 @@ from aerobat.evaluation import Opening
 from aerobat.reporting.page import (
     AXIS,
     COLUMNS,
-    HEADING,
     TITLES,
     blank_page,
     heading,
@@ -137,19 +135,22 @@ def _draw_outcomes(figure: Figure, sweep: Sweep, left: float, bottom: float) -> 
 
 
 def _draw_distributions(figure: Figure, sweep: Sweep, left: float, bottom: float) -> None:
-    """Draw the share of flights that keep within an error: the largest, and that in each gate."""
+    """Draw the share of flights that keep within an error: the largest, and that in the two worst gates."""
     axes = panel(figure, left, bottom, THIRD, CURVES)
-    columns = {"largest": "max_position_error_m"} | {name: f"{name}_miss_m" for name in sweep.passages}
+    worst = sorted(sweep.passages, key=lambda name: sweep.quantile(f"{name}_miss_m", 0.95))[-2:]
+    columns = {"largest": "max_position_error_m"} | {name: f"{name}_miss_m" for name in worst}
     shares = 100.0 * np.arange(1, len(sweep) + 1) / len(sweep)
-    for (name, column), colour in zip(columns.items(), cycle((INK, BLUE, SKY)), strict=False):
+    for (name, column), colour in zip(columns.items(), (INK, BLUE, SKY), strict=False):
         errors = np.sort(sweep.table[column])
         axes.step(100.0 * errors, shares, where="post", color=colour, label=name)
     axes.axhline(95.0, color=MUTED, linewidth=0.8, linestyle=(0, (4, 2)))
-    widest = 100.0 * sweep.quantile("max_position_error_m", 0.99)
+    ends = [100.0 * sweep.quantile(column, 0.99) for column in columns.values()]
+    widest = max(filter(isfinite, ends), default=1.0)
     axes.set(xlim=(0.0, widest), ylim=(0.0, 102.0), xlabel="position error [cm]", ylabel="flights within [%]")
     axes.set_yticks([0, 50, 95], ["0", "50", "95"])
-    legend(axes, above=HEADING)
-    heading(axes, "Errors")
+    axes.locator_params(axis="x", nbins=5)
+    legend(axes, above=0.1)  # where the note would be: names need the width
+    heading(axes, "Errors" if len(worst) == len(sweep.passages) else "Errors, in the worst gates")
 
 
 def known_opening(sweep: Sweep, passage: str) -> Opening | None:
