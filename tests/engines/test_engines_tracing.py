@@ -1,6 +1,7 @@
 """A traced kernel is the kernel: the same numbers from its list of operations, which people can read."""
 
 import math
+import operator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +42,17 @@ def test_a_trace_computes_what_its_kernel_does_to_the_last_bit(x: float, y: floa
     trace = Trace()
     result = kernel(TraceOps(trace), trace.input("x"), trace.input("y"))
     assert values(trace, {"x": x, "y": y})[result.number] == kernel(FloatOps, x, y)
+
+
+@given(NUMBERS, st.sampled_from([-1.0, 0.0, -0.0, math.nan]))
+def test_equality_of_values_is_traced_as_equality_of_floats(x: float, y: float) -> None:
+    for first, second in ((x, y), (y, y), (y, 0.0)):
+        trace = Trace()
+        a, b = trace.input("a"), trace.input("b")
+        for compare in (operator.eq, operator.ne):
+            for result in (compare(a, b), compare(a, second), compare(first, b)):
+                found = values(trace, {"a": first, "b": second})[result.number]
+                assert found is compare(first, second)
 
 
 def test_what_is_common_is_computed_once() -> None:

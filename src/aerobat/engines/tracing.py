@@ -158,6 +158,14 @@ class Symbol:
     __lt__, __gt__ = _binary("less"), _binary("less", swapped=True)
     __le__, __ge__ = _binary("less_equal"), _binary("less_equal", swapped=True)
 
+    def __eq__(self, other: Any) -> Symbol:  # type: ignore[override]
+        return self.trace.apply("and", self <= other, self >= other)
+
+    def __ne__(self, other: Any) -> Symbol:  # type: ignore[override]
+        return self.trace.apply("select", self == other, False, True)
+
+    __hash__ = object.__hash__
+
     def __neg__(self) -> Symbol:
         return self.trace.apply("negate", self)
 
