@@ -123,6 +123,10 @@ IN_A_LAW = {
         "step",
         "return state, RotorWrench(seen.height, (0.0, 0.0, 0.0))",
     ): "AttributeError: 'Seen' object",
+    (
+        "step",
+        "return state, RotorWrench(abs(seen.body.position[2]), (0.0, 0.0, 0.0))",
+    ): "step() cannot be compiled for `return state, RotorWrench(abs(",
     ("step", "return seen.thrusts[9]"): "IndexError: tuple index out of range",
     ("init", 'raise KeyError("gain")'): "KeyError: 'gain'",
     ("init", 'return "none"'): "init() returned 'none', not a tree of tuples of numbers",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,19 @@ class ThrustForFloats(ThrustAlone):
         return state, RotorWrench(0.0, ZERO)
 
 
-@pytest.mark.parametrize("law", [*LAWS, ThrustAlone(0.9)], ids=str)
+@ab.controller("thrust-by-equality")
+class ThrustByEquality(ThrustAlone):
+    """More thrust on the plane x = 0, and less off the plane y = 0."""
+
+    def step(self, ops: Any, model: Any, state: Any, seen: Seen, elapsed: Any) -> tuple[Any, RotorWrench]:
+        """Return the force."""
+        x, y, _ = seen.reference.position
+        state, (thrust, moment) = super().step(ops, model, state, seen, elapsed)
+        factor = ops.select(x == 0.0, 1.1, 1.0) * ops.select(y != 0.0, 0.9, 1.0)
+        return state, RotorWrench(factor * thrust, moment)
+
+
+@pytest.mark.parametrize("law", [*LAWS, ThrustAlone(0.9), ThrustByEquality()], ids=str)
 @pytest.mark.parametrize(
     "engine",
     ["compiled", pytest.param("jax", marks=pytest.mark.slow)],
@@ -91,6 +104,37 @@ def test_a_law_of_ones_own_is_flown_as_itself_and_by_its_name() -> None:
 def test_the_engine_of_floats_flies_a_law_with_branches() -> None:
     branching = ab.fly(SHORT, QUAD, controller=ThrustForFloats(), engine="floats")
     assert_same(branching, ab.fly(SHORT, QUAD, controller=ThrustAlone(), engine="floats"))
+
+
+FOR_FLOATS_ALONE = {
+    "abs": lambda z: abs(z),
+    "power": lambda z: z**2,
+    "if": lambda z: z if z > 0.0 else -z,
+    "max": lambda z: max(z, 0.0),
+    "math": lambda z: math.sin(z),
+    "ufunc": lambda z: np.tanh(z),
+    "norm": lambda z: np.linalg.norm((z, z)),
+    "array": lambda z: (np.ones(3) * z)[0],
+}
+
+
+@pytest.mark.parametrize("compute", FOR_FLOATS_ALONE.values(), ids=list(FOR_FLOATS_ALONE))
+@pytest.mark.parametrize("method", ["init", "step"])
+def test_a_law_that_cannot_be_compiled_is_refused_with_its_line_and_the_remedy(
+    compute: Any, method: str
+) -> None:
+    def computed(law: Any, ops: Any, *others: Any) -> Any:
+        seen = next(each for each in others if isinstance(each, Seen))
+        compute(seen.body.position[2])
+        return getattr(ThrustAlone, method)(law, ops, *others)
+
+    computed.__name__ = method
+    law: Any = type("Own", (ThrustAlone,), {method: computed})()
+    said = complaint(lambda: ab.fly(GENTLE, QUAD, controller=law, engine="compiled"))
+    place = f"{__file__}:{compute.__code__.co_firstlineno}"
+    assert said.startswith(f"{place}: controller 'thrust-alone': {method}() cannot be compiled for `")
+    assert 'or fly the law by the engine floats (engine="floats")' in said
+    compute(1.0)
 
 
 def test_a_law_is_swept_under_conditions_flight_by_flight_as_it_is_flown() -> None:

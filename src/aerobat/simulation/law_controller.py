@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from inspect import getfile
 from math import pi
+from traceback import extract_tb
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from aerobat.control import ControlLaw, Controller, Seen
 from aerobat.declaration import placed, shown
+from aerobat.engines.floats import FloatOps
 from aerobat.engines.pytree import tree_leaves
 from aerobat.errors import SpecError
 from aerobat.kernels import control, motors
@@ -56,7 +61,8 @@ class LawController(Component):
         reference = inputs or signals.reference
         body = signals.observer.body
         first = control.init(ops, parameters.model, body, reference)
-        own = self.law.init(ops, parameters.model, Seen(body, first.thrusts, reference))
+        with _compiled(ops, self.law.init):
+            own = self.law.init(ops, parameters.model, Seen(body, first.thrusts, reference))
         if any(isinstance(leaf, str) for leaf in tree_leaves(own)):
             raise _wrong(self.law.init, f"returned {shown(own)}, not a tree of tuples of numbers")
         return LawState(own, first.thrusts, first.commands)
@@ -76,7 +82,8 @@ class LawController(Component):
         rotors = model.airframe.rotors
         decay_factors = motors.decay_factors(ops, rotors, elapsed)
         thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
-        answer: Any = self.law.step(ops, model, state.own, Seen(body, thrusts, reference), elapsed)
+        with _compiled(ops, self.law.step):
+            answer: Any = self.law.step(ops, model, state.own, Seen(body, thrusts, reference), elapsed)
         own, load = self._checked(answer)
         if len(tree_leaves(own)) != len(tree_leaves(state.own)):
             raise _wrong(self.law.step, f"returned the state {shown(own)}, of another shape than before")
@@ -98,10 +105,31 @@ class LawController(Component):
         )
 
 
+@contextmanager
+def _compiled(ops: Ops, method: Any) -> Iterator[None]:
+    """Refuse a line of a law's method that floats alone can compute, in flights by any other engine."""
+    try:
+        yield
+    except TypeError as error:
+        lines = [frame for frame in extract_tb(error.__traceback__) if frame.filename == getfile(method)]
+        if ops is FloatOps or not lines:
+            raise
+        complaint = _complaint(
+            method,
+            f"cannot be compiled for `{lines[-1].line}`; write this line in + - * /, comparisons and ops "
+            "(ops.select for if, ops.maximum(x, -x) for abs), or fly the law by the engine floats "
+            '(engine="floats")',
+        )
+        raise SpecError(f"{lines[-1].filename}:{lines[-1].lineno}: {complaint}") from error
+
+
 def _wrong(method: Any, complaint: str) -> SpecError:
     """Return the error of a law's method, with its file and line."""
-    law = f"controller '{method.__self__.kind}'"
-    return placed(SpecError(f"{law}: {method.__name__}() {complaint}"), method)
+    return placed(SpecError(_complaint(method, complaint)), method)
+
+
+def _complaint(method: Any, complaint: str) -> str:
+    return f"controller '{method.__self__.kind}': {method.__name__}() {complaint}"
 
 
 def flown_by(law: ControlLaw | None, settings: Controller, period: int = 1) -> Component:
