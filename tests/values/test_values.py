@@ -168,6 +168,33 @@ def test_tables_hold_the_numbers_of_what_they_are_made_of() -> None:
     assert ab.to_dataframe(plan()).empty
     compared = ab.to_dataframe(instance(ab.Comparison))
     assert compared["duration_s"].tolist() == [plan().duration]
+    assert len(ab.to_dataframe(plan().certificate.findings)) == len(plan().certificate.findings)
+
+
+@pytest.mark.parametrize("cls", [cls for cls in VALUES if cls is not ab.Plan], ids=lambda cls: cls.__name__)
+def test_every_value_has_rows_and_several_of_them_a_row_each(cls: type) -> None:
+    """But for a plan without attempts: these are its rows."""
+    value = instance(cls)
+    assert len(ab.to_dataframe(value))
+    assert len(ab.to_dataframe([value, value])) == len(ab.to_dataframe((value, value))) == 2
+
+
+def test_tables_of_references_and_estimates_are_their_series_over_time() -> None:
+    reference, estimates = instance(ab.Reference), instance(ab.Estimates)
+    table = ab.to_dataframe(reference)
+    np.testing.assert_array_equal(table["time"], reference.times)
+    acceleration = table[[f"setpoint_acceleration_{axis}" for axis in "xyz"]]
+    np.testing.assert_array_equal(acceleration, reference.setpoint.flat.acceleration)
+    np.testing.assert_array_equal(table["setpoint_thrust"], reference.setpoint.wrench.thrust)
+    np.testing.assert_array_equal(table[[f"rotor_thrusts_{k}" for k in range(4)]], reference.rotor_thrusts)
+    table = ab.to_dataframe(estimates)
+    np.testing.assert_array_equal(table["time"], estimates.times)
+    np.testing.assert_array_equal(table[[f"gyro_bias_{axis}" for axis in "xyz"]], estimates.gyro_bias)
+    np.testing.assert_array_equal(table[[f"sigma_{k}" for k in range(15)]], estimates.sigma)
+
+
+def test_a_mapping_in_a_line_of_text_is_shown_with_its_values() -> None:
+    assert str(ab.Gradient(np.array(2.0), {"mass": np.array(0.5)})) == "Gradient(value=2, slopes=(mass=0.5))"
 
 
 def test_without_pandas_a_table_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:

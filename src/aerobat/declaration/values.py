@@ -127,12 +127,12 @@ def _short(value: Any) -> str:
         if value.size > _FEW:
             return f"array of {' x '.join(map(str, value.shape))}"
         return _short(tuple(value.tolist())) if value.ndim else f"{value:g}"
-    if isinstance(value, tuple | list):
+    if isinstance(value, tuple | list | Mapping):
         if len(value) > _FEW:
             return f"{len(value)} entries"
+        if isinstance(value, Mapping):
+            return f"({', '.join(f'{key}={_short(each)}' for key, each in value.items())})"
         return f"({', '.join(map(_short, value))})"
-    if isinstance(value, Mapping):
-        return f"({', '.join(map(str, value))})"
     if isinstance(value, Enum):
         return value.name.lower()
     if isinstance(value, float):

@@ -27,7 +27,9 @@ TOLD_IN = {
     "aerobat.planning": "plans",
     "aerobat.simulation.autopilot": "plans",
     "aerobat.simulation": "flights",
+    "aerobat.estimation": "flights",
     "aerobat.evaluation": "flights",
+    "aerobat.flatness": "flights",
     "aerobat.vehicle": "vehicles",
     "aerobat.studies.compare": "comparison",
     "aerobat.studies.error_causes": "error_causes",
@@ -76,6 +78,12 @@ class Facts(tuple[Fact, ...]):
 
 class Columns(dict[str, Any]):
     """A table by its columns, (rows,) each: for data frames, and too long for JSON."""
+
+
+class Rows(tuple[Any, ...]):
+    """A table by its rows, each a result; one without rows is a table too."""
+
+    __slots__ = ()
 
 
 @singledispatch

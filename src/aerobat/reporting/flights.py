@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isinf, isnan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerobat.arrays import AXES
+from aerobat.arrays import AXES, Array
+from aerobat.estimation import Estimates
 from aerobat.evaluation.criteria import GOAL
 from aerobat.evaluation.score import ObserverScore, Score
+from aerobat.flatness import Reference
 from aerobat.reporting.facts import NONE, REPORT, Columns, Fact, facts, fields_of, kept, picture, said
 from aerobat.reporting.plans import rough_length
 from aerobat.simulation import Flight
+from aerobat.simulation.flight import setpoint_series
 from aerobat.simulation.outcome import digits, length
 from aerobat.simulation.passages import NearestObstacle, Passage, WaypointPassage
 
@@ -90,6 +93,22 @@ def _(passage: Passage) -> Iterator[Fact]:
 def _(flight: Flight) -> Iterator[Fact]:
     yield Fact("", text=str(flight))
     yield Fact("rows", Columns(_rows_of(flight)))
+
+
+@facts.register
+def _(found: Reference) -> Iterator[Fact]:
+    thrusts = _components({"rotor_thrusts": found.rotor_thrusts}, is_in_space=False)
+    setpoints = _components(setpoint_series(found.setpoint))
+    yield Fact("rows", Columns({"time": found.times, **setpoints, **thrusts}))
+    yield from fields_of(found)
+
+
+@facts.register
+def _(found: Estimates) -> Iterator[Fact]:
+    arrays = {name: part for name, part in vars(found).items() if isinstance(part, np.ndarray)}
+    series = {name: part for name, part in arrays.items() if part.ndim == 2}  # all others are of poses
+    yield Fact("rows", Columns({"time": found.times, **_components(series)}))
+    yield from fields_of(found)
 
 
 def _report(score: Score) -> Iterator[Fact]:
@@ -190,25 +209,32 @@ def _pair(largest: float, rms: float, unit: str) -> str:
 def _rows_of(flight: Flight) -> dict[str, Any]:
     """The columns of a flight, or of a batch."""
     if not flight.is_batch:
-        return dict(_columns(flight))
-    each = [dict(_columns(flight[k])) for k in range(len(flight.vehicles))]
+        return _columns(flight)
+    each = [_columns(flight[k]) for k in range(len(flight))]
     numbers = [np.full(len(columns["time"]), k) for k, columns in enumerate(each)]
     joined = {name: np.concatenate([columns[name] for columns in each]) for name in each[0]}
     return {"vehicle": np.concatenate(numbers), **joined}
 
 
-def _columns(flight: Flight) -> Iterator[tuple[str, Any]]:
-    yield "time", flight.times
+def _columns(flight: Flight) -> dict[str, Array]:
+    columns = {"time": flight.times}
     for one in flight.kinds:
-        values = flight.series[one.name]
-        if not one.over_time:
-            continue
+        if one.over_time:
+            columns |= _components({one.name: flight.series[one.name]}, min(one.shape, default=1) > 0)
+    return columns
+
+
+def _components(series: Mapping[str, Array], is_in_space: bool = True) -> dict[str, Array]:
+    """The columns of series over time: of vectors and quaternions by their letters, of others by number."""
+    columns = {}
+    for name, values in series.items():
         if values.ndim == 1:
-            yield one.name, values
-        else:
-            names = COMPONENTS.get(values.shape[1]) if one.shape[0] > 0 else None
-            for k, column in enumerate(values.T):
-                yield f"{one.name}_{names[k] if names else k}", column
+            columns[name] = values
+            continue
+        letters = COMPONENTS.get(values.shape[1]) if is_in_space else None
+        for k, column in enumerate(values.T):
+            columns[f"{name}_{letters[k] if letters else k}"] = column
+    return columns
 
 
 def _flights_of(scores: Score) -> dict[str, Any]:

@@ -6,13 +6,14 @@ import json
 from collections.abc import Iterator, Mapping
 from enum import Enum
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from aerobat.declaration import shown, unknown_name, validated
 from aerobat.errors import SpecError, import_extra
-from aerobat.reporting.facts import Columns, Facts, facts
+from aerobat.reporting.facts import Columns, Facts, Rows, facts
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -20,12 +21,13 @@ if TYPE_CHECKING:
 
 @validated
 def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
-    """Return a pandas DataFrame of a result, or of a list of results; units as in its columns' names.
+    """Return a pandas DataFrame of a result, or of a list or tuple of results; units as in columns' names.
 
     A result that has tables gives the first of them: of a flight its rows, the series by their components, as
-    `position_x` and `thrusts_0`, of a batch with the number of the vehicle first; of a plan its attempts, of
-    a comparison its planners, of scores the flights with their passages through each gate, of a sweep its
-    flights, of a map of what is feasible its cells. A result without tables is one row.
+    `position_x` and `thrusts_0`, of a batch with the number of the vehicle first; of references and estimates
+    their rows likewise; of a plan its attempts, of a comparison its planners, of scores the flights with
+    their passages through each gate, of a sweep its flights, of a map of what is feasible its cells. A
+    result without tables, or with empty ones alone, is one row.
     Raises BackendMissing without pandas, SpecError for what is no result, or has no such table.
 
     Args:
@@ -33,7 +35,7 @@ def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
         table: The key of another of its tables, as "stages" of a plan.
     """
     pandas = import_extra("pandas", "to_dataframe needs pandas", "aerobat[pandas]")
-    if isinstance(result, list):
+    if isinstance(result, list | tuple) and not isinstance(result, Facts):
         several = [plain(each) for each in result]
         if not all(isinstance(each, dict) for each in several):
             raise SpecError(f"result must be a result, or a list of results, got {shown(result)}")
@@ -41,7 +43,8 @@ def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
     tables = {fact.key: fact.value for fact in facts(result) if fact.key and _is_table(fact.value)}
     if table is not None and table not in tables:
         raise unknown_name("table", table, list(tables))
-    found = tables[table] if table is not None else next(iter(tables.values()), None)
+    filled = (each for each in tables.values() if isinstance(each, Rows) or len(each))
+    found = tables[table] if table is not None else next(filled, None)
     if isinstance(found, Columns):
         return pandas.DataFrame(dict(found))
     rows = [plain(result)] if found is None else map(plain, found)
@@ -50,10 +53,9 @@ def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
 
 def _is_table(value: Any) -> bool:
     """True for columns, and for a sequence of results, an empty one too; arrays are values."""
-    is_rows = isinstance(value, list | tuple) and not isinstance(value, Facts)
-    return isinstance(value, Columns) or (
-        is_rows and not any(isinstance(each, int | float | str) for each in value)
-    )
+    if isinstance(value, list | tuple) and not isinstance(value, Facts):
+        return all(isinstance(plain(each), dict) for each in value[:1])
+    return isinstance(value, Columns)
 
 
 def _cells(row: dict[str, Any], begin: str = "") -> Iterator[tuple[str, Any]]:
@@ -76,11 +78,13 @@ def plain(value: Any) -> Any:
         return value.value if isinstance(value, str) else value.name.lower()
     if value is None or isinstance(value, bool | int | str):
         return value
+    if isinstance(value, Path):
+        return str(value)
     if isinstance(value, float):
         return value if isfinite(value) else None
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple) and not isinstance(value, Facts):
+    if isinstance(value, list | tuple | range) and not isinstance(value, Facts):
         return [plain(each) for each in value]
     filed = (fact for fact in facts(value) if fact.key and not isinstance(fact.value, Columns))
     return {fact.key: plain(fact.value) for fact in filed}

@@ -14,7 +14,7 @@ from aerobat.planning import Assessment, Attempt, Flyability, Plan, Tube
 from aerobat.planning.flyability import FlownPassage
 from aerobat.planning.heading.follow import heading_error
 from aerobat.planning.time_limit import best_by_limit
-from aerobat.reporting.facts import REPORT, WARNING, Fact, Facts, facts, fields_of, kept, picture, said
+from aerobat.reporting.facts import REPORT, WARNING, Fact, Facts, Rows, facts, fields_of, kept, picture, said
 from aerobat.simulation.autopilot import Recoveries
 from aerobat.simulation.outcome import length
 
@@ -58,7 +58,7 @@ def _(plan: Plan) -> Iterator[Fact]:
         sized = "the duration" if plan.cost == plan.duration else f"{plan.cost:.7g}"
         cost = f"{sized}, {_optimality(plan)}"
     yield Fact("cost", plan.cost, "cost", cost)
-    yield from kept(attempts=plan.attempts, status=plan.status, bound=plan.bound, gap=plan.gap)
+    yield from kept(attempts=Rows(plan.attempts), status=plan.status, bound=plan.bound, gap=plan.gap)
     yield from kept(backend=plan.backend, starts_s=plan.starts, spread=plan.spread)
     if plan.spread is not None:
         coarse = f"{plan.starts[0]:.3f} to {plan.starts[-1]:.3f} s on a coarse mesh"
