@@ -94,6 +94,8 @@ def test_flights_that_do_not_come_to_a_gate_are_worse_than_any_that_miss_it() ->
         none.passed("gat")
     with pytest.raises(ab.SpecError, match="no column of numbers named 'outcome'"):
         none.quantile("outcome", 0.5)
+    with pytest.raises(ab.SpecError, match=r"named 'gate_outcome'; (?!.*gate_outcome)(?=.*gate_miss_m)"):
+        none.within("gate_outcome", 1.0)
 
 
 def test_quantiles_and_shares_are_those_of_the_rows() -> None:

@@ -66,7 +66,7 @@ class Comparison:
 def compare(
     problem: Problem | str,
     vehicle: Vehicle | str,
-    planners: Sequence[tuple[str, Planner] | str] | None = None,
+    planners: Sequence[tuple[str, Planner] | Planner | str] | None = None,
     progress: Callable[[Attempt], None] | None = None,
     begin: Callable[[str], None] | None = None,
     time_limit: NonNegative | None = None,
@@ -84,7 +84,8 @@ def compare(
     Args:
         problem: What is planned, or its name.
         vehicle: What flies it, or its name.
-        planners: Each with a name, or the name of a registered one; by default all that are registered.
+        planners: Each with a name, or by its registered name, or that name alone; by default all that are
+            registered.
         progress: Called with every attempt as it ends, of planners in this process.
         begin: Called with each planner's name when its turn comes, or when another process is done with it.
         time_limit: For each planner [s]; the best plan that it finds by then counts.
@@ -161,11 +162,13 @@ def _timed_entry(
         return _entry(*named, task.problem, task.vehicle, progress)
 
 
-def _named(planner: tuple[str, Planner] | str) -> tuple[str, Planner]:
+def _named(planner: tuple[str, Planner] | Planner | str) -> tuple[str, Planner]:
     """The planner with its name."""
+    if isinstance(planner, tuple):
+        return planner[0], as_planner(planner[1])
     if isinstance(planner, str):
         return planner, as_planner(planner)
-    return planner[0], as_planner(planner[1])
+    return getattr(planner, "kind", type(planner).__name__), planner
 
 
 def _improved(

@@ -150,7 +150,8 @@ class Sweep:
 
     def _errors(self, column: str) -> Array:
         """A column of numbers, infinite where there was no passage."""
-        if column not in self.table or self.table[column].dtype.kind not in "fi":
-            raise unknown_name("column of numbers", column, [n for n in self.table if n != "outcome"])
+        numbers = [name for name, values in self.table.items() if values.dtype.kind in "fi"]
+        if column not in numbers:
+            raise unknown_name("column of numbers", column, numbers)
         values = np.asarray(self.table[column], dtype=float)
         return np.where(np.isnan(values), np.inf, values)
