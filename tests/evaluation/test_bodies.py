@@ -144,5 +144,7 @@ def test_the_smallest_opening_counts_flights_that_never_got_there_and_knows_when
     with pytest.raises(SpecError, match=r"scores of 298 flights cannot vouch for 99 % .*; score 299 flights"):
         ab.smallest_opening(needing(widths[:298], heights[:298]), gate)
     assert ab.smallest_opening(needing(widths[:299], heights[:299]), gate).scale == pytest.approx(0.6)
+    with pytest.raises(SpecError, match=r"scores of 1 flights cannot vouch for 99 % .*; score 299 flights"):
+        ab.smallest_opening(scored()[0], gate)
     with pytest.raises(SpecError, match="no gate named 'other'"):
         ab.smallest_opening(needing(widths, heights), replace(gate, name="other"))

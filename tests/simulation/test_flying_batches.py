@@ -77,6 +77,8 @@ def test_one_vehicle_takes_many_starts() -> None:
     starts = near(3)
     batch = fly(AT_REST, QUAD, start=starts)
     assert batch.vehicles == ("agile-quad",) * 3
+    assert len(batch) == len([*batch]) == 3
+    assert len(batch[0]) == 1
     for k in range(3):
         assert_same(batch[k], fly(AT_REST, QUAD, start=one(starts, k)))
 
@@ -198,3 +200,10 @@ def test_a_controller_of_its_own_is_flown() -> None:
     )
     tight = fly(loops(3.0), QUAD, start=one(near(1), 0))
     assert np.abs(loose.states.position - tight.states.position).max() > 0.01
+
+
+def test_a_series_that_a_flight_has_not_is_answered_by_those_that_it_has() -> None:
+    flight = fly(AT_REST, QUAD)
+    with pytest.raises(AttributeError, match="no 'observed_position'; its series are ") as raised:
+        flight.observed_position  # noqa: B018
+    assert str(raised.value).partition("series are ")[2].split(", ") == list(flight.series)

@@ -205,6 +205,12 @@ def test_intervals_of_shares_are_those_of_an_exact_test(of: int, fraction: float
     assert share.interval == pytest.approx((expected.low, expected.high), rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.parametrize(("count", "of"), [(0, 0), (5, 3), (-1, 3), (0, -1)])
+def test_a_share_is_of_one_flight_or_more_and_no_more_than_all(count: int, of: int) -> None:
+    with pytest.raises(ab.SpecError, match=f"got {count} of {of}$"):
+        Share(count, of)
+
+
 @pytest.mark.parametrize(
     ("count", "of", "text"),
     [

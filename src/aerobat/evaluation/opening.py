@@ -121,7 +121,7 @@ def _needed(scores: Score, gate: Gate, side: Side) -> Array:
     if not passages:
         raise unknown_name("gate", gate.name, [passage.gate for passage in scores.passages])
     width, height = (
-        np.max(np.nan_to_num([getattr(passage, field) for passage in passages], nan=np.inf), axis=0)
+        np.max([np.nan_to_num(np.ravel(getattr(each, field)), nan=np.inf) for each in passages], axis=0)
         for field in ("needed_width", "needed_height")
     )
     own_width, own_height = gate.opening.size

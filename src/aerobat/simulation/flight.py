@@ -117,9 +117,10 @@ class Flight:
         object.__setattr__(self, "series", MappingProxyType(checked))
 
     def __getattr__(self, name: str) -> NDArray[Any]:
-        if not name.startswith("_") and name in self.__dict__.get("series", ()):
-            return self.series[name]
-        raise AttributeError(f"a flight has no {name!r}; its series are {', '.join(s.name for s in SERIES)}")
+        series: Mapping[str, Array] = self.__dict__.get("series", {})
+        if not name.startswith("_") and name in series:
+            return series[name]
+        raise AttributeError(f"this flight has no {name!r}; its series are {', '.join(series)}")
 
     @property
     def kinds(self) -> tuple[Series, ...]:
@@ -194,14 +195,17 @@ class Flight:
         """When the one flight diverged [s], NaN where it did not, (1,). Raises SpecError for a batch."""
         return np.array([np.nan if self.outcome is Outcome.COMPLETE else self.series["ends"]])
 
+    def __len__(self) -> int:
+        """The number of vehicles."""
+        return len(self.vehicles)
+
     @validated
     def __getitem__(self, vehicle: int) -> Flight:
         """The flight of one vehicle of a batch, as if it had flown alone. Raises SpecError for one flight."""
         if not self.is_batch:
             raise SpecError("this is one flight, not a batch: use it without an index")
-        count = len(self.vehicles)
-        if not -count <= vehicle < count:
-            raise OutOfRange(f"there are {count} flights, no flight {shown(vehicle)}; count from 0")
+        if not -len(self) <= vehicle < len(self):
+            raise OutOfRange(f"there are {len(self)} flights, no flight {shown(vehicle)}; count from 0")
         rows = slice(0, int(np.searchsorted(self.times, self.series["ends"][vehicle], side="right")))
         picked = {}
         for one in self.kinds:

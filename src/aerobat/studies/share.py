@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from aerobat.arrays import Mask
 from aerobat.environment import Dispersion
+from aerobat.errors import SpecError
 
 CONFIDENCE = 0.95  # of the intervals
 MAX_DIGITS = 6  # of a percentage, behind the point
@@ -18,6 +19,13 @@ class Share:
 
     count: int
     of: int
+
+    def __post_init__(self) -> None:
+        """Check. Raises SpecError for a share of no flights, or of more than there are."""
+        if not 0 <= self.count <= self.of > 0:
+            raise SpecError(
+                f"count must be from 0 to all flights, one or more, got {self.count} of {self.of}"
+            )
 
     @classmethod
     def where(cls, holds: Mask) -> Share:
