@@ -82,6 +82,16 @@ def test_times_keep_their_shape():
     np.testing.assert_array_equal(trajectory.flat(t).jerk, trajectory.evaluate(t, 3))
 
 
+@pytest.mark.parametrize("kind", [np.int64, np.uint8])
+def test_an_order_of_derivative_is_any_whole_number(kind):
+    trajectory = random_trajectory(0)
+    np.testing.assert_array_equal(trajectory.evaluate(0.1, kind(4)), trajectory.evaluate(0.1, 4))
+    assert trajectory.effort(kind(4)) == trajectory.effort(4)
+    for wrong in (True, 2.0, np.float64(2.0), kind(200)):
+        with pytest.raises(SpecError, match=r"derivative must be a whole number from 0 to 31"):
+            trajectory.evaluate(0.1, wrong)
+
+
 @pytest.mark.parametrize("outside", [-1e-6, 12.1, np.nan, np.inf])
 def test_a_time_outside_is_refused(outside):
     trajectory = random_trajectory(0)

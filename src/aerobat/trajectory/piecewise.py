@@ -212,7 +212,7 @@ class Trajectory:
 
     def effort(self, derivative: int) -> float:
         """∫ |d^k p/dt^k|² dt over the whole trajectory, exactly."""
-        _check_derivative(derivative)
+        derivative = _whole(derivative)
         quadratic = polynomial.gram(self.degree, derivative)
         per_segment = np.einsum("sid,ij,sjd->s", self.coefficients, quadratic, self.coefficients)
         return float(np.sum(per_segment / self.durations ** (2 * derivative - 1)))
@@ -241,7 +241,7 @@ class Trajectory:
 
     def _rates(self, derivative: int) -> Array:
         """Coefficients of d^k p/dt^k on each segment, (S, K, 3)."""
-        _check_derivative(derivative)
+        derivative = _whole(derivative)
         scale = self.durations[:, None, None] ** derivative
         return np.asarray(polynomial.differentiate(self.coefficients, derivative) / scale)
 
@@ -266,11 +266,13 @@ class Trajectory:
         )
 
 
-def _check_derivative(derivative: int) -> None:
-    """Raise SpecError for what counts no derivative; higher ones than this all vanish."""
-    if type(derivative) is not int or not 0 <= derivative <= MAX_DEGREE + 1:
+def _whole(derivative: int) -> int:
+    """The order of a derivative. Raises SpecError for what is none; higher ones than this all vanish."""
+    is_whole = isinstance(derivative, int | np.integer) and not isinstance(derivative, bool)
+    if not is_whole or not 0 <= derivative <= MAX_DEGREE + 1:
         complaint = f"must be a whole number from 0 to {MAX_DEGREE + 1}, got {shown(derivative)}"
         raise FieldError("derivative", complaint)
+    return int(derivative)
 
 
 def _normalised(s: ArrayLike) -> Array:
