@@ -49,15 +49,17 @@ class Presets(Generic[T]):
     def load(self, name_or_path: str | os.PathLike[str]) -> T:
         """Return what one of them describes, or a file. Raises SpecError.
 
-        A path object, or text that ends in .toml or has a folder in it, is the path of a file.
+        A path object, or text that ends in .toml or has a folder in it, is the path of a file. Other text is
+        a name, or else the path of a file that there is.
         """
         text = os.fspath(name_or_path)
         path: Document = Path(text)
         if isinstance(name_or_path, str) and not (text.endswith(".toml") or "/" in text or os.sep in text):
             known = self.names()
-            if text not in known:
+            if text in known:
+                path = self.folder / f"{text}.toml"
+            elif not os.path.isfile(text):
                 raise unknown_name(self.kind, text, known)
-            path = self.folder / f"{text}.toml"
         return read_document(path, self.cls, self.kind, name=path.name.removesuffix(".toml"))
 
     def text(self, name_or_path: str | os.PathLike[str]) -> str:

@@ -84,6 +84,30 @@ def test_a_plan_is_drawn_without_a_flight_and_a_flight_with_the_vehicle_of_its_p
     assert complaint(lambda: ab.draw(dataclasses.replace(plan(), vehicle=None))).startswith("vehicle is miss")
 
 
+@pytest.mark.parametrize(
+    ("write", "load", "value"),
+    [
+        (ab.write_problem, ab.load_problem, LINE),
+        (ab.write_vehicle, ab.load_vehicle, QUAD),
+    ],
+)
+def test_a_file_is_read_under_any_name_that_is_no_built_in_one(
+    write: Callable[..., None], load: Callable[..., Any], value: Any, tmp_path: Any, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    other = dataclasses.replace(value, name="mine")
+    for name in ("mine", "mine.txt", value.name):
+        write(other, name)
+    assert load("mine") == load("mine.txt") == other
+    assert load(value.name) == value
+
+
+def test_a_planner_is_compared_under_its_registered_name() -> None:
+    (found,) = ab.compare("line", "agile-quad", [ab.MinSnap()]).entries
+    assert found.planner == "min-snap"
+    assert found.certified
+
+
 MEANT: dict[str, tuple[Callable[[], Any], str]] = {
     "a problem's name for the plan": (
         lambda: ab.fly("half-flip"),
