@@ -55,7 +55,18 @@ def test_a_table_longer_than_documents_may_be_is_read_back(tmp_path: Path) -> No
     np.testing.assert_array_equal(read_table(tmp_path / "long.csv")["flight"], table["flight"])
 
 
-@pytest.mark.parametrize("content", [b"", b"a,b\n", b"a,b\n1\n", b"a,a\n1,2\n", b"\xff\xfe", b"PAR1"])
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_table_without_rows_and_one_of_true_and_false_are_read_back(tmp_path: Path, suffix: str) -> None:
+    write_table({"a": [], "b": []}, tmp_path / f"table.{suffix}")
+    assert {name: column.tolist() for name, column in read_table(tmp_path / f"table.{suffix}").items()} == {
+        "a": [],
+        "b": [],
+    }
+    write_table({"well": [True, False]}, tmp_path / f"table.{suffix}")
+    np.testing.assert_array_equal(read_table(tmp_path / f"table.{suffix}")["well"], [True, False])
+
+
+@pytest.mark.parametrize("content", [b"", b"a,b\n1\n", b"a,a\n1,2\n", b"\xff\xfe", b"PAR1\n1,2\n"])
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
 def test_a_file_that_is_no_table_is_refused_in_a_sentence(
     tmp_path: Path, suffix: str, content: bytes

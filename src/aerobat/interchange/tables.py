@@ -25,8 +25,9 @@ MAX_CELLS = MAX_TABLE // 8
 def write_table(table: Mapping[str, Any], path: PathName) -> None:
     """Write columns by their names, as a sweep's table, to a CSV or Parquet file, by the path's suffix.
 
-    Whole numbers, numbers or text; digits enough to read all numbers back exactly. Raises SpecError for
-    another suffix, and where the file cannot be written, BackendMissing for Parquet without pyarrow.
+    Whole numbers, numbers or text, true and false as 1 and 0; digits enough to read all numbers back exactly.
+    Raises SpecError for another suffix, and where the file cannot be written, BackendMissing for Parquet
+    without pyarrow.
     """
     columns = _columns(table)
     if _suffix(path) == CSV:
@@ -49,6 +50,7 @@ def write_table(table: Mapping[str, Any], path: PathName) -> None:
 def read_table(path: PathName) -> dict[str, NDArray[Any]]:
     """Return the columns that `write_table` wrote, by their names: whole numbers, numbers, or text.
 
+    CSV has no types: a column of text is read as numbers where all of its entries are numbers in text.
     Raises SpecError, one sentence, for any other file, BackendMissing for Parquet without pyarrow.
     """
     with in_document(Path(path), "table"):
@@ -78,9 +80,9 @@ def _columns(table: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
         columns = {}
     shapes = {column.shape for column in columns.values()}
     kinds = {column.dtype.kind for column in columns.values()}
-    if len(shapes) != 1 or len(shapes.pop()) != 1 or not kinds <= set("iufU"):
+    if len(shapes) != 1 or len(shapes.pop()) != 1 or not kinds <= set("biufU"):
         raise SpecError("table must hold columns by their names: lists of numbers or text, all as long")
-    return columns
+    return {name: column + 0 if column.dtype.kind == "b" else column for name, column in columns.items()}
 
 
 def _parquet() -> Any:
@@ -110,9 +112,9 @@ def _from_csv(text: str) -> dict[str, NDArray[Any]]:
         header, *rows = csv.reader(io.StringIO(text, newline=""))
     except (ValueError, csv.Error):  # nothing at all, or no text
         header, rows = [], []
-    if not rows or len(set(header)) < len(header) or any(len(row) != len(header) for row in rows):
+    if not header or len(set(header)) < len(header) or any(len(row) != len(header) for row in rows):
         raise SpecError("it is no table with a header and rows as long; write it again")
-    return {name: _parsed(column) for name, column in zip(header, zip(*rows, strict=True), strict=True)}
+    return {name: _parsed([row[k] for row in rows]) for k, name in enumerate(header)}
 
 
 def _parsed(column: Sequence[str]) -> NDArray[Any]:
