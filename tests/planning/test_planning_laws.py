@@ -220,6 +220,14 @@ def test_progress_sees_every_attempt_as_it_is_kept(name: str) -> None:
     assert found.attempts == tuple(seen[name, "elsewhere"])
 
 
+def test_the_same_request_is_planned_to_an_equal_plan_whatever_the_clock_says() -> None:
+    found, again = (plan(STEP, MinSnap(), QUAD) for _ in range(2))
+    assert found == again
+    assert hash(found) == hash(again)
+    slower = tuple(replace(attempt, solve_time=attempt.solve_time + 1.0) for attempt in found.attempts)
+    assert replace(found, attempts=slower) == found
+
+
 def test_a_planner_is_known_by_its_name() -> None:
     assert plan(STEP, "min-snap", QUAD).trajectory.durations == pytest.approx(
         plan(STEP, MinSnap(), QUAD).trajectory.durations

@@ -16,7 +16,7 @@ class Attempt:
     outcome: str  # a sentence
     cost: float | None  # what the planner minimizes, as in Plan
     nodes: int  # QPs solved, or iterations
-    solve_time: float  # [s]
+    solve_time: float = field(compare=False)  # [s] of the clock
     dt: float | None = None  # [s] of the intervals, where they are equal
     margin: float | None = None  # [N] of the rotors, negative: beyond their limits; None: not looked at
 
