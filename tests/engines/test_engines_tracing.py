@@ -55,6 +55,24 @@ def test_equality_of_values_is_traced_as_equality_of_floats(x: float, y: float) 
                 assert found is compare(first, second)
 
 
+@pytest.mark.parametrize("engine", ["floats", "compiled"])
+def test_conditions_are_compared_and_counted_as_floats_do_it(engine: str) -> None:
+    def told(ops: Any, parameters: Any, carry: Any, x: Any) -> Any:
+        first, second = x > 0.0, x < 1.0
+        same, other = (ops.select(condition, 1.0, 0.0) for condition in (first == second, first != second))
+        return carry, (same, other, first + 2.0 * second, True - first)
+
+    rows = run_whole(
+        choose(engine, 1, 1),
+        lambda ops, parameters, x: (0.0,),
+        told,
+        (np.zeros(1),),
+        np.array([-1.0, 0.5, 2.0]),
+    )
+    expected = [0.0, 1.0, 0.0], [1.0, 0.0, 1.0], [2.0, 3.0, 1.0], [1.0, 0.0, 0.0]
+    np.testing.assert_array_equal(np.squeeze(rows), expected)
+
+
 def test_what_is_common_is_computed_once() -> None:
     trace = Trace()
     x, y = trace.input("x"), trace.input("y")

@@ -31,6 +31,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 _COMMUTATIVE = {"add", "multiply", "and"}
 _LOGICAL = {"less", "less_equal", "and"}
+_OF_LOGICAL = {"and", "select"}  # all others take numbers
 
 
 class BranchError(TypeError):
@@ -77,9 +78,12 @@ class Trace:
         return Symbol(self, self._number("constant", (), content, logical))
 
     def apply(self, name: str, *arguments: Any) -> Symbol:
-        """A function of symbols and numbers."""
+        """A function of symbols and numbers; true and false are 1 and 0 where numbers are taken."""
         numbers = tuple([self.symbol(argument).number for argument in arguments])
         known = [self.operations[number] for number in numbers]
+        if name not in _OF_LOGICAL and any(operation.logical for operation in known):
+            numbers = tuple([self._as_number(number) for number in numbers])
+            known = [self.operations[number] for number in numbers]
         constants = [operation.name == "constant" for operation in known]
         if all(constants):
             return self.symbol(FUNCTIONS[name](*(operation.content for operation in known)))
@@ -108,6 +112,10 @@ class Trace:
                 selects = self.operations[number].name == "select" and arguments[0] == unless
                 waiting.extend(arguments[::2] if selects else arguments)
         return found
+
+    def _as_number(self, number: int) -> int:
+        symbol = Symbol(self, number)
+        return (self.apply("select", symbol, 1.0, 0.0) if self.operations[number].logical else symbol).number
 
     def _number(
         self, name: str, arguments: tuple[int, ...], content: float | bool | str, logical: bool
