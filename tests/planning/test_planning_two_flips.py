@@ -8,10 +8,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+import aerobat as ab
+from aerobat import so3
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.task import Task
-from aerobat.problem import CustomManeuver, Problem, load_problem
+from aerobat.problem import CustomManeuver, Flip, Problem, at_rest, load_problem
 from aerobat.problem.condition import Condition, Quantity
 from aerobat.trajectory import Trajectory
 from places import ROOT
@@ -120,3 +122,19 @@ def test_a_start_changes_nothing_but_the_way(shift: int) -> None:
     started = solver().solve(program, start=[slot - shift for slot in result.slots])
     assert (started.status, started.slots) == ("optimal", result.slots)
     assert started.cost == pytest.approx(result.cost, rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "seconds"), [("agile-quad", 1.75), ("crazyflie", 3.2)])
+def test_two_flips_in_a_row_turn_over_twice_and_leave_weak_rotors_no_detour(
+    name: str, seconds: float
+) -> None:
+    """Closed forms know no attitudes: from those the Crazyflie took 7.8 s, 20 m across."""
+    problem = Problem("along", at_rest((0.0, 0.0, 1.0)), at_rest((8.0, 0.0, 1.0)), Flip(count=2))
+    plan = ab.plan(problem, ab.FreeKnots(reserve=0.15), name)
+    assert plan.certified
+    assert plan.duration < seconds
+    assert plan.vehicle is not None
+    inverted = np.array([stage.time for stage in plan.stages if stage.name in ("180°", "540°")])
+    setpoint = ab.reference(plan.trajectory, plan.vehicle, inverted).setpoint
+    assert (so3.axes(setpoint.q_world_body)[:, 2, 2] < np.cos(np.deg2rad(149.0))).all()

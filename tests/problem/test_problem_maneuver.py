@@ -87,6 +87,20 @@ def test_a_flip_asks_the_same_turn_about_any_horizontal_axis(axis_deg: float, th
                 assert (ca.lower, ca.upper) == (cb.lower, cb.upper)
 
 
+@given(st.floats(-180, 180), st.floats(-60.0, 60.0), st.floats(5.0, 60.0))
+def test_upside_down_a_flip_leans_out_of_its_plane_by_thirty_degrees_at_most(
+    axis_deg: float, aside: float, downward: float
+) -> None:
+    """Without a gate, whose attitude would say so: else a quick flip never turns over."""
+    flip = Flip(axis_deg, count=2)
+    thrust = aside * flip.turn_axis + [0.0, 0.0, -downward]
+    leaning = np.rad2deg(np.arctan2(abs(aside), downward))
+    stages = {stage.name: stage for stage in flip.stage_sequence([], 20.0).stages}
+    for name in ("180°", "540°"):
+        if abs(leaning - 30.0) > 1e-6:
+            assert holds(stages[name], thrust - [0.0, 0.0, G]) == (leaning < 30.0)
+
+
 def test_signed_stages_refuse_the_inverted_thrust_that_the_papers_accept() -> None:
     signed = load_problem("flip-roll")
     first = signed.stages(50.0).stages[0]

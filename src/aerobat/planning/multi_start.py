@@ -17,6 +17,8 @@ from aerobat.errors import Infeasible, Reason, limits_of
 from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
 from aerobat.planning.around.fastest import fastest_around
 from aerobat.planning.around.guesses import guesses
+from aerobat.planning.assessment.assessment import SUSPICIOUS
+from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.miqp.rescue import with_more_intervals
@@ -36,6 +38,8 @@ SEED = 0
 ASIDE = 0.1  # of a path's extent, by which it is bent out of its plane: symmetry is an optimum of its own
 FINISHED = 3  # certified paths, the best of which is kept, where the first touches frames or loses much
 MORE_TIME = 10.0  # [s] of the processor, for a program of more intervals: of nine stages one takes four
+RAISED = (0.25, 0.5, 0.75, 1.0)  # of the reserve, step by step
+RAISING_TIME = 40.0  # [s] of the processor, for all of these: of two flips in a row they take half
 ROUGH_TIME = 0.5  # of the time that is left, where there is a limit, for rough rounds
 
 _Start = tuple[Plan | None, WarmStart]  # a path, and the plan that it is of, if it is one's
@@ -108,7 +112,41 @@ class MultiStart:
             best = min(filter(None, (best, found)), key=_Found.rank, default=None)
             if out_of_time() or (best is not None and best.path.is_clear):
                 break
+        if best is not None and self._lacks_places and not out_of_time():
+            best = self._faster(best)
         return self._or_begun_from(None if best is None else self._plan(best), known)
+
+    @property
+    def _lacks_places(self) -> bool:
+        """True of a course of attitudes alone, which say nothing to the closed forms that it begins at."""
+        stages = self._task.stages
+        return is_course(stages) and not any(stage.is_placed for stage in stages.stages)
+
+    def _faster(self, best: _Found) -> _Found:
+        """A path, or where it is slow the first faster one of programs without a reserve."""
+        task, guess = self._task, replace(self.guess, reserve=0.0)
+        if best.path.duration < SUSPICIOUS * least_duration(task.problem, task.vehicle):
+            return best
+        more = with_more_intervals(guess, task.problem, task.vehicle)
+        with within_time(RAISING_TIME, processor):
+            for planner in chain([guess], (planner for planner, _ in more)):
+                with suppress(Infeasible):
+                    begun = WarmStart.of(planner.plan(task.problem, task.vehicle), task.stages)
+                    found = self._finished(self.refinement, self._at_reserve(begun), best)
+                    if found is not None and found is not best:
+                        return found
+                if out_of_time():
+                    break
+        return best
+
+    def _at_reserve(self, begun: WarmStart) -> list[RefinedPath]:
+        """The rough path near one without a reserve, which is raised in steps; none if one loses its way."""
+        for share in RAISED:
+            task = replace(self._task, reserve=share * self._task.reserve)
+            refinement = replace(self.refinement, task=task)
+            rough = refinement.rough(begun, self._least_segments)
+            begun = rough.path
+        return [rough] if refinement.is_promising(rough) else []
 
     def _or_begun_from(self, found: Plan | None, begun: Sequence[Plan]) -> Plan | None:
         """What was found, or a better one of the plans that it began from, certified and with the reserve."""

@@ -235,6 +235,18 @@ def thrust_in_plane(direction: Array, axis: Array, minimum: float) -> tuple[Cond
     return (across_it, Condition(Quantity.SPECIFIC_THRUST, unit(direction), lower=minimum))
 
 
+def leaning_at_most(direction: Array, axis: Array, angle: float) -> tuple[Condition, ...]:
+    """Specific thrust that leans from `direction` toward `axis`, or away from it, by an angle at most.
+
+    Args:
+        direction: unit vector, world frame, (3,).
+        axis: unit vector normal to it, (3,).
+        angle: less than a right one [rad].
+    """
+    normals = (sign * np.cos(angle) * axis - np.sin(angle) * direction for sign in (1.0, -1.0))
+    return tuple(Condition(Quantity.SPECIFIC_THRUST, normal, upper=0.0) for normal in normals)
+
+
 def across(direction: Array) -> tuple[Array, Array]:
     """Two unit vectors normal to a unit vector and to each other."""
     first = unit(np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))]))

@@ -13,7 +13,15 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import Count, PartialVector, Positive, validated
 from aerobat.errors import SpecError
-from aerobat.problem.condition import THRUST_FRACTION, Condition, Quantity, fixed, free, thrust_in_plane
+from aerobat.problem.condition import (
+    THRUST_FRACTION,
+    Condition,
+    Quantity,
+    fixed,
+    free,
+    leaning_at_most,
+    thrust_in_plane,
+)
 from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.gate_passage import (
     PAPER_INVERTED,
@@ -34,8 +42,10 @@ class Flip(Maneuver):
     one next to it: upside down, tilted by 180°, as in the paper, or at any angle of the turn at which its
     upright lies. Each asks for thrust along its direction: none across it in the plane of the turn, and at
     least `min_lateral_thrust` or, upside down, `min_inverted_thrust` along it, in m/s²; by default fractions
-    of what the vehicle can give. As the paper prints it (`signed` and `ordered` False) the stages at 45° and
-    315° take either sign and the solver may turn either way. The gate is passed as `passage` says.
+    of what the vehicle can give. Upside down the thrust leans out of that plane by 30° at most: quick flips
+    would lean farther and never turn over. As the paper prints it (`signed` and `ordered` False) it leans as
+    it likes, the stages at 45° and 315° take either sign and the solver may turn either way. The gate is
+    passed as `passage` says.
     """
 
     # heading of the axis of the turn, right-handed: 0 turns about +x, 90 about +y, -90 nose up
@@ -54,6 +64,7 @@ class Flip(Maneuver):
 
     ANGLES_DEG: ClassVar[tuple[float, ...]] = (45.0, 90.0, 180.0, 270.0, 315.0)  # of the turn
     APART_DEG: ClassVar[float] = 22.5  # from the gate's: stages that are nearer ask the same
+    INVERTED_WITHIN_DEG: ClassVar[float] = 30.0  # the thrust upside down, out of the plane of the turn
     IN_PLANE_DEG: ClassVar[float] = 0.1  # as exactly as files are written
     SIDES: ClassVar[Mapping[int, str]] = {0: "forward", 1: "left", 2: "back", 3: "right"}
 
@@ -139,6 +150,8 @@ class Flip(Maneuver):
     def _stage(self, angle_deg: float, is_free: bool, max_specific_thrust: float) -> Stage:
         """The stage at an angle of the turns; upside down at its position where no gate is passed."""
         asked = self._in_plane(angle_deg, self._min_thrust(angle_deg, max_specific_thrust))
+        if self.signed and _is_inverted(angle_deg):
+            asked += leaning_at_most(-UP, self.turn_axis, np.deg2rad(self.INVERTED_WITHIN_DEG))
         there = fixed(Quantity.POSITION, self.position) if is_free and angle_deg == 180.0 else ()
         return Stage(f"{angle_deg:g}°", (*there, *asked))
 
