@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from decimal import Decimal
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -211,11 +212,20 @@ def test_a_share_is_of_one_flight_or_more_and_no_more_than_all(count: int, of: i
         Share(count, of)
 
 
+def test_a_range_is_rounded_outward_so_that_it_excludes_nothing_of_the_interval() -> None:
+    assert Share(772, 800).interval[0] < 0.95
+    assert Share(772, 800).range == "94.9 to 97.7 %"
+    for count in range(1000):
+        low, high = Share(count, 999).interval
+        first, _, last, _ = Share(count, 999).range.split()
+        assert Decimal(first) <= 100 * Decimal(low) <= 100 * Decimal(high) <= Decimal(last)
+
+
 @pytest.mark.parametrize(
     ("count", "of", "text"),
     [
-        (0, 10, "0 % (0 to 30.8 %)"),
-        (999_999, 10**6, "99.9999 % (99.999 to 99.999997 %)"),
+        (0, 10, "0 % (0 to 30.9 %)"),
+        (999_999, 10**6, "99.9999 % (99.999 to 99.999998 %)"),
         (1, 10**5, "0.001 %"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
 from typing import ClassVar
 
 from aerobat.arrays import Mask
@@ -54,20 +55,28 @@ class Share:
 
     @property
     def range(self) -> str:
-        """The interval in percent."""
+        """The interval in percent, rounded outward, so that its text excludes nothing that it holds."""
         low, high = self.interval
-        return f"{percent(low)} to {percent(high)} %"
+        return f"{percent(low, ROUND_FLOOR)} to {percent(high, ROUND_CEILING)} %"
 
     def __str__(self) -> str:
         """The share in percent, with its interval."""
         return f"{percent(self.fraction)} % ({self.range})"
 
 
-def percent(fraction: float) -> str:
-    """A fraction in percent, with the digits that tell it from none and from all."""
-    value = 100.0 * fraction
-    texts = (f"{value:.{digits}f}" for digits in range(1, MAX_DIGITS + 1))
-    return next((text for text in texts if float(text) not in (0.0, 100.0)), f"{value:.0f}")
+def percent(fraction: float, rounding: str = ROUND_HALF_EVEN) -> str:
+    """A fraction in percent, with the digits that tell it from none and from all.
+
+    Args:
+        fraction: From 0 to 1 [-].
+        rounding: One of the modes of `decimal`.
+    """
+    value = Decimal(100.0 * fraction)
+    for digits in range(1, MAX_DIGITS + 1):
+        last = Decimal(1).scaleb(-digits)
+        if {value.quantize(last, mode) for mode in (ROUND_HALF_EVEN, rounding)}.isdisjoint((0, 100)):
+            return f"{value.quantize(last, rounding)}"
+    return f"{value:.0f}"
 
 
 @dataclass(frozen=True)
