@@ -46,7 +46,7 @@ CURVES = 1.3  # [in] the height of the distributions
 
 @validated
 def sweep_figure(sweep: Sweep) -> Figure:
-    """Draw a page on a sweep: errors over time, crossings of gates, outcomes, distributions of errors.
+    """Draw a page on a sweep: errors over time, crossings of gates, outcomes, distributions of distances.
 
     Bands over time are those of the flights that are sampled, the first ones. What went wrong is red.
     """
@@ -135,22 +135,23 @@ def _draw_outcomes(figure: Figure, sweep: Sweep, left: float, bottom: float) -> 
 
 
 def _draw_distributions(figure: Figure, sweep: Sweep, left: float, bottom: float) -> None:
-    """Draw the share of flights that keep within an error: the largest, and that in the two worst gates."""
+    """Draw the share of flights within a largest error, and within distances from the two worst gates."""
     axes = panel(figure, left, bottom, THIRD, CURVES)
     worst = sorted(sweep.passages, key=lambda name: sweep.quantile(f"{name}_miss_m", 0.95))[-2:]
-    columns = {"largest": "max_position_error_m"} | {name: f"{name}_miss_m" for name in worst}
+    columns = {"largest error": "max_position_error_m"} | {name: f"{name}_miss_m" for name in worst}
     shares = 100.0 * np.arange(1, len(sweep) + 1) / len(sweep)
     for (name, column), colour in zip(columns.items(), (INK, BLUE, SKY), strict=False):
-        errors = np.sort(sweep.table[column])
-        axes.step(100.0 * errors, shares, where="post", color=colour, label=name)
+        distances = np.sort(sweep.table[column])
+        axes.step(100.0 * distances, shares, where="post", color=colour, label=name)
     axes.axhline(95.0, color=MUTED, linewidth=0.8, linestyle=(0, (4, 2)))
     ends = [100.0 * sweep.quantile(column, 0.99) for column in columns.values()]
     widest = max(filter(isfinite, ends), default=1.0)
-    axes.set(xlim=(0.0, widest), ylim=(0.0, 102.0), xlabel="position error [cm]", ylabel="flights within [%]")
+    label = "error, or distance from the gate's centre [cm]" if worst else "position error [cm]"
+    axes.set(xlim=(0.0, widest), ylim=(0.0, 102.0), xlabel=label, ylabel="flights within [%]")
     axes.set_yticks([0, 50, 95], ["0", "50", "95"])
     axes.locator_params(axis="x", nbins=5)
     legend(axes, above=0.1)  # where the note would be: names need the width
-    heading(axes, "Errors" if len(worst) == len(sweep.passages) else "Errors, in the worst gates")
+    heading(axes, "Distances" if len(worst) == len(sweep.passages) else "Distances, in the worst gates")
 
 
 def known_opening(sweep: Sweep, passage: str) -> Opening | None:
