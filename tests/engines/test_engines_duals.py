@@ -111,9 +111,10 @@ def test_at_a_kink_the_slope_is_that_of_the_second_and_the_root_of_zero_has_none
 def test_powers_and_comparisons_are_those_of_values() -> None:
     x = Dual(2.0, 5.0)
     assert ((x**3).value, (x**3).tangent) == (8.0, 60.0)
-    compared = (operator.lt, operator.le, operator.gt, operator.ge)
-    assert [f(x, 2.0) for f in compared] == [False, True, False, True]
-    assert [f(1.0, x) for f in compared] == [True, True, False, False]
+    compared = (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne)
+    assert [f(x, 2.0) for f in compared] == [False, True, False, True, True, False]
+    assert [f(1.0, x) for f in compared] == [True, True, False, False, False, True]
+    assert x == Dual(2.0, 7.0) != Dual(3.0, 5.0)
 
 
 def begin(ops: Any, rate: Any, push: Any) -> Any:

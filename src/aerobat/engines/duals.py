@@ -63,6 +63,14 @@ class Dual:
     def __pow__(self, exponent: int) -> Dual:
         return Dual(self.value**exponent, _product(self.tangent, exponent * self.value ** (exponent - 1)))
 
+    def __eq__(self, other: Any) -> Any:
+        return self.value == _parts(other)[0]
+
+    def __ne__(self, other: Any) -> Any:
+        return self.value != _parts(other)[0]
+
+    __hash__ = object.__hash__
+
     def __lt__(self, other: Any) -> Any:
         return self.value < _parts(other)[0]
 
