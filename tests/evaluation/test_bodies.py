@@ -141,10 +141,12 @@ def test_the_smallest_opening_counts_flights_that_never_got_there_and_knows_when
     heights[:20] = np.nan
     assert ab.smallest_opening(needing(widths, heights), gate).scale == np.inf
     heights[:20] = 0.15
-    with pytest.raises(SpecError, match=r"scores of 298 flights cannot vouch for 99 % .*; score 299 flights"):
+    with pytest.raises(
+        SpecError, match="99 % with 95 % confidence takes the scores of 299 flights or more, got 298"
+    ):
         ab.smallest_opening(needing(widths[:298], heights[:298]), gate)
     assert ab.smallest_opening(needing(widths[:299], heights[:299]), gate).scale == pytest.approx(0.6)
-    with pytest.raises(SpecError, match=r"scores of 1 flights cannot vouch for 99 % .*; score 299 flights"):
+    with pytest.raises(SpecError, match="takes the scores of 299 flights or more, got 1; score more"):
         ab.smallest_opening(scored()[0], gate)
     with pytest.raises(SpecError, match="no gate named 'other'"):
         ab.smallest_opening(needing(widths, heights), replace(gate, name="other"))

@@ -111,8 +111,8 @@ def test_the_course_of_the_record_has_19_waypoints_in_three_laps() -> None:
         ),
         (
             {"elements": [{"kind": "gate", "gate": "red"}, {"kind": "half-flip"}]},
-            "maneuver.elements[1]: a half-flip passes one gate, there is none; give one table [[gates]] with "
-            "a position, or the name of its gate",
+            "maneuver.elements[1]: a half-flip passes one gate, there are none; give one table [[gates]] "
+            "with a position, or the name of its gate",
         ),
         (
             {"elements": [{"kind": "power-loop"}]},

@@ -194,7 +194,7 @@ def test_two_gates_of_one_name_are_refused() -> None:
 
 
 def test_a_flip_through_two_gates_is_refused() -> None:
-    with pytest.raises(SpecError, match="a flip passes one gate, there is 2"):
+    with pytest.raises(SpecError, match="a flip passes one gate, there are 2"):
         ab.Problem("two", START, GOAL, ab.Flip(), THREE[:2])
 
 

@@ -142,6 +142,10 @@ MEANT: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: ab.plan(LINE, ab.Miqp),
         "planner must be a Planner or a name, got the class Miqp; make one, as Miqp()",
     ),
+    "a number for a planner": (
+        lambda: ab.compare(LINE, QUAD, [3]),  # type: ignore[list-item]
+        "compare: planners[0] must be a tuple of a name and a Planner, a Planner or a name, got 3",
+    ),
     "a vehicle for the plan": (
         lambda: ab.fly(QUAD, plan()),
         "fly: plan must be a plan or a Trajectory, got a Vehicle; did you mean vehicle=...?",

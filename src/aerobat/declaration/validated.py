@@ -259,6 +259,8 @@ def _described(hint: Any) -> str:
         return "a name"
     if hint is ArrayLike or get_origin(hint) is np.ndarray:
         return "numbers"
+    if get_origin(hint) is tuple and ... not in get_args(hint):
+        return f"a tuple of {' and '.join(map(_described, get_args(hint)))}"
     if get_origin(hint) in (Sequence, tuple, Mapping):
         return "a list of them"
     if hint in (int, float):

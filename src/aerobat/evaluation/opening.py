@@ -92,8 +92,8 @@ def opening_of(
     least = ceil(log(1.0 - confidence) / log(probability))
     if len(scales) < least:
         raise SpecError(
-            f"scores of {len(scales)} flights cannot vouch for {100 * probability:g} % with "
-            f"{100 * confidence:g} % confidence; score {least} flights or more"
+            f"to vouch for {100 * probability:g} % with {100 * confidence:g} % confidence takes the scores "
+            f"of {least} flights or more, got {len(scales)}; score more"
         )
     scale = float(scales[_rank(len(scales), probability, confidence) - 1])
     width, height = gate.opening.size.tolist()

@@ -300,10 +300,9 @@ def passed_gate(gates: Sequence[Gate], name: str | None, maneuver: str) -> Gate:
     if name is not None:
         return named_gate(gates, name)
     if len(gates) != 1:
-        has = "none" if not gates else str(len(gates))
         raise SpecError(
-            f"a {maneuver} passes one gate, there is {has}; give one table [[gates]] with a position, "
-            "or the name of its gate"
+            f"a {maneuver} passes one gate, there are {len(gates) or 'none'}; give one table "
+            "[[gates]] with a position, or the name of its gate"
         )
     return gates[0]
 
