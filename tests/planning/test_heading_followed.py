@@ -14,6 +14,7 @@ from aerobat.declaration import from_table, to_table
 from aerobat.errors import Infeasible, SpecError
 from aerobat.planning.heading.follow import heading_error, with_heading
 from aerobat.planning.heading.yaw_spline import YawSpline
+from aerobat.reporting.facts import facts
 from aerobat.trajectory import Trajectory
 from shared_plans import shared_plan
 
@@ -74,6 +75,39 @@ def test_what_turns_too_fast_is_followed_as_far_as_rotors_go() -> None:
     assert plan.certified
     assert error is not None
     assert error.largest > np.deg2rad(5.0)
+
+
+@pytest.mark.parametrize("plan", ["line", "half-flip"])
+def test_a_turn_leaves_the_controller_half_of_its_reserve(plan: str) -> None:
+    assert following(plan, mode="spline", knots_deg=[[0.4, 0.0], [0.6, 360.0], [1.0, 0.0]]).keeps(
+        0.5 * RESERVE
+    )
+
+
+def test_a_path_that_keeps_no_reserve_is_turned_within_its_limits() -> None:
+    still = shared_plan("line")
+    asked = ab.Heading(mode="spline", knots_deg=[[0.5, 90.0], [1.0, 180.0]])
+    plan = with_heading(replace(still, problem=replace(still.problem, heading=asked)), 0.32)
+    assert not still.keeps(0.16)
+    assert plan.certified
+    assert np.abs(plan.trajectory.yaw).max() > 0.5
+
+
+def test_an_error_beyond_a_hundred_degrees_is_reported_in_whole_degrees() -> None:
+    plan = shared_plan("line")
+    turned = replace(
+        plan,
+        problem=replace(plan.problem, heading=ab.Heading(mode="fixed")),
+        trajectory=replace(plan.trajectory, heading=np.deg2rad(135.0)),
+    )
+    (fact,) = (fact for fact in facts(turned) if fact.label == "heading")
+    assert fact.text.startswith("fixed, 135° off, at worst 135° at ")
+
+
+def test_a_turn_is_sought_between_none_and_what_is_asked() -> None:
+    error = heading_error(following("half-flip", mode="spline", knots_deg=[[0.1, 120.0], [1.0, 120.0]]))
+    assert error is not None
+    assert error.median < np.deg2rad(60.0)  # 80°, where only no turn and whole ones begin a search
 
 
 @pytest.mark.slow

@@ -48,7 +48,7 @@ def _(plan: Plan) -> Iterator[Fact]:
     off = heading_error(plan)
     if off is not None:
         most, usual = degrees(off.largest), degrees(off.median)
-        text = f"{plan.problem.heading.mode}, {usual:.2g}° off, at worst {most:.3g}° at {off.time:.2f} s"
+        text = f"{plan.problem.heading.mode}, {usual:.3g}° off, at worst {most:.3g}° at {off.time:.2f} s"
         yield Fact("heading_error_deg", most, "heading", text, level=REPORT)
         yield from kept(heading_error_median_deg=usual, heading_error_time_s=off.time)
     dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "

@@ -25,7 +25,9 @@ from aerobat.problem.heading import Heading, HeadingMode
 from aerobat.states import FlatState
 
 SHARE = 0.5  # of the reserve that the path keeps for the controller, which turning leaves to it
-PLACES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])  # of each part, where limits are looked at: off its knots
+# of each part, where limits are looked at: off its knots, and closer beside them, where limits are steep
+PLACES = 0.5 - 0.5 * np.cos(np.pi * np.array([0.006, *np.arange(1, 8) / 8, 0.994]))
+SPANS = np.diff(0.5 * (PLACES[1:] + PLACES[:-1]), prepend=0.0, append=1.0)  # of it, which these stand for
 SMOOTH = 1e-6  # [s⁶] of the third derivative's square: what is asked faster than some 10 rad/s is rounded
 ASKED = 0.3  # [-] of full weight from which on what is asked counts
 AT_ITS_END = 0.5  # of its size, how near to its end a limit may be to matter to a step
@@ -33,15 +35,18 @@ SLACK = 1e-3  # of its size, by which a sampled limit may be exceeded
 REACH, LEAST_REACH = 0.6, 2e-3  # [rad] of a step at first, and of the last
 ROUNDS = 60
 SMOOTHER = (1.0, 30.0, 1000.0)  # times as smooth as need be, where a search begins
+PART = 0.4  # of the smoother ones of these turns, where it begins too: whole ones may be too far off limits
 RESTORED = 0.5  # of what is exceeded, that a step takes away
 ENOUGH = 1e-4  # of the cost, that a step has to gain
 # what is kept more of limits' sizes, and how much of the turn is left, where a certificate refutes samples
-TRIES = ((0.0, 1.0), (0.02, 1.0), (0.02, 0.6), (0.02, 0.3), (0.02, 0.0))
+WHOLE = tuple((more, 1.0) for more in (0.0, 0.005, 0.01, 0.02, 0.04, 0.08))
+TRIES = (*WHOLE, (0.08, 0.6), (0.08, 0.3), (0.08, 0.0))
 
 
 def with_heading(plan: Plan, reserve: float) -> Plan:
     """Return a plan whose body follows its problem's heading; itself where that is free.
 
+    The first turn is taken that leaves the rotors SHARE of the reserve, else the first that is certified.
     Raises Infeasible where the heading's tolerance is not kept.
 
     Args:
@@ -51,13 +56,16 @@ def with_heading(plan: Plan, reserve: float) -> Plan:
     heading = plan.problem.heading
     if heading.mode is HeadingMode.FREE or plan.vehicle is None:
         return plan
-    spline = YawSpline.along(plan.trajectory)
+    spline, tried = YawSpline.along(plan.trajectory), []
     for more, left in TRIES:
         task = Task.of(plan.problem, plan.vehicle, SHARE * reserve + more)
         found = _turned(plan, spline, _YawProgram(task, heading, spline).best(left))
-        if found.certified or not plan.certified:
+        if found.keeps(SHARE * reserve) or not plan.certified:
             break
+        tried.append(found)
     else:
+        found = next((each for each in tried if each.certified), found)
+    if plan.certified and not found.certified:
         why = "" if found.certificate is None else found.certificate.why
         sentence = f"no turn is proven that follows the heading: {why}; leave more with --reserve"
         raise Infeasible(Reason(sentence, ("heading", "reserve")))
@@ -180,7 +188,7 @@ class _YawProgram:
     @cached_property
     def _seconds(self) -> Array:
         """The time that each place stands for [s], (m,)."""
-        return np.repeat(self.spline.seconds, len(PLACES)) / len(PLACES)
+        return np.outer(self.spline.seconds, SPANS).ravel()
 
     def _yaw(self, x: Array) -> Array:
         """The yaw and its derivatives, (4, m)."""
@@ -195,10 +203,11 @@ class _YawProgram:
         return value.T @ off + third.T @ (bend * yaw[3]), hessian
 
     def _starts(self) -> list[Array]:
-        """No turn at all, and what would be followed, the smoother the less, if there were no limits."""
+        """No turn; what would be followed without limits, the smoother the less; parts of the smoother."""
         still = np.zeros(self._ends[0].shape[1])
         slopes = [self._slopes(self._yaw(still), SMOOTH * more) for more in SMOOTHER]
-        return [still, *(np.asarray(-np.linalg.solve(hessian, gradient)) for gradient, hessian in slopes)]
+        whole = [np.asarray(-np.linalg.solve(hessian, gradient)) for gradient, hessian in slopes]
+        return [still, *whole, *(PART * turn for turn in whole[1:])]
 
     def _rank(self, x: Array) -> tuple[float, float]:
         """By how much limits are exceeded, slack aside, and the cost."""
