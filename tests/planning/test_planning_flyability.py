@@ -57,6 +57,14 @@ def test_flyability_is_the_score_of_the_plan_s_own_flight(plan: ab.Plan) -> None
     assert plan.flies
 
 
+def test_where_unequal_drag_tilts_the_path_in_a_gate_a_larger_tolerance_is_the_remedy() -> None:
+    for drag, unequal in (((0.0, 0.8, 0.0), True), ((0.4, 0.4, 0.0), False)):
+        tilted = shared_plan("half-flip").for_vehicle(replace(QUAD, drag_body=drag))
+        assert tilted.certificate is not None
+        assert "attitude" in {f.name for f in tilted.certificate.findings if f.verdict == "violated"}
+        assert ("attitude_tolerance_deg" in flyability(tilted).remedy) is unequal
+
+
 def test_the_reserve_is_what_the_certificate_leaves(plan: ab.Plan) -> None:
     assert plan.certificate is not None
     assert plan.vehicle is not None

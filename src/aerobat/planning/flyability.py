@@ -15,7 +15,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import isinf, isnan, radians
 
+from aerobat.certification import Verdict
+from aerobat.certification.path.passages import passage_findings
 from aerobat.environment import Environment
+from aerobat.flatness import has_unequal_drag
 from aerobat.planning.passages import PlacedStage, planned_passages
 from aerobat.planning.task import Task
 from aerobat.simulation.config import FlightConfig
@@ -98,10 +101,16 @@ class Flyability(OwnFlight):
     disturbance: float  # [N] by which every rotor may miss its thrust; 0 where nothing is left
     disturbed_fraction: float  # [-] the same over the largest thrust of a rotor
     disturbed_error: float  # [m] the largest position error where all rotors give less by that fraction
+    tilted_by_drag: bool = False  # the path misses a gate's attitude, as drag differs along body x and y
 
     @property
     def remedy(self) -> str:
         """The remedies that may mend the plan's defects, in words; empty where there are none."""
+        if self.tilted_by_drag:
+            return (
+                "drag differs along body x and y, and attitudes in gates are planned for the mean of it: "
+                "allow the gates more attitude_tolerance_deg"
+            )
         found = []
         if self.lingers:
             found.append("ask more speed of the passage or widen the opening")
@@ -172,7 +181,15 @@ def own_flights(
         disturbance=disturbance,
         disturbed_fraction=fraction,
         disturbed_error=_largest_error(disturbed),
+        tilted_by_drag=has_unequal_drag(task.vehicle) and _is_tilted(task, trajectory, stages),
     )
+
+
+def _is_tilted(task: Task, trajectory: Trajectory, stages: Sequence[PlacedStage]) -> bool:
+    """True if the path itself, whatever its flight, misses the attitude of a gate."""
+    passages = planned_passages(stages, task.problem)
+    findings = passage_findings(trajectory, passages, task.vehicle, task.environment)
+    return any(each.name == "attitude" and each.verdict is Verdict.VIOLATED for each in findings)
 
 
 @lru_cache(maxsize=2)
