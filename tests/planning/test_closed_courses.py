@@ -269,3 +269,15 @@ def test_a_closed_course_around_an_obstacle_is_certified_clear_of_it() -> None:
     found = ab.plan(STANDING, ab.FreeKnots(reserve=0.03), QUAD)
     assert found.certified
     assert any("clearance" in finding.name for finding in found.certificate.findings)
+
+
+def test_laps_whose_stages_come_in_any_order_end_with_the_latest_of_them() -> None:
+    x = np.eye(3)[0]
+    stages = tuple(
+        ab.Stage(f"at {place:g} m", (ab.Condition("position", x, place, place),), lap=lap)
+        for place, lap in ((1.0, 1), (2.0, 1), (4.0, 2), (3.0, 2))
+    )
+    ends = ab.at_rest((0.0, 0.0, 0.0)), ab.at_rest((5.0, 0.0, 0.0))
+    plan = ab.plan(ab.Problem("straight", *ends, ab.CustomManeuver(stages, ordered=False)), ab.Miqp(), None)
+    times = {stage.name: stage.time for stage in plan.stages}
+    assert plan.laps == (times["at 2 m"], times["at 4 m"])

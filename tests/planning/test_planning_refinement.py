@@ -142,7 +142,8 @@ def test_a_window_narrower_than_an_interval_is_met_unless_intervals_are_asked_fo
         plan(problem, Miqp(intervals=20), quad)
 
 
-@pytest.mark.parametrize("name", ["free-knots", pytest.param("time-optimal", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["free-knots", "time-optimal"])
 def test_what_more_intervals_lead_to_is_a_start_of_every_planner(name: str, quad: Vehicle) -> None:
     """Of 20 intervals none that may end in its window is early enough for the stage."""
     aside = Condition(Quantity.POSITION, AXES[1], 0.2, 0.2)

@@ -122,5 +122,5 @@ def test_each_series_of_the_table_is_an_attribute_and_nothing_else_is() -> None:
         assert getattr(flight, series.name) is flight.series[series.name]
     np.testing.assert_array_equal(flight.states.velocity, flight.velocity)
     np.testing.assert_array_equal(flight.setpoint.wrench.thrust, flight.setpoint_thrust)
-    with pytest.raises(AttributeError, match="a flight has no 'thrust'; its series are position"):
+    with pytest.raises(AttributeError, match="this flight has no 'thrust'; its series are position"):
         flight.thrust  # noqa: B018

@@ -13,7 +13,7 @@ from aerobat.declaration import PathName, by_value, in_notebooks, validated
 from aerobat.planning.assessment.assessment import Assessment, SecondOpinion
 from aerobat.planning.evidence import Evidence
 from aerobat.planning.flyability import Flyability
-from aerobat.planning.passages import PlacedStage
+from aerobat.planning.passages import PlacedStage, timed_stages
 from aerobat.planning.recorder import Attempt, Progress
 from aerobat.planning.rotor_margin import RotorMargin, reserve_shortfalls
 from aerobat.planning.task import Task
@@ -130,10 +130,10 @@ class Plan:
 
         They end with their last stages, those of a closed course as long after that as it is to the seam.
         """
-        stages = self.problem.stages(1.0).stages
-        if len(stages) != len(self.stages):
+        if len(self.problem.stages(1.0).stages) != len(self.stages):
             return ()
-        ends = {stage.lap: place.time for stage, place in zip(stages, self.stages, strict=True)}
+        in_time = sorted(self.stages, key=lambda place: place.time)
+        ends = {stage.lap: time for stage, time in timed_stages(in_time, self.problem)}
         if self.problem.ends:
             return tuple(ends.values()) if len(ends) > 1 else ()
         to_seam = self.duration - max(ends.values())
