@@ -10,7 +10,7 @@ from aerobat.arrays import AXES
 from aerobat.limits.limit import Asked, Limit, size_of
 from aerobat.limits.quantity import PATH_SHAPE, PathQuantity
 from aerobat.problem import Limits
-from aerobat.problem.problem import DERIVATIVES, UNITS
+from aerobat.problem.limits import DERIVATIVES, UNITS
 
 UP = AXES.index("z")
 # the fields that bound each derivative of position, in sentences

@@ -16,7 +16,7 @@ from aerobat.flatness.references import has_unequal_drag
 from aerobat.limits.limit import SMALLEST_SIZE, Asked, Limit
 from aerobat.limits.quantity import PATH_SHAPE, UPRIGHT, PathQuantity
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
-from aerobat.problem.problem import UNITS
+from aerobat.problem.limits import UNITS
 
 FIELD = "path_constraints"  # of the maneuver
 

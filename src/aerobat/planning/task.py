@@ -17,7 +17,8 @@ from aerobat.limits.along import limits_along
 from aerobat.limits.limit import Limit
 from aerobat.planning.passages import PlacedStage, gaps_at_ends, planned_passages, planned_waypoints
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
-from aerobat.problem.problem import Limits, Problem
+from aerobat.problem.limits import Limits
+from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.vehicle import Vehicle
 

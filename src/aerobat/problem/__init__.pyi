@@ -4,6 +4,7 @@ from .end_state import EndState, at_rest
 from .files import as_problem, load_problem, problem_names, problem_text, write_problem
 from .gate import Gate, tilted_gate
 from .heading import Heading
+from .limits import PAPER_LIMITS, Limits
 from .maneuvers import (
     BarrelRoll,
     Corkscrew,
@@ -29,7 +30,7 @@ from .maneuvers import (
 )
 from .maneuvers.maneuver import maneuver, registered_maneuvers
 from .planned_passage import PlannedPassage, PlannedWaypoint
-from .problem import PAPER_LIMITS, Limits, Problem
+from .problem import Problem
 from .stage import Stage, StageSequence
 from .tolerance import Tolerance
 from .wall import Wall

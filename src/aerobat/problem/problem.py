@@ -15,14 +15,10 @@ from pydantic import AfterValidator, PlainValidator
 
 from aerobat.arrays import Array
 from aerobat.declaration import (
-    Corner,
-    Derivative,
     FieldError,
     Label,
     NonNegative,
-    PerAxis,
     Positive,
-    TiltLimit,
     declared,
     from_table,
     in_degrees,
@@ -39,74 +35,14 @@ from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.end_state import EndState
 from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.heading import Heading, as_heading
+from aerobat.problem.limits import DERIVATIVES, PAPER_LIMITS, UNITS, Limits
 from aerobat.problem.maneuvers.line import Line
 from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver
 from aerobat.problem.stage import StageSequence
 from aerobat.problem.tolerance import Tolerance
 
-DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle")
-UNITS = ("m", "m/s", "m/s²", "m/s³", "m/s⁴", "m/s⁵")
 ROUNDING = 1e-9  # of a bound's size
 MIN_PLACES = 2  # of a closed course: between fewer there is no way
-
-
-def _unbounded() -> Array:
-    return np.full(3, np.inf)
-
-
-@declared
-class Limits:
-    """Bounds on a path, per axis as in the paper's (1), and on its tilt; infinite where nothing is asked.
-
-    `lower` and `upper` bound the position, `max_tilt` the attitude; the others bound the magnitude of each
-    component of a derivative.
-    """
-
-    lower: Corner = field(default_factory=lambda: -_unbounded())  # [m] corner of the volume allowed
-    upper: Corner = field(default_factory=_unbounded)  # [m] opposite corner
-    velocity: PerAxis = field(default_factory=_unbounded)  # [m/s] largest magnitude
-    acceleration: PerAxis = field(default_factory=_unbounded)  # [m/s²] largest magnitude
-    jerk: PerAxis = field(default_factory=_unbounded)  # [m/s³] largest magnitude
-    snap: PerAxis = field(default_factory=_unbounded)  # [m/s⁴] largest magnitude
-    crackle: PerAxis = field(default_factory=_unbounded)  # [m/s⁵] largest magnitude
-    max_tilt: TiltLimit = np.inf  # [rad] largest angle between the thrust axis and the vertical
-
-    SHORTHANDS: ClassVar[Mapping[str, str]] = {"max_tilt_deg": "[deg] `max_tilt` in degrees"}
-
-    def __post_init__(self) -> None:
-        """Check."""
-        if not (self.lower < self.upper).all():
-            raise FieldError("lower", "must be below upper on every axis")
-
-    @validated
-    def of(self, derivative: Derivative) -> tuple[Array, Array]:
-        """The lower and upper bounds of a derivative of position, each (3,)."""
-        if derivative == 0:
-            return self.lower, self.upper
-        bound = np.asarray(getattr(self, DERIVATIVES[derivative]))
-        return -bound, bound
-
-    @validated
-    def without(self, derivative: Derivative) -> Limits:
-        """The same limits with those on one derivative taken away."""
-        if derivative == 0:
-            return replace(self, lower=np.full(3, -np.inf), upper=np.full(3, np.inf))
-        bounds: dict[str, Any] = {DERIVATIVES[derivative]: np.inf}
-        return replace(self, **bounds)
-
-    def tightened(self, derivative: int, below: Array, above: Array) -> Limits:
-        """The same limits, one derivative's tighter: by `below` at its lower ends, `above` at its upper ones.
-
-        Raises SpecError when nothing is left between them.
-        """
-        if derivative == 0:
-            return replace(self, lower=self.lower + below, upper=self.upper - above)
-        bound = self.of(derivative)[1] - np.maximum(below, above)
-        tighter: dict[str, Any] = {DERIVATIVES[derivative]: bound}
-        return replace(self, **tighter)
-
-
-PAPER_LIMITS = Limits(velocity=10.0, acceleration=90.0, jerk=200.0)  # the authors' reference code
 
 
 def _file_name(name: str) -> str:

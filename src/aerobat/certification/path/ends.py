@@ -8,7 +8,7 @@ import numpy as np
 
 from aerobat.certification.certificate import Finding, Side, Verdict
 from aerobat.problem import EndState
-from aerobat.problem.problem import DERIVATIVES, UNITS
+from aerobat.problem.limits import DERIVATIVES, UNITS
 from aerobat.trajectory import Trajectory
 
 # [m, m/s, m/s²] by which an end may miss its state: what solvers leave adds up to a tenth of it

@@ -12,7 +12,7 @@ from aerobat.certification.certificate import Finding, Side
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.queries import ChebyshevSeries, ExtremumQuery, root, within
 from aerobat.limits.limit import Limit
-from aerobat.problem.problem import DERIVATIVES
+from aerobat.problem.limits import DERIVATIVES
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 

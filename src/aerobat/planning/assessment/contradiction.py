@@ -15,7 +15,8 @@ from aerobat.flatness import force_balance
 from aerobat.limits.box import FIELDS, field_with_value
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.problem.condition import Condition, LinearBound, Quantity
-from aerobat.problem.problem import Limits, Problem
+from aerobat.problem.limits import Limits
+from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.vehicle import Vehicle
 

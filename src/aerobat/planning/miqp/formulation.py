@@ -22,7 +22,8 @@ from aerobat.planning.miqp.integrator import INPUT_NAMES, IntegratorChain
 from aerobat.planning.task import Task
 from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.end_state import VELOCITY
-from aerobat.problem.problem import DERIVATIVES, Problem
+from aerobat.problem.limits import DERIVATIVES
+from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 
 

@@ -31,7 +31,8 @@ from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.search import GridSearch, Search
 from aerobat.planning.task import Task
 from aerobat.planning.time_limit import TIME_LIMIT, stopped, too_short
-from aerobat.problem.problem import Limits, Problem
+from aerobat.problem.limits import Limits
+from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 

@@ -36,7 +36,7 @@ from aerobat.planning.refinement.stage_values import StageValues
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.problem import UNITS
+from aerobat.problem.limits import UNITS
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory, polynomial
 

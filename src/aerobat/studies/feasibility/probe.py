@@ -14,7 +14,7 @@ from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning import Plan, plan
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.rotor_margin import reserve_shortfalls
-from aerobat.problem.problem import UNITS
+from aerobat.problem.limits import UNITS
 from aerobat.studies.lens import Scenario
 
 AS_NEAR = 0.01  # of a limit's size: closer than plans that use all of it come to tell apart

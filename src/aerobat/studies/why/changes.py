@@ -12,7 +12,8 @@ from aerobat.planning import Planner
 from aerobat.planning.task import max_specific_thrust
 from aerobat.problem import CustomManeuver
 from aerobat.problem.condition import Condition
-from aerobat.problem.problem import DERIVATIVES, Problem
+from aerobat.problem.limits import DERIVATIVES
+from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.studies.lens import lens
 from aerobat.vehicle import Vehicle
