@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import isinf, isnan, radians
 
-from aerobat.certification import Verdict
+from aerobat.certification.certificate import Verdict
 from aerobat.certification.path.passages import passage_findings
 from aerobat.environment import Environment
 from aerobat.flatness import has_unequal_drag
