@@ -281,3 +281,9 @@ def test_laps_whose_stages_come_in_any_order_end_with_the_latest_of_them() -> No
     plan = ab.plan(ab.Problem("straight", *ends, ab.CustomManeuver(stages, ordered=False)), ab.Miqp(), None)
     times = {stage.name: stage.time for stage in plan.stages}
     assert plan.laps == (times["at 2 m"], times["at 4 m"])
+
+
+def test_a_closed_course_without_time_is_not_sent_to_a_planner_that_refuses_it() -> None:
+    with pytest.raises(ab.Infeasible, match=r"allow more with --time-limit$") as refused:
+        ab.plan(SHORT, ab.FreeKnots(time_limit=0.0), "agile-quad")
+    assert "miqp" not in str(refused.value)

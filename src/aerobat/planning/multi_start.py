@@ -81,8 +81,8 @@ class MultiStart:
         where = "between obstacles no way was found, and " if is_closed else ""
         sentence = (
             f"no path of '{task.problem.name}' is certified for {task.vehicle.name}: {where}at the last "
-            f"attempt {last}, which does not prove that there is none; widen what binds there, or give "
-            "other --segments"
+            f"attempt {last}, which does not prove that there is none; widen what binds there, or give other "
+            f"--segments{', or take --planner time-optimal' * (self.planner == 'free-knots')}"
         )
         raise Infeasible(Reason(sentence, limits_of(last)), recorder.attempts)
 

@@ -39,7 +39,9 @@ def best_in_time(
         if found is not None:
             return stopped(found)
         if out_of_time():
-            raise too_short(problem, limit, recorder.attempts)
+            # closed courses are no problem of miqp's
+            remedy = "take the planner miqp, which is quick" if problem.ends else ""
+            raise too_short(problem, limit, recorder.attempts, remedy)
     return None
 
 
@@ -58,7 +60,7 @@ def too_short(
     problem: Problem,
     limit: float | None,
     attempts: Sequence[Attempt],
-    remedy: str = "take the planner miqp, which is quick",
+    remedy: str,
 ) -> Infeasible:
     """The error of a search whose time was over before anything was found.
 
@@ -66,11 +68,12 @@ def too_short(
         problem: What was planned.
         limit: The planner's own [s]; None where another's ended it.
         attempts: What was tried.
-        remedy: What else may help.
+        remedy: What else may help; empty where nothing does.
     """
     given = "the time given" if limit is None else f"{limit:g} s"
     return Infeasible(
-        f"no plan of '{problem.name}' was found in {given}; allow more with --time-limit, or {remedy}",
+        f"no plan of '{problem.name}' was found in {given}; "
+        f"{' or '.join(filter(None, ('allow more with --time-limit', remedy)))}",
         tuple(attempts),
         remedy="",
     )
