@@ -45,7 +45,6 @@ def least_gap(plan: ab.Plan) -> float:
     return float(world.pieces.separated(pieces, centres[bodies], shapes[bodies]).gaps.min(initial=np.inf))
 
 
-@pytest.mark.slow
 def test_a_plan_keeps_its_clearance_from_what_stands_in_its_way() -> None:
     plan = ab.plan(hall(trunk(4.0, 0.1)), ab.FreeKnots(segments=6, reserve=0.15, clearance=0.1), QUAD)
     assert plan.certified
@@ -66,7 +65,7 @@ def test_a_round_hole_in_a_wall_is_passed_with_half_of_the_room_that_it_leaves()
 
 
 @pytest.mark.slow
-def test_where_something_stands_paths_that_knew_nothing_of_it_are_tried_too() -> None:
+def test_where_attitudes_are_asked_paths_that_knew_no_obstacles_are_tried_too() -> None:
     """Over a bar and back under it, the fastest way is no route's."""
     problem = ab.load_problem(CASES / "rewind.toml")
     fastest = ab.plan(problem, ab.Miqp(), QUAD).duration

@@ -169,9 +169,9 @@ class MultiStart:
             return None
         refinement, found = around.refinement, _Found(around.through_gates())
         best = self._finished(refinement, [around.judged.solution.source], found)
-        if best is None or is_course(self._task.stages):
+        if best is None or is_course(self._task.stages) or not self._task.stages.asks_thrust:
             return best
-        with suppress(Infeasible):  # paths that know no obstacles may lead to faster ones
+        with suppress(Infeasible):  # routes know no attitudes: paths that know no obstacles may be nearer
             _, begun = next(self._batches())
             rough = self._rough(refinement, [path for _, path in begun])
             best = self._finished(refinement, rough, best)

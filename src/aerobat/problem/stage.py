@@ -209,6 +209,12 @@ class StageSequence:
         """The same, a polytope in each ball among the conditions, for who holds nothing but those."""
         return replace(self, stages=tuple(stage.linear for stage in self.stages))
 
+    @property
+    def asks_thrust(self) -> bool:
+        """True if a stage asks where the thrust points, or how much there is."""
+        conditions = (condition for stage in self.stages for condition in stage.conditions)
+        return any(condition.quantity is Quantity.SPECIFIC_THRUST for condition in conditions)
+
     def intervals_from(self, least: int) -> int:
         """Return the fewest intervals, from `least` on, of which one ends in the window of each stage.
 
