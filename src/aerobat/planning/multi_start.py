@@ -16,7 +16,7 @@ import numpy as np
 from aerobat.errors import Infeasible, Reason, limits_of
 from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
 from aerobat.planning.around.fastest import fastest_around
-from aerobat.planning.around.guesses import guesses
+from aerobat.planning.around.guesses import ROUTES, guesses
 from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.courses import is_course
@@ -37,7 +37,9 @@ PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, wher
 SEED = 0
 ASIDE = 0.1  # of a path's extent, by which it is bent out of its plane: symmetry is an optimum of its own
 FINISHED = 3  # certified paths, the best of which is kept, where the first touches frames or loses much
-MORE_TIME = 10.0  # [s] of the processor, for a program of more intervals: of nine stages one takes four
+# [s] of the processor, for a program of more intervals, of which one of nine stages takes four, or for what
+# is tried beside routes around obstacles
+MORE_TIME = 10.0
 RAISED = (0.25, 0.5, 0.75, 1.0)  # of the reserve, step by step
 RAISING_TIME = 40.0  # [s] of the processor, for all of these: of two flips in a row they take half
 ROUGH_TIME = 0.5  # of the time that is left, where there is a limit, for rough rounds
@@ -169,11 +171,13 @@ class MultiStart:
             return None
         refinement, found = around.refinement, _Found(around.through_gates())
         best = self._finished(refinement, [around.judged.solution.source], found)
-        if best is None or is_course(self._task.stages) or not self._task.stages.asks_thrust:
+        # routes are starts too, but know no attitudes: where those are asked, others may be nearer
+        count = self.starts if self._task.stages.asks_thrust else max(self.starts - ROUTES, 0)
+        if best is None or is_course(self._task.stages) or not count:
             return best
-        with suppress(Infeasible):  # routes know no attitudes: paths that know no obstacles may be nearer
+        with suppress(Infeasible), within_time(MORE_TIME, processor):
             _, begun = next(self._batches())
-            rough = self._rough(refinement, [path for _, path in begun])
+            rough = self._rough(refinement, [path for _, path in begun[:count]])
             best = self._finished(refinement, rough, best)
         return best
 
