@@ -110,7 +110,7 @@ def test_what_a_log_holds_is_what_is_read_and_what_it_lacks_is_told_from_the_res
         rows = slice(len(whole.times))
         np.testing.assert_allclose(whole.series[name], flight.series[name][rows], atol=1e-6)
     np.testing.assert_allclose(poses.velocity, whole.velocity, atol=0.05)
-    np.testing.assert_allclose(poses.thrusts[50:], whole.thrusts[50:], atol=0.05)
+    np.testing.assert_allclose(poses.thrusts, whole.thrusts, atol=0.05)
     np.testing.assert_allclose(
         whole.setpoint_position, flight.setpoint_position[: len(whole.times)], atol=1e-9
     )
@@ -167,6 +167,7 @@ def test_a_malformed_log_is_refused_in_a_sentence(text: str, told: str, tmp_path
     [
         ({"position": lambda x: 1000.0 * x}, "from the plan's path half of the time; give metres"),
         ({"position": lambda x: x[:, [1, 0, 2]] * [1.0, 1.0, -1.0]}, "z up, of a flight of this plan"),
+        ({"q_world_body": lambda q: q[:, [1, 2, 3, 0]]}, "plan's attitude half of the time; give qw first"),
         ({"thrusts": lambda f: 102.0 * f}, "the column f0 reaches .* N at most; give newtons"),
         ({"times": lambda t: t + (t > 0.5 * t[-1]) * 0.4}, "t rises by 0.4[0-9]* s, where rows are"),
     ],

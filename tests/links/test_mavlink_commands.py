@@ -185,6 +185,7 @@ def test_pymavlinks_own_client_takes_the_vehicle_for_a_copter_and_flies_it() -> 
         (("PLAN", "--connect", "udp:here:port"), "is no address"),
         (("PLAN", "--connect", "/dev/none"), "neither a device nor an address"),
         (("PLAN", "--connect", "tcp:127.0.0.1:9"), "cannot open tcp:127.0.0.1:9"),
+        (("PLAN", "--connect", "udp:nohost.invalid:9"), "cannot open udp:nohost.invalid:9"),
         (("PLAN", "--vehicle", "hexarotor"), "certified for agile-quad, not for hexarotor"),
         (("PLAN", "--origin", "0", "0", "0"), "raise its origin"),
         (("path.csv",), "holds a path alone"),

@@ -5,9 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aerobat.environment import Environment
 from aerobat.errors import Infeasible, SpecError
 from aerobat.planning import BisectionSearch, Miqp, Plan, plan
-from aerobat.problem import EndState, Flip, HalfFlip, Limits, Problem, at_rest, load_problem, tilted_gate
+from aerobat.problem import (
+    Condition,
+    CustomManeuver,
+    EndState,
+    Flip,
+    HalfFlip,
+    Limits,
+    Problem,
+    Stage,
+    at_rest,
+    load_problem,
+    tilted_gate,
+)
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Vehicle, load_vehicle
 from shared_plans import shared_plan
@@ -119,6 +132,17 @@ def test_a_gate_that_asks_more_thrust_than_there_is_says_both_numbers(quad: Vehi
     problem = replace(load_problem("flip-roll"), maneuver=Flip(180.0, min_inverted_thrust=45.0))
     with pytest.raises(Infeasible, match=r"'gate' asks 45 m/s² inverted, agile-quad gives 32\.4"):
         plan(problem, vehicle=quad)
+
+
+def test_ground_that_binds_is_named_as_such_where_there_are_no_limits_of_space() -> None:
+    """A dive so near to it that the jerk allowed does not end it in time."""
+    z, ends = (0.0, 0.0, 1.0), (at_rest((0.0, 0.0, 1.0)), at_rest((4.0, 0.0, 1.0)))
+    bounds = ("velocity", -4.0), ("position", 1.0), ("acceleration", 0.0)
+    dive = Stage("dive", tuple(Condition(name, z, upper=most) for name, most in bounds), at=(0.3, 0.6))
+    free = Problem("low", *ends, CustomManeuver((dive,)), limits=Limits(jerk=1.0))
+    assert plan(free, Miqp(), None).trajectory.evaluate(np.linspace(0.0, 14.0, 99))[:, 2].min() < 0.9
+    with pytest.raises(Infeasible, match=r"environment.ground or limits.jerk .* binds"):
+        plan(replace(free, environment=Environment(ground=0.9)), Miqp(), None)
 
 
 def test_the_limit_that_binds_is_named() -> None:

@@ -110,11 +110,12 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
     if not ((norms > 0.5) & (norms < 2.0)).all():
         raise SpecError("qw, qx, qy, qz must be unit quaternions in every row")
     q = so3.normalize(attitude)
-    thrusts, commands = _of_rotors(columns, times, nominal)
-    span = nominal.max_thrusts - nominal.min_thrusts
-    margin = np.minimum(commands - nominal.min_thrusts, nominal.max_thrusts - commands)
     asked = reference(plan, nominal, times=times)
     _require_near(position, asked.setpoint.flat.position)
+    _require_aligned(q, asked.setpoint.q_world_body)
+    thrusts, commands = _of_rotors(columns, asked.rotor_thrusts[0], nominal)
+    span = nominal.max_thrusts - nominal.min_thrusts
+    margin = np.minimum(commands - nominal.min_thrusts, nominal.max_thrusts - commands)
     series = {
         "position": position,
         "velocity": _group(columns, ("vx", "vy", "vz"), _rate(times, position)),
@@ -168,6 +169,16 @@ def _require_near(position: Array, asked: Array) -> None:
         )
 
 
+def _require_aligned(q_world_body: Array, asked: Array) -> None:
+    """Refuse attitudes of other axes, or of another order of the quaternion."""
+    off = float(np.median(so3.angle_between(asked, q_world_body)))
+    if off > np.pi / 2.0:
+        raise SpecError(
+            f"qw, qx, qy, qz are {np.rad2deg(off):.3g}° from the plan's attitude half of the time; give qw "
+            "first, and turns from the body's axes, x forward, y left, z up, to the world's"
+        )
+
+
 def _group(columns: Mapping[str, Array], names: tuple[str, ...], otherwise: Array | None = None) -> Array:
     """Columns side by side, (T, len(names)), or what stands for them where one is not there."""
     if otherwise is not None and not all(name in columns for name in names):
@@ -175,9 +186,12 @@ def _group(columns: Mapping[str, Array], names: tuple[str, ...], otherwise: Arra
     return np.stack([columns[name] for name in names], axis=1)
 
 
-def _of_rotors(columns: Mapping[str, Array], times: Array, nominal: Vehicle) -> tuple[Array, Array]:
-    """Thrusts and commands [N] of every rotor, (T, n) each, the one from the other where it is not there."""
-    count = len(nominal.rotors)
+def _of_rotors(columns: Mapping[str, Array], first: Array, nominal: Vehicle) -> tuple[Array, Array]:
+    """Thrusts and commands [N] of every rotor, (T, n) each, the one from the other where it is not there.
+
+    Thrusts that are not there begin with those that the plan asks `first`.
+    """
+    times, count = columns["t"], len(nominal.rotors)
     given = {}
     for letter in "fu":
         names = tuple(f"{letter}{k}" for k in range(count))
@@ -198,15 +212,15 @@ def _of_rotors(columns: Mapping[str, Array], times: Array, nominal: Vehicle) -> 
         assert thrusts is not None, "one of them was given"
         led = thrusts + nominal.lags * np.gradient(thrusts, times, axis=0)
         return thrusts, np.clip(led, nominal.min_thrusts, nominal.max_thrusts)
-    return (_followed(times, commands, nominal.lags) if thrusts is None else thrusts), commands
+    return (_followed(times, first, commands, nominal.lags) if thrusts is None else thrusts), commands
 
 
-def _followed(times: Array, commands: Array, lags: Array) -> Array:
-    """Thrusts [N] of rotors that follow commands from row to row, by their lags."""
+def _followed(times: Array, first: Array, commands: Array, lags: Array) -> Array:
+    """Thrusts [N] of rotors that follow commands from row to row from the first ones on, by their lags."""
     left = np.exp(-np.diff(times)[:, None] / np.maximum(lags, 1e-9))
-    thrusts = [commands[0]]
+    thrusts = [first]
     for command, remains in zip(commands[:-1], left, strict=True):
-        thrusts.append(np.array(first_order_response(thrusts[-1], command, remains)))
+        thrusts.append(np.array(first_order_response(tuple(thrusts[-1]), command, remains)))
     return np.array(thrusts)
 
 

@@ -107,4 +107,4 @@ def _verdict(report: Report) -> str:
         if report.trials.refuted:
             return f"certified, but too few flights succeed {conditions}"
         return f"certified, but not proven to succeed often enough {conditions}"
-    return "certified, and it flies"
+    return "certified, and it flies" + ("" if report.trials is not None else " undisturbed")

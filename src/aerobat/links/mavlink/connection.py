@@ -85,7 +85,11 @@ def connect(address: str, *, listen: bool, system: int, component: int = 1, baud
         dialect="common",
         retries=0,
     )
+    kind, _, rest = address.partition(":")
     try:
+        if kind in _KINDS:
+            host, _, port = rest.rpartition(":")
+            socket.getaddrinfo(host, port)  # by UDP a name that nobody knows is only a link that is silent
         return _PymavlinkConnection(open_link)
     except Exception as error:  # sockets, devices and resolvers raise what they like
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__

@@ -81,6 +81,11 @@ class Assessment:
         return self.duration / self.least_duration if self.least_duration else inf
 
     @property
+    def goes_astray(self) -> bool:
+        """True if the path leaves what is asked for by more than its size, and some metres."""
+        return self.room.excess(self.asked) > ASTRAY + self.asked.size
+
+    @property
     def suspicious(self) -> bool:
         """True if the duration is so much above the lower bound that only another plan tells what it is."""
         return self.ratio > SUSPICIOUS and not self.obstructed
@@ -116,7 +121,7 @@ class Assessment:
     def warnings(self) -> tuple[str, ...]:
         """Warnings to a person who is about to fly the plan, each a sentence without its full stop."""
         found = [self.sentence] if self.poor else []
-        if self.room.excess(self.asked) > ASTRAY + self.asked.size:
+        if self.goes_astray:
             found.append(
                 f"goes astray: {self.room.excess(self.asked):.0f} m beyond start, goal, gates and stages, "
                 f"which lie within {self.asked.size:.3g} m; give limits.lower and limits.upper"

@@ -21,6 +21,7 @@ from aerobat.problem.stage import Stage
 
 OUT_OF_TIME = "no solution was found in time"
 NOT_CONVERGED = "the solver did not converge"
+GROUND = "environment.ground"
 MORE_INTERVALS = (1.3, 1.8, 2.5)  # times as many as there are that are tried, or as there are stages
 DIAGNOSIS_TIME = 1.0  # [s] of the processor, for all relaxed problems together
 PROBES = 4  # durations at which a relaxed problem is tried
@@ -119,10 +120,13 @@ def _relaxations(formulation: Formulation) -> Iterator[tuple[str, str, Formulati
 
     for derivative in range(formulation.chain.order + 1):
         if np.isfinite(np.concatenate(problem.path_limits.of(derivative))).any():
-            name = field_with_value(derivative, problem.path_limits)
-            name = name if derivative else f"the volume between {name}"
-            unlimited = replace(problem, limits=problem.path_limits.without(derivative))
-            yield name, FIELDS[derivative], without(problem=unlimited)
+            name, field = field_with_value(derivative, problem.path_limits), FIELDS[derivative]
+            unlimited = replace(problem, limits=problem.limits.without(derivative))
+            if derivative == 0:  # the ground is one of them
+                unlimited = replace(unlimited, environment=replace(problem.environment, ground=None))
+                is_bounded = np.isfinite(np.concatenate(problem.limits.of(0))).any()
+                name, field = (f"the volume between {name}", field) if is_bounded else (GROUND, GROUND)
+            yield name, field, without(problem=unlimited)
     for i, stage in enumerate(sequence.stages):
         others = sequence.stages[:i] + sequence.stages[i + 1 :]
         name, fewer = f"stage '{stage.name}'", replace(sequence, stages=others)

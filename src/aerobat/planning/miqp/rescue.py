@@ -73,12 +73,14 @@ class Rescue:
     def shortened(self, plan: Plan) -> Plan:
         """The plan, or where it is poor a better one by another way, which says so.
 
-        It is poor where it is not certified or a program's own answer, or paths that nearly held are faster.
+        It is poor where it is not certified, a program's own answer or far from all that is asked, where
+        paths that nearly held are faster, or where it is suspiciously long and stages have windows of time.
         """
         # programs have a dt; of paths those that nearly hold have a cost
         paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
         fastest = min((path.duration for path in paths), default=inf)
-        if plan.certified and plan.bound is None and plan.duration <= POOR * fastest:
+        is_fast = plan.certified and plan.bound is None and plan.duration <= POOR * fastest
+        if is_fast and not self._looks_poor(plan):
             return plan
         cls: Any = planner_class(FREE_KNOTS)
         others = cls(reserve=self.asked.reserve, clearance=self.asked.clearance)
@@ -87,6 +89,12 @@ class Rescue:
         longest = plan.duration if plan.certified else inf
         with within_time(PROMISING_TIME, processor):
             return self._first(chain([(others, f"by {FREE_KNOTS}")], more), said, longest) or plan
+
+    def _looks_poor(self, plan: Plan) -> bool:
+        """True of a plan that goes astray, or is suspiciously long where stages hold in windows of time."""
+        found, stages = plan.assessment, self.problem.stages(self.vehicle.max_specific_thrust)
+        is_timed = any(stage.at != "free" for stage in stages.stages)
+        return found is not None and (found.goes_astray or (is_timed and found.suspicious))
 
     def __str__(self) -> str:
         """The ways that were tried in vain, in a part of a sentence."""
