@@ -73,8 +73,8 @@ class Rescue:
     def shortened(self, plan: Plan) -> Plan:
         """The plan, or where it is poor a better one by another way, which says so.
 
-        It is poor where it is not certified, a program's own answer or far from all that is asked, where
-        paths that nearly held are faster, or where it is suspiciously long and stages have windows of time.
+        It is poor where it is not certified, a program's own answer or far from all that is asked. It is so
+        where paths that nearly held are faster, and where stages have windows and it is suspiciously long.
         """
         # programs have a dt; of paths those that nearly hold have a cost
         paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
