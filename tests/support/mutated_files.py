@@ -165,7 +165,7 @@ def certified_path(path: Path) -> ab.Certificate:
 
 def flight_log(path: Path) -> None:
     """A flight as a log of another system has it."""
-    flight = shared_flight("half-flip")
+    flight = ab.fly(plan())
     q, f = flight.states.q_world_body, flight.thrusts
     columns = np.column_stack([flight.times, flight.states.position, q, f])[::10]
     header = ["t", *"xyz", "qw", "qx", "qy", "qz", *(f"f{k}" for k in range(f.shape[1]))]
