@@ -13,7 +13,7 @@ from aerobat.kernels import rigid_body
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, RotorWrench
 
-SHORTEST = 1e-12  # of a time constant: a step that divides
+LEAST_STEP = 1e-12  # in time constants, of one that divides
 
 
 class Rotors(NamedTuple):
@@ -105,6 +105,6 @@ def advance(
 def _mean_factors(ops: Ops, rotors: Rotors, halfway: PerRotor, dt: Scalar) -> PerRotor:
     """What is left of each rotor's distance from a held command, the mean over `dt` [s]."""
     return tuple(
-        (1.0 - left * left) / ops.maximum(dt * rate, SHORTEST)
+        (1.0 - left * left) / ops.maximum(dt * rate, LEAST_STEP)
         for left, rate in zip(halfway, rotors.inverse_time_constant, strict=True)
     )

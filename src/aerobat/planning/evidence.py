@@ -36,8 +36,7 @@ class Evidence:
     @cached_property
     def flyability(self) -> Flyability:
         """The findings of the vehicle's own simulated flights (tens of milliseconds)."""
-        margin = self.certificate.margin or 0.0
-        return own_flights(self.task, self.trajectory, self.stages, margin)
+        return own_flights(self.task, self.trajectory, self.stages, self.certificate)
 
     @cached_property
     def assessment(self) -> Assessment:

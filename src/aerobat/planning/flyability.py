@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import isinf, isnan, radians
 
-from aerobat.certification.certificate import Verdict
-from aerobat.certification.path.passages import passage_findings
+from aerobat.certification.certificate import Certificate, Verdict
 from aerobat.environment import Environment
 from aerobat.flatness import has_unequal_drag
 from aerobat.planning.passages import PlacedStage, planned_passages
@@ -162,7 +161,7 @@ def _flown(passage: Passage) -> FlownPassage:
 
 
 def own_flights(
-    task: Task, trajectory: Trajectory, stages: Sequence[PlacedStage], margin: float
+    task: Task, trajectory: Trajectory, stages: Sequence[PlacedStage], certificate: Certificate
 ) -> Flyability:
     """Fly a path twice: nominally, and with the rotors' reserve used up.
 
@@ -170,9 +169,9 @@ def own_flights(
         task: Its vehicle flies, in its environment.
         trajectory: What is flown.
         stages: The task's, placed.
-        margin: Of the rotors, proven [N]: the reserve.
+        certificate: Of the path: the proven margin of its rotors is the reserve.
     """
-    disturbance = max(margin, 0.0)
+    disturbance = max(certificate.margin or 0.0, 0.0)
     fraction = disturbance / float(task.vehicle.max_thrusts.max())
     nominal = own_flight(task, trajectory, stages)
     disturbed = disturbed_flight(trajectory, task.vehicle, task.environment, fraction)
@@ -181,15 +180,14 @@ def own_flights(
         disturbance=disturbance,
         disturbed_fraction=fraction,
         disturbed_error=_largest_error(disturbed),
-        tilted_by_drag=has_unequal_drag(task.vehicle) and _is_tilted(task, trajectory, stages),
+        tilted_by_drag=has_unequal_drag(task.vehicle) and _is_tilted(certificate),
     )
 
 
-def _is_tilted(task: Task, trajectory: Trajectory, stages: Sequence[PlacedStage]) -> bool:
+def _is_tilted(certificate: Certificate) -> bool:
     """True if the path itself, whatever its flight, misses the attitude of a gate."""
-    passages = planned_passages(stages, task.problem)
-    findings = passage_findings(trajectory, passages, task.vehicle, task.environment)
-    return any(each.name == "attitude" and each.verdict is Verdict.VIOLATED for each in findings)
+    attitudes = (finding for finding in certificate.findings if finding.name == "attitude")
+    return any(finding.verdict is Verdict.VIOLATED for finding in attitudes)
 
 
 @lru_cache(maxsize=2)

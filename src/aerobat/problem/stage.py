@@ -42,7 +42,7 @@ MIN_CROSSING_SPEED = 1.0  # [m/s] through a gate, where nothing else is asked: w
 PARALLEL = 1e-6  # [-] a direction with less of a gate's normal lies in the gate's plane
 PLANNED_SHARE = 0.5  # of a gate's tolerance of attitude: the plan's
 ROUNDING = 1e-9  # [-] of an interval
-MANY_INTERVALS = 100  # one of them ends in every window of a hundredth of the duration
+MOST_INTERVALS = 100  # one of them ends in every window of a hundredth of the duration
 
 
 @declared
@@ -218,7 +218,7 @@ class StageSequence:
     def intervals_from(self, least: int) -> int:
         """Return the fewest intervals, from `least` on, of which one ends in the window of each stage.
 
-        Where so many would be more than MANY_INTERVALS, it is `least`.
+        Where so many would be more than MOST_INTERVALS, it is `least`.
         """
-        tried = range(least, max(least, MANY_INTERVALS) + 1)
+        tried = range(least, max(least, MOST_INTERVALS) + 1)
         return next((n for n in tried if all(stage.slots(n) for stage in self.stages)), least)

@@ -68,7 +68,7 @@ def connect(address: str, *, listen: bool, system: int, component: int = 1, baud
         baud: the rate of a serial device [bit/s].
     """
     dialect()
-    _check(address)
+    place = _host_and_port(address)
     if listen and address.startswith("tcp:"):
         address = address.replace("tcp:", "tcpin:", 1)
     from pymavlink import mavutil
@@ -85,28 +85,29 @@ def connect(address: str, *, listen: bool, system: int, component: int = 1, baud
         dialect="common",
         retries=0,
     )
-    kind, _, rest = address.partition(":")
     try:
-        if kind in _KINDS:
-            host, _, port = rest.rpartition(":")
-            socket.getaddrinfo(host, port)  # by UDP a name that nobody knows is only a link that is silent
+        if place is not None:
+            socket.getaddrinfo(*place)  # by UDP a name that nobody knows is only a link that is silent
         return _PymavlinkConnection(open_link)
     except Exception as error:  # sockets, devices and resolvers raise what they like
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise SpecError(f"cannot open {address}: {reason}; give another address or port") from None
 
 
-def _check(address: str) -> None:
+def _host_and_port(address: str) -> tuple[str, str] | None:
+    """The host and the port of an address; None of a device's. Raises SpecError for what is neither."""
     kind, _, rest = address.partition(":")
     if kind in _KINDS:
         host, _, port = rest.rpartition(":")
         if not host or not port.isdecimal() or not 0 < int(port) < 65536:
             raise SpecError(f"{address} is no address; give {kind}:HOST:PORT, as in {kind}:127.0.0.1:14540")
-    elif not os.path.exists(address):
+        return host, port
+    if not os.path.exists(address):
         raise SpecError(
             f"{address} is neither a device nor an address; give udp:HOST:PORT, tcp:HOST:PORT or a serial "
             "device that is there"
         )
+    return None
 
 
 class _PymavlinkConnection:

@@ -19,6 +19,7 @@ from aerobat.planning.planners import Planner, planner_class, planner_with_reser
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.problem.problem import Problem
+from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 MORE_INTERVALS = (1.3, 2.0)  # times as many
@@ -67,8 +68,11 @@ class Rescue:
     @property
     def _intervals(self) -> int:
         """The number of intervals of the plan that was sought."""
-        stages = self.problem.stages(self.vehicle.max_specific_thrust)
-        return int(self.asked.intervals_for(stages))
+        return int(self.asked.intervals_for(self._stages))
+
+    @property
+    def _stages(self) -> StageSequence:
+        return self.problem.stages(self.vehicle.max_specific_thrust)
 
     def shortened(self, plan: Plan) -> Plan:
         """The plan, or where it is poor a better one by another way, which says so.
@@ -92,8 +96,7 @@ class Rescue:
 
     def _looks_poor(self, plan: Plan) -> bool:
         """True of a plan that goes astray, or is suspiciously long where stages hold in windows of time."""
-        found, stages = plan.assessment, self.problem.stages(self.vehicle.max_specific_thrust)
-        is_timed = any(stage.at != "free" for stage in stages.stages)
+        found, is_timed = plan.assessment, any(stage.at != "free" for stage in self._stages.stages)
         return found is not None and (found.goes_astray or (is_timed and found.suspicious))
 
     def __str__(self) -> str:
