@@ -104,6 +104,7 @@ def test_an_error_beyond_a_hundred_degrees_is_reported_in_whole_degrees() -> Non
     assert fact.text.startswith("fixed, 135° off, at worst 135° at ")
 
 
+@pytest.mark.slow
 def test_a_turn_is_sought_between_none_and_what_is_asked() -> None:
     error = heading_error(following("half-flip", mode="spline", knots_deg=[[0.1, 120.0], [1.0, 120.0]]))
     assert error is not None
