@@ -5,16 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import aerobat as ab
 from aerobat.errors import Infeasible, SpecError
 from aerobat.flatness import force_balance
 from aerobat.optimization import solver
-from aerobat.planning import GridSearch, Miqp, plan, planner_class
+from aerobat.planning import GridSearch, Miqp, Plan, plan, planner_class
 from aerobat.planning.evidence import Evidence
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.miqp.rescue import with_more_intervals
 from aerobat.planning.miqp.shortest import COARSE_GROWTH
 from aerobat.planning.result import FLYING_RESERVE
 from aerobat.planning.task import Task
+from aerobat.planning.turns import extra_turns
 from aerobat.problem import (
     Condition,
     CustomManeuver,
@@ -150,6 +152,37 @@ def test_a_plan_that_goes_astray_in_a_late_window_is_not_the_last_word(quad: Veh
     assert found.duration < 1.05 * other.duration
     assert found.assessment is not None
     assert not found.assessment.goes_astray
+
+
+def one_flip(count: int = 1) -> Problem:
+    """One or more flips in pitch over 6 m."""
+    low, far = ab.at_rest((0.0, 0.0, 2.0)), ab.at_rest((6.0, 0.0, 2.0))
+    flip = ab.Flip(axis_deg=90.0, position=np.array([3.0, 0.0, 2.5]), count=count)
+    return Problem("one-flip", low, far, flip, environment=ab.Environment(ground=0.0))
+
+
+def test_turns_beyond_those_that_stages_ask_are_counted_and_told(quad: Vehicle) -> None:
+    angles = np.arange(0.0, 4.25 * np.pi, np.pi / 4.0)  # two turns of 12 m/s² of thrust
+    thrust = 12.0 * np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], axis=-1)
+    begun = np.array([np.zeros(3), np.zeros(3), thrust[0] - [0.0, 0.0, 9.80665]])
+    twice = Trajectory.from_inputs(begun, np.diff(thrust, axis=0) / 0.1, 0.1)
+    counts = [extra_turns(Task.of(one_flip(count), quad), twice) for count in (1, 2, 3)]
+    assert counts == [1, 0, 0]
+    never_asked = replace(one_flip(), maneuver=ab.Line())
+    assert extra_turns(Task.of(never_asked, quad), twice) == 0
+    assessment = Plan(one_flip(), twice, "own", vehicle=quad).assessment
+    assert assessment is not None
+    assert "turns over once more than the stages ask" in str(assessment)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["free-knots", "time-optimal"])
+def test_one_flip_is_not_planned_as_two(name: str) -> None:
+    """Nothing bounds the turn before the first stage and after the last; it took 2.08 s, one turn 1.80 s."""
+    found = plan(one_flip(), planner_class(name)(), ab.load_vehicle("section-v"))
+    assert found.assessment is not None
+    assert (found.certified, found.assessment.extra_turns) == (True, 0)
+    assert found.duration < 1.9
 
 
 @pytest.mark.slow

@@ -28,6 +28,7 @@ from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPa
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
 from aerobat.planning.time_limit import best_in_time
+from aerobat.planning.turns import extra_turns, priced_duration
 from aerobat.planning.warm_start import WarmStart
 
 WORTHWHILE = 0.01  # of the duration: four times as many where twice as many gain more
@@ -155,8 +156,10 @@ class MultiStart:
         task = self._task
         plans = (plan if plan.vehicle == task.vehicle else plan.for_vehicle(task.vehicle) for plan in begun)
         kept = [plan for plan in plans if plan.certified and plan.keeps(task.reserve)]
-        known = min(kept, key=lambda plan: plan.duration, default=None)
-        if known is None or (found is not None and found.certified and found.duration <= known.duration):
+        known = min(kept, key=self._priced, default=None)
+        if known is None or (
+            found is not None and found.certified and self._priced(found) <= self._priced(known)
+        ):
             return found
         said = f"{self.planner} found none better than the path that it began from, {known.planner}'s"
         attempts = tuple(self.refinement.recorder.attempts)
@@ -199,9 +202,13 @@ class MultiStart:
             return
         with within_share(ROUGH_TIME):
             others = list(starts(task, guess))
-            if not any(plan for plan, _ in others):
-                others = list(starts(task, replace(guess, segments=SEGMENTS)))
+            if not any(plan and not extra_turns(task, path.trajectory) for plan, path in others):
+                finer = starts(task, replace(guess, segments=SEGMENTS))
+                others += [each for each in finer if each[0] is not None]
         yield self.refinement, list(islice(_varied(sorted(others, key=_likeliest)), self.starts))
+
+    def _priced(self, path: Plan | WarmStart) -> float:
+        return priced_duration(self._task, path.trajectory)
 
     def _of_more(self, guess: Miqp) -> Iterator[_Start]:
         """Yield the plans of mixed-integer programs of more intervals, of an open course."""
@@ -249,7 +256,7 @@ class MultiStart:
                 found.append(rough)
             if found and out_of_time():
                 break
-        return sorted(found, key=_duration)
+        return sorted(found, key=lambda rough: self._priced(rough.path))
 
     def _with_more_segments(
         self, refinement: Refinement, paths: Sequence[RefinedPath]
@@ -265,7 +272,7 @@ class MultiStart:
                     if refinement.is_promising(finer):
                         found.append(finer)
                         known = min(known, _duration(finer))
-            found.sort(key=_duration)
+            found.sort(key=lambda finer: self._priced(finer.path))
             if not found or _duration(found[0]) > (1.0 - WORTHWHILE) * _duration(paths[0]):
                 return found
             paths = found
@@ -293,12 +300,15 @@ class _Found:
     starts: tuple[float, ...] = ()  # [s] roughly, rising
 
     def rank(self) -> tuple[bool, float]:
-        """The key that sorts by what is best: clear of frames first, the shortest foremost."""
-        return not self.path.is_clear, self.path.duration
+        """The key that sorts by what is best: clear of frames first, the shortest foremost, turns priced."""
+        return not self.path.is_clear, self._priced(self.path.judged.solution.source)
 
     def is_ahead_of(self, rough: RefinedPath) -> bool:
         """True if a rough path is not worth finishing."""
-        return self.path.is_clear and self.path.duration <= _duration(rough)
+        return self.path.is_clear and self.rank()[1] <= self._priced(rough)
+
+    def _priced(self, refined: RefinedPath) -> float:
+        return priced_duration(self.path.refinement.task, refined.path.trajectory)
 
 
 def _likeliest(begun: _Start) -> tuple[bool, bool, float]:

@@ -11,6 +11,7 @@ from aerobat.certification.certificate import Certificate, Side
 from aerobat.planning.assessment.assessment import Assessment, Point, PositionRange
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.task import Task
+from aerobat.planning.turns import extra_turns
 from aerobat.trajectory import Trajectory
 
 
@@ -28,6 +29,7 @@ def assessment(task: Task, trajectory: Trajectory, certificate: Certificate) -> 
         ground=task.environment.ground,
         rate_limit=task.vehicle.max_body_rate,
         obstructed=bool(task.environment.obstacles),
+        extra_turns=extra_turns(task, trajectory),
     )
 
 

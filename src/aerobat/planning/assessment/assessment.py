@@ -63,6 +63,7 @@ class Assessment:
     ground: float | None = None  # [m] of the environment, which the certificate is about
     rate_limit: float = inf  # [rad/s] of the vehicle, likewise
     obstructed: bool = False  # by obstacles, of which the lower bound knows nothing
+    extra_turns: int = 0  # upside down, beyond those that stages ask
     opinion: SecondOpinion | None = None  # where there is one
 
     @property
@@ -125,6 +126,12 @@ class Assessment:
             found.append(
                 f"goes astray: {self.room.excess(self.asked):.0f} m beyond start, goal, gates and stages, "
                 f"which lie within {self.asked.size:.3g} m; give limits.lower and limits.upper"
+            )
+        if self.extra_turns:
+            often = "once" if self.extra_turns == 1 else f"{self.extra_turns} times"
+            found.append(
+                f"turns over {often} more than the stages ask; another --planner may spare that, "
+                "or a start and a goal that are slower or further apart"
             )
         if self.ground is None and self.dive > DIVE:
             found.append(

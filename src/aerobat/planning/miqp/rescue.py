@@ -18,6 +18,7 @@ from aerobat.planning.miqp.integrator import INPUT_NAMES, MAX_INTERVALS
 from aerobat.planning.planners import Planner, planner_class, planner_with_reserve
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
+from aerobat.planning.turns import priced_duration
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
@@ -77,8 +78,9 @@ class Rescue:
     def shortened(self, plan: Plan) -> Plan:
         """The plan, or where it is poor a better one by another way, which says so.
 
-        It is poor where it is not certified, a program's own answer or far from all that is asked. It is so
-        where paths that nearly held are faster, and where stages have windows and it is suspiciously long.
+        It is poor where it is not certified, a program's own answer, far from all that is asked, or turns
+        over more often than that. It is so where paths that nearly held are faster, and where stages have
+        windows and it is suspiciously long.
         """
         # programs have a dt; of paths those that nearly hold have a cost
         paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
@@ -90,14 +92,16 @@ class Rescue:
         others = cls(reserve=self.asked.reserve, clearance=self.asked.clearance)
         more = with_more_intervals(self.asked, self.problem, self.vehicle)
         said = f"no fast path of miqp with {self._intervals} intervals settled"
-        longest = plan.duration if plan.certified else inf
+        longest = _priced(plan) if plan.certified else inf
         with within_time(PROMISING_TIME, processor):
             return self._first(chain([(others, f"by {FREE_KNOTS}")], more), said, longest) or plan
 
     def _looks_poor(self, plan: Plan) -> bool:
-        """True of a plan that goes astray, or is suspiciously long where stages hold in windows of time."""
+        """True of a plan that goes astray, turns over too often, or is suspiciously long through windows."""
         found, is_timed = plan.assessment, any(stage.at != "free" for stage in self._stages.stages)
-        return found is not None and (found.goes_astray or (is_timed and found.suspicious))
+        if found is None:
+            return False
+        return found.goes_astray or found.extra_turns > 0 or (is_timed and found.suspicious)
 
     def __str__(self) -> str:
         """The ways that were tried in vain, in a part of a sentence."""
@@ -120,13 +124,13 @@ class Rescue:
         Args:
             ways: Planners, and how they plan in words.
             failed: Why they are asked.
-            shorter_than: The duration that a plan must fall short of [s].
+            shorter_than: The duration, turns priced, that a plan must fall short of [s].
         """
         for planner, how in ways:
             with within_share(ONE_WAY):
                 plan = self._planned(planner, how)
             kept = min(self.asked.reserve, getattr(planner, "reserve", self.asked.reserve))
-            if plan is not None and plan.keeps(kept) and plan.duration < shorter_than:
+            if plan is not None and plan.keeps(kept) and _priced(plan) < shorter_than:
                 attempts = (*self.recorder.attempts, *plan.attempts)
                 return replace(plan, attempts=attempts, rescue=f"{failed}; planned {how}")
         return None
@@ -200,6 +204,12 @@ class Rescue:
         if self.problem.maneuver.through_points:
             yield planner_with_reserve("min-snap", self.asked.reserve), "by min-snap"
         yield planner_with_reserve(FREE_KNOTS, self.asked.reserve), f"by {FREE_KNOTS}"
+
+
+def _priced(plan: Plan) -> float:
+    """The duration of a vehicle's plan [s], longer for each turn beyond those asked."""
+    assert plan.evidence is not None
+    return priced_duration(plan.evidence.task, plan.trajectory)
 
 
 def with_more_intervals(asked: Any, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:

@@ -1,0 +1,50 @@
+"""How often a path turns the vehicle over, beside how often its stages ask for that."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from aerobat.planning.courses import is_course
+from aerobat.planning.task import Task
+from aerobat.problem.condition import Quantity
+from aerobat.problem.stage import Stage
+from aerobat.trajectory import Trajectory
+
+# of the duration, that a turn beyond those asked counts like: a way without one is worth that
+TURN_PRICE = 0.2
+UPSIDE_DOWN = -0.5  # of the thrust's direction along the vertical: tilted by 120° or more
+PLACES = np.linspace(0.0, 1.0, 64, endpoint=False)  # of a segment, where the thrust is looked at
+
+
+def priced_duration(task: Task, trajectory: Trajectory) -> float:
+    """Return a path's duration [s], longer by TURN_PRICE for each turn beyond those asked."""
+    return trajectory.duration * (1.0 + TURN_PRICE * extra_turns(task, trajectory))
+
+
+def extra_turns(task: Task, trajectory: Trajectory) -> int:
+    """Return how many times a path turns the vehicle upside down beyond what its stages ask.
+
+    Stages that never ask for it leave it free, as do courses with places, where it shortens the way.
+    """
+    stages = task.stages
+    asked = [False, *map(_asks_upside_down, stages.stages)]
+    turns = sum(after and not before for before, after in pairwise(asked))
+    if not turns or (is_course(stages) and any(stage.is_placed for stage in stages.stages)):
+        return 0
+    velocity, acceleration = (trajectory.on_segments(PLACES, derivative) for derivative in (1, 2))
+    thrust = task.balance.specific_thrust(velocity, acceleration).reshape(-1, 3)
+    upward = thrust[:, 2] / np.linalg.norm(thrust, axis=1)
+    sides = upward[(upward < UPSIDE_DOWN) | (upward > 0.0)] < 0.0  # in between it has not turned back yet
+    return max(int((sides[1:] & ~sides[:-1]).sum()) - turns, 0)
+
+
+def _asks_upside_down(stage: Stage) -> bool:
+    """True of a stage that asks for thrust downward."""
+    return any(
+        asked.quantity is Quantity.SPECIFIC_THRUST
+        and asked.lower > 0.0
+        and asked.direction[2] < UPSIDE_DOWN * float(np.linalg.norm(asked.direction))
+        for asked in stage.conditions
+    )
