@@ -35,7 +35,8 @@ ONE_WAY = 0.75  # of the time that is left, for one way, so that the next has so
 POOR = 1.1
 FREE_KNOTS = "free-knots"  # the planner that begins at other paths too, quickly
 MOTION = "time-optimal"  # the planner that begins at the most paths
-MOTIONS = 2  # that time-optimal starts from: further ones make motions faster, but seldom find the first
+MOTIONS = 2  # that time-optimal starts from: further ones make motions faster, but seldom find the first,
+ALL_MOTIONS = 8  # which is worth its time only where there most likely is one
 
 
 @dataclass
@@ -56,7 +57,7 @@ class Rescue:
             found = self._first(self._ways(), self._none_found)
         if found is None and self.is_promising:
             with within_time(PROMISING_TIME, processor):
-                found = self._first(iter([self._motion_from_all()]), self._none_found)
+                found = self._first(iter([self._motion_from_all(ALL_MOTIONS)]), self._none_found)
         if found is None or found.keeps(self.asked.reserve):
             return found
         with within_time(RESCUE_TIME, processor):
@@ -160,22 +161,22 @@ class Rescue:
             yield replace(self.asked, reserve=0.0, rescue=False), "without a reserve"
         more = with_more_intervals(self.asked, self.problem, self.vehicle)
         if any(attempt.cost is not None for attempt in self.recorder.attempts):
-            yield self._motion_from_all()
+            yield self._motion_from_all(MOTIONS)
             yield from more
         else:
             yield from more
-            yield self._motion(None), f"by {MOTION}"
+            yield self._motion(None, MOTIONS), f"by {MOTION}"
         yield from self._others()
 
-    def _motion_from_all(self) -> tuple[Planner, str]:
-        """Time-optimal, from the path without rotors among others."""
-        return self._motion(self._path_without_rotors()), f"by {MOTION}"
+    def _motion_from_all(self, starts: int) -> tuple[Planner, str]:
+        """Time-optimal from so many starts and from the path without rotors."""
+        return self._motion(self._path_without_rotors(), starts), f"by {MOTION}"
 
-    def _motion(self, start: Plan | None) -> Planner:
-        """Time-optimal, quickly, with no reserve but the one that is asked: that tells soonest of none."""
+    def _motion(self, start: Plan | None, starts: int) -> Planner:
+        """Time-optimal with no reserve but the one that is asked: that tells soonest of none."""
         cls: Any = planner_class(MOTION)
         guess = replace(self.asked, rescue=False)
-        return cast(Planner, cls(reserve=self.asked.reserve, starts=MOTIONS, guess=guess, start=start))
+        return cast(Planner, cls(reserve=self.asked.reserve, starts=starts, guess=guess, start=start))
 
     def _path_without_rotors(self) -> Plan | None:
         """The MIQP's plan for no vehicle."""
