@@ -41,6 +41,7 @@ class MissionOptions(PluginOptions):
         )
 
 
+@Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class EndOptions:
     """Options of what runs until it is interrupted."""

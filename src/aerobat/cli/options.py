@@ -1,4 +1,7 @@
-"""The commands' options, each with its help; those of the planners follow from the registered planners."""
+"""The commands' options, each with its help; those of the planners follow from the registered planners.
+
+`@Parameter(name="*")` has a command take the fields of a class, and of those that extend it, as its options.
+"""
 
 # no postponed annotations here: the class of options is made from them, where nobody could look names up
 
@@ -48,6 +51,7 @@ def how_many(least: int, most: int) -> Parameter:
     return Parameter(name=("--runs", "--flights"), group=flying, validator=flights)
 
 
+@Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class PluginOptions:
     """Options of all commands that code of one's own may take part in."""
@@ -84,6 +88,7 @@ class ProblemOptions(VehicleOptions):
     """The tilt of a half-flip's gate in degrees, -90 to 90, to the right when positive."""
 
 
+@Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class FlightsOptions:
     """Options of many flights."""
@@ -107,6 +112,7 @@ class OutputOptions(RunOptions):
     name, as in out/half-flip-crazyflie-45deg-free-knots."""
 
 
+@Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class ExplainingOptions:
     """Options of a report on a plan."""
@@ -210,6 +216,7 @@ class PlanningOptions(PlannerOptions):
     planning. Flown by --controller all the same."""
 
 
+@Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class ConditionsOptions:
     """Options of the conditions, of what flies under them, and of planning for both."""

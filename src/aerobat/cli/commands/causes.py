@@ -30,7 +30,7 @@ class CausesOptions(ProblemOptions, FlightsOptions):
     workers: Annotated[str | None, Workers(group=flying)] = None
 
 
-def causes(problem: str, options: Annotated[CausesOptions, Parameter(name="*")] = CausesOptions()) -> None:
+def causes(problem: str, options: CausesOptions = CausesOptions()) -> None:
     """Measure what each of four causes of error costs, alone and all together, over many flights.
 
     The paper's authors name the causes: the plan does not know the rotors' limits; a hand-off goes between

@@ -51,7 +51,7 @@ class CheckOptions(VehicleOptions):
     """The greatest moment allowed, N m."""
 
 
-def check(plan: Path, options: Annotated[CheckOptions, Parameter(name="*")] = CheckOptions()) -> ExitCode:
+def check(plan: Path, options: CheckOptions = CheckOptions()) -> ExitCode:
     """Prove over continuous time that a vehicle can fly a trajectory, or say when and why it cannot.
 
     The proof covers every rotor's thrust, its command where it lags, the vehicle's body rate and, where

@@ -30,7 +30,7 @@ class CompareOptions(TaskOptions):
     workers: Annotated[str, Workers(group=planning, help=WORKERS)] = "1"
 
 
-def compare(problem: str, options: Annotated[CompareOptions, Parameter(name="*")] = CompareOptions()) -> None:
+def compare(problem: str, options: CompareOptions = CompareOptions()) -> None:
     """Plan a maneuver with every planner and put the plans side by side.
 
     Prints a table of durations, ratios to the time-optimal plan, margins, proofs and tracking errors, and

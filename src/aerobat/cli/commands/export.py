@@ -35,7 +35,7 @@ class ExportOptions(RunOptions):
     """Rows, messages or keys a second. Default: 100, of px4 250; crazyflie has none."""
 
 
-def export(plan: Path, options: Annotated[ExportOptions, Parameter(name="*")]) -> ExitCode:
+def export(plan: Path, options: ExportOptions) -> ExitCode:
     """Write a plan as another system reads it, and say what that lost.
 
     The loss is the largest difference of position, velocity and attitude from the plan over continuous time.

@@ -60,9 +60,7 @@ class FeasibilityOptions(PlannerOptions):
             raise SpecError("--table is for a map; add --over, or leave it out")
 
 
-def feasibility(
-    problem: str, options: Annotated[FeasibilityOptions, Parameter(name="*")] = FeasibilityOptions()
-) -> None:
+def feasibility(problem: str, options: FeasibilityOptions = FeasibilityOptions()) -> None:
     """Find the least thrust-to-weight ratio, ceiling and gates with a plan, or map feasibility over fields.
 
     Without --over, the least of each quantity is found by bisection, the others as they are. The answer comes

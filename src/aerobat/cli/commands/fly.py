@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
 
 import numpy as np
-from cyclopts import Parameter
 
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ExplainingOptions, FlyingOptions, PlanningOptions
@@ -24,9 +22,9 @@ from aerobat.simulation.plants import PLANTS
 
 def fly(
     problem: str,
-    options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions(),
-    flying: Annotated[FlyingOptions, Parameter(name="*")] = FlyingOptions(),
-    explaining: Annotated[ExplainingOptions, Parameter(name="*")] = ExplainingOptions(),
+    options: PlanningOptions = PlanningOptions(),
+    flying: FlyingOptions = FlyingOptions(),
+    explaining: ExplainingOptions = ExplainingOptions(),
 ) -> ExitCode:
     """Plan a maneuver, fly it in simulation, and report.
 

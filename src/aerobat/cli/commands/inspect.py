@@ -34,7 +34,7 @@ class InspectOptions(VehicleOptions):
     """The picture's file. Default: inspect.png in the log's folder."""
 
 
-def inspect(log: Path, options: Annotated[InspectOptions, Parameter(name="*")] = InspectOptions()) -> None:
+def inspect(log: Path, options: InspectOptions = InspectOptions()) -> None:
     """Say what caused a recorded flight's error: start, saturation, delay, hand-off, gains or the vehicle.
 
     Of a flight whose rates an inner loop held, it also names motors in another order, rates or gains other

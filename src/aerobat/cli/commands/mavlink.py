@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
-from cyclopts import Parameter
 
 from aerobat.arrays import Array
 from aerobat.cli.failures import ExitCode
@@ -27,9 +26,7 @@ CLEARANCE = 3.0  # [m] of a plan's lowest point over where the vehicle stands
 RECOVERED = 1.0  # [m] of the lowest point of a recovery from any instant of it, at the least
 
 
-def mavlink(
-    plan: Path, options: Annotated[MavlinkOptions, Parameter(name="*")] = MavlinkOptions()
-) -> ExitCode:
+def mavlink(plan: Path, options: MavlinkOptions = MavlinkOptions()) -> ExitCode:
     """Fly a plan on an autopilot over MAVLink: PX4, ArduPilot, or `aerobat link mavlink-vehicle`.
 
     Arms, takes off, goes to the plan's start, streams attitude, rates and thrust along the plan, holds where
@@ -80,7 +77,7 @@ def mavlink(
 def mavlink_vehicle(
     vehicle: str = "agile-quad",
     /,
-    options: Annotated[MavlinkVehicleOptions, Parameter(name="*")] = MavlinkVehicleOptions(),
+    options: MavlinkVehicleOptions = MavlinkVehicleOptions(),
 ) -> None:
     """Simulate a vehicle that MAVLink clients take for PX4 or ArduPilot: `aerobat link mavlink` and others.
 

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from cyclopts import Parameter
-
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ConditionsOptions, ExplainingOptions, PlanningOptions
 from aerobat.cli.runs.folder import finish
@@ -16,9 +12,9 @@ from aerobat.errors import SpecError
 
 def plan(
     problem: str,
-    options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions(),
-    passing: Annotated[ConditionsOptions, Parameter(name="*")] = ConditionsOptions(),
-    explaining: Annotated[ExplainingOptions, Parameter(name="*")] = ExplainingOptions(),
+    options: PlanningOptions = PlanningOptions(),
+    passing: ConditionsOptions = ConditionsOptions(),
+    explaining: ExplainingOptions = ExplainingOptions(),
 ) -> ExitCode:
     """Plan a maneuver and stop there.
 

@@ -36,9 +36,7 @@ class RepeatOptions(OutputOptions, ExplainingOptions):
     """The folder to write to, replaced as a whole. Default: FOLDER-repeated, beside the one repeated."""
 
 
-def repeat(
-    folder: Path, options: Annotated[RepeatOptions, Parameter(name="*")] = RepeatOptions()
-) -> ExitCode:
+def repeat(folder: Path, options: RepeatOptions = RepeatOptions()) -> ExitCode:
     """Do a run again from its folder, and say if it came to the same.
 
     Takes problem, vehicle, planner, options and seed from the run.toml there, plans and flies anew, and

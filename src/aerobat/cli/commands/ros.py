@@ -6,9 +6,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal
-
-from cyclopts import Parameter
+from typing import Literal
 
 from aerobat import so3
 from aerobat.cli.link_options import RosOptions, RosVehicleOptions
@@ -33,7 +31,7 @@ from aerobat.vehicle import Vehicle
 _VEHICLE_RATE = 250.0  # [1/s] at which the simulated vehicle goes on
 
 
-def ros(*problems: str, options: Annotated[RosOptions, Parameter(name="*")] = RosOptions()) -> None:
+def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
     """Fly maneuvers on demand as a node of ROS 1 or ROS 2.
 
     Offers services of std_srvs/Trigger: /aerobat/takeoff, the paper's line, flip, flip_pitch, flip_trans and
@@ -90,7 +88,7 @@ def ros(*problems: str, options: Annotated[RosOptions, Parameter(name="*")] = Ro
 def ros_vehicle(
     vehicle: str = "agile-quad",
     /,
-    options: Annotated[RosVehicleOptions, Parameter(name="*")] = RosVehicleOptions(),
+    options: RosVehicleOptions = RosVehicleOptions(),
 ) -> None:
     """Simulate a vehicle that is a node of ROS: goals in, odometry out, for `aerobat link ros`.
 

@@ -67,8 +67,8 @@ class SweepingOptions(FlightsOptions):
 
 def sweep(
     problem: str,
-    options: Annotated[PlanningOptions, Parameter(name="*")] = PlanningOptions(),
-    sweeping: Annotated[SweepingOptions, Parameter(name="*")] = SweepingOptions(),
+    options: PlanningOptions = PlanningOptions(),
+    sweeping: SweepingOptions = SweepingOptions(),
 ) -> None:
     """Fly a maneuver many times as it would really be flown, and count what becomes of it.
 

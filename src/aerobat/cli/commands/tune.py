@@ -54,9 +54,7 @@ class TuningOptions(ProblemOptions, FlightsOptions, OutputOptions):
     workers: Annotated[str | None, Workers(group=flying)] = None
 
 
-def tune(
-    *problems: str, options: Annotated[TuningOptions, Parameter(name="*")] = TuningOptions()
-) -> ExitCode:
+def tune(*problems: str, options: TuningOptions = TuningOptions()) -> ExitCode:
     """Find the controller gains with which a vehicle flies maneuvers best under conditions.
 
     Lowers the largest position error that 95 % of flights stay within, and counts 5 cm more for each flight

@@ -55,6 +55,7 @@ class ViewOptions(VehicleOptions):
     """Open the page in the browser."""
 
 
+@Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class LiveOptions:
     """Options of the live page."""
@@ -114,8 +115,8 @@ def serve(source: Path | None, options: ViewOptions, serving: LiveOptions) -> No
 
 def view(
     source: Path | None = None,
-    options: Annotated[ViewOptions, Parameter(name="*")] = ViewOptions(),
-    serving: Annotated[LiveOptions, Parameter(name="*")] = LiveOptions(),
+    options: ViewOptions = ViewOptions(),
+    serving: LiveOptions = LiveOptions(),
 ) -> None:
     """Write a page that replays a run, a plan or a flight: one HTML file that a browser opens from the disk.
 
