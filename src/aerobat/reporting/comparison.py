@@ -27,6 +27,7 @@ from aerobat.reporting.page import (
     heading,
     house_style,
     panel,
+    set_scale,
     size_of,
     write,
 )
@@ -224,7 +225,10 @@ def draw_overlay(
         _, camera = draw_box_around(axes, points, pad, points, gates)
     else:
         camera = plane.camera
-        _fit_plane(axes, camera.project(points))
+        picture = camera.project(points)
+        low, high = picture.min(axis=0), picture.max(axis=0)
+        free = size_of(axes) - 0.5  # [in] a quarter of an inch around
+        set_scale(axes, (low + high) / 2, max(float(((high - low) / free).max()), 1e-3))
         axes.set(xlabel=plane.label, ylabel="z [m]")
     shapes = obstacle_shapes(surfaces, camera) + [shape for gate in gates for shape in gate_shapes(gate)]
     if shapes:
@@ -233,12 +237,3 @@ def draw_overlay(
     for path, drawn in zip(paths, pictures, strict=True):
         axes.plot(*drawn.T, color=path.colour, linewidth=1.7, label=path.name)
     mark_ends(axes, pictures[0][[0, -1]])
-
-
-def _fit_plane(axes: Axes, picture: Array) -> None:
-    """Fit points (n, 2) [m] into the axes, the same scale along both."""
-    low, high = picture.min(axis=0), picture.max(axis=0)
-    size = size_of(axes)
-    per_inch = max(float(((high - low) / (size - 0.5)).max()), 1e-3)  # a quarter of an inch free around
-    (left, bottom), (right, top) = ((low + high + sign * size * per_inch) / 2 for sign in (-1.0, 1.0))
-    axes.set(xlim=(left, right), ylim=(bottom, top))

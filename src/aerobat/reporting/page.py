@@ -116,12 +116,18 @@ def size_of(axes: Axes) -> Array:
     return np.asarray(cast("Figure", axes.figure).get_size_inches() * axes.get_position().size)
 
 
+def set_scale(axes: Axes, centre: Array, per_inch: float) -> None:
+    """Show so many units of data an inch along both axes, about a centre (2,)."""
+    half = size_of(axes) * per_inch / 2
+    (left, bottom), (right, top) = centre - half, centre + half
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+
+
 def heading(axes: Axes, title: str, note: str = "") -> None:
     """A title above axes, and a note under it."""
-    height = float(size_of(axes)[1])
-    place: dict[str, Any] = {"transform": axes.transAxes, "va": "bottom"}
-    axes.text(0.0, 1.0 + HEADING / height, title, size=TITLE, weight="bold", **place)
-    axes.text(0.0, 1.0 + 0.1 / height, note, size=SMALL, color=MUTED, **place)
+    place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "va": "bottom"}
+    axes.annotate(title, (0.0, 1.0), (0.0, 72.0 * HEADING), size=TITLE, weight="bold", **place)
+    axes.annotate(note, (0.0, 1.0), (0.0, 7.2), size=SMALL, color=MUTED, **place)
 
 
 def legend(axes: Axes, above: float) -> None:

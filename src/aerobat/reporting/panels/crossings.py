@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array, Mask
 from aerobat.problem.gate import Gate
-from aerobat.reporting.page import size_of
+from aerobat.reporting.page import set_scale, size_of
 from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, PAPER, RED, SMALL, YELLOW
 
 if TYPE_CHECKING:
@@ -70,7 +70,6 @@ def draw_opening(axes: Axes, crossings: Crossings) -> None:
     half = np.clip(1.05 * off, half, 2.0 * half)
     _draw_crossings(axes, crossings, half, 1.0)
     axes.grid(False)
-    _fit(axes, half)
     axes.set(xlabel="to the right [m]", ylabel="up [m]")
 
 
@@ -86,12 +85,11 @@ def draw_scatter(axes: Axes, crossings: Crossings) -> None:
         ring = Circle((0.0, 0.0), radius, fill=False, edgecolor=INK, linewidth=0.9, linestyle=style)
         axes.add_patch(ring)
     _draw_crossings(axes, crossings, half, 100.0)
-    _fit(axes, half)
     axes.set(xlabel="to the right [cm]", ylabel="up [cm]")
 
 
 def _draw_crossings(axes: Axes, crossings: Crossings, half: Array, scale: float) -> None:
-    """Dots, blue and red; those beyond the picture are counted in its corner.
+    """Dots, blue and red, to one scale along both axes; those beyond are counted in the picture's corner.
 
     Args:
         axes: Where to draw.
@@ -99,6 +97,7 @@ def _draw_crossings(axes: Axes, crossings: Crossings, half: Array, scale: float)
         half: Width and height of the picture, half of them, in its unit, (2,).
         scale: Of its unit to the metre.
     """
+    set_scale(axes, np.zeros(2), 2.0 * float((half / size_of(axes)).max()))
     points = scale * np.column_stack([crossings.right, crossings.up])
     inside = crossings.crossed & (np.abs(np.nan_to_num(points)) <= half).all(axis=1)
     opacity = max(0.18, min(1.0, np.sqrt(64 / max(inside.sum(), 1))))  # of up to 64 dots full
@@ -114,15 +113,7 @@ def _draw_crossings(axes: Axes, crossings: Crossings, half: Array, scale: float)
     beyond = int((crossings.crossed & ~inside).sum())
     if beyond:
         wrong = bool((crossings.crossed & ~inside & crossings.wrong).any())
-        x, y = 0.08 / size_of(axes)
-        axes.text(
-            x, y, f"{beyond} beyond", size=SMALL, color=RED if wrong else MUTED, transform=axes.transAxes,
-            zorder=4,
+        axes.annotate(
+            f"{beyond} beyond", (0.0, 0.0), (5.8, 5.8), xycoords="axes fraction", textcoords="offset points",
+            size=SMALL, color=RED if wrong else MUTED, zorder=4,
         )  # fmt: skip
-
-
-def _fit(axes: Axes, half: Array) -> None:
-    """Fit half a width and height (2,) about the centre, the same scale along both."""
-    size = size_of(axes)
-    across, up = size * float((half / size).max())
-    axes.set(xlim=(-across, across), ylim=(-up, up))

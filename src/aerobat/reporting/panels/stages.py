@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from aerobat.arrays import Array
 from aerobat.planning import Plan
 from aerobat.planning.passages import as_passed
 from aerobat.problem.gate import Gate
-from aerobat.reporting.page import size_of, spread_out
+from aerobat.reporting.page import set_scale, size_of, spread_out
 from aerobat.reporting.panels.keyframes import (
     Keyframe,
     Keyframes,
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 VEHICLE = 0.6  # [in] a vehicle, about
 MOST_STAGES = 11  # that follow one another legibly
 STAGE_ROW = 0.5  # [in] kept free for names at the foot of a wide panel
-# [in] from a hair line's end to the text, for each alignment of it
-GAPS = {"right": np.array([-0.04, 0.0]), "left": np.array([0.04, 0.0]), "center": np.array([0.0, -0.04])}
+# [pt] from a hair line's end to the text, for each alignment of it
+GAPS = {"right": (-2.9, 0.0), "left": (2.9, 0.0), "center": (0.0, -2.9)}
 COMPONENTS = np.eye(2)  # lateral, vertical
 KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s²] that a key may show
 
@@ -169,8 +169,7 @@ def _fit(axes: Axes, points: Array, pad: float, min_side: float, columns: tuple[
     free = size - (left + right, foot)
     low, high = points.min(axis=0), points.max(axis=0)
     inches = float(((free - np.minimum(2 * pad, 0.5 * free)) / np.maximum(high - low, min_side)).min())
-    centre, half = (low + high) / 2 + np.array([right - left, -foot]) / 2 / inches, size / 2 / inches
-    axes.set(xlim=(centre[0] - half[0], centre[0] + half[0]), ylim=(centre[1] - half[1], centre[1] + half[1]))
+    set_scale(axes, (low + high) / 2 + np.array([right - left, -foot]) / 2 / inches, 1.0 / inches)
     return inches
 
 
@@ -232,16 +231,16 @@ def _draw_names(
 
 def _write_name(axes: Axes, keyframe: Keyframe, anchor: Array, side: str) -> None:
     """A stage's name in bold over its time and interval; a step of time has its time only."""
-    x, y = anchor + GAPS[side] / size_of(axes) * [np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())]
     below = side == "center"
+    place: dict[str, Any] = {"xy": anchor, "xytext": GAPS[side], "textcoords": "offset points", "ha": side}
     if keyframe.interval is None:
         up = "top" if below else "center"
-        axes.text(x, y, f"{keyframe.time:.2f} s", size=SMALL, color=MUTED, ha=side, va=up)
+        axes.annotate(f"{keyframe.time:.2f} s", size=SMALL, color=MUTED, va=up, **place)
         return
-    axes.text(x, y, keyframe.name, size=NORMAL, weight="bold", ha=side, va="top" if below else "bottom")
-    place = f"n = {keyframe.interval}" if keyframe.along is None else f"h along {keyframe.along:g}°"
-    facts = f"{keyframe.time:.2f} s\n{place}"
-    axes.text(x, y, "\n" * below + facts, size=SMALL, color=MUTED, linespacing=1.15, ha=side, va="top")
+    axes.annotate(keyframe.name, size=NORMAL, weight="bold", va="top" if below else "bottom", **place)
+    shown = f"n = {keyframe.interval}" if keyframe.along is None else f"h along {keyframe.along:g}°"
+    facts = f"{keyframe.time:.2f} s\n{shown}"
+    axes.annotate("\n" * below + facts, size=SMALL, color=MUTED, linespacing=1.15, va="top", **place)
 
 
 def names_beside(places: Array, thrust: Array, size: Array, columns: tuple[float, float]) -> Array:

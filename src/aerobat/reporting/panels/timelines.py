@@ -123,11 +123,10 @@ def fit_to_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
     pad = 0.08 * (top - bottom)
     axes.set_ylim(bottom - pad, top + pad)
     if lowest < bottom or highest > top:
-        x, y = 1.0 - 0.06 / size_of(axes)
         note = f"cut off: {lowest:.4g} to {highest:.4g}".replace("-", "−")
-        axes.text(
-            x, y, note, size=SMALL, color=MUTED, ha="right", va="top", transform=axes.transAxes,
-            bbox={"fc": "white", "ec": "none", "pad": 1.5}, zorder=4.0,
+        axes.annotate(
+            note, (1.0, 1.0), (-4.3, -4.3), xycoords="axes fraction", textcoords="offset points", size=SMALL,
+            color=MUTED, ha="right", va="top", bbox={"fc": "white", "ec": "none", "pad": 1.5}, zorder=4.0,
         )  # fmt: skip
 
 

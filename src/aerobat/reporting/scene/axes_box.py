@@ -10,7 +10,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.problem.gate import Gate
-from aerobat.reporting.page import size_of
+from aerobat.reporting.page import set_scale, size_of
 from aerobat.reporting.scene.camera import Camera, best_view
 from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted
 from aerobat.reporting.style import HAIR, NORMAL, PAPER, SMALL
@@ -106,8 +106,7 @@ def _fit(axes: Axes, box: AxesBox, camera: Camera) -> float:
     low, high = picture.min(axis=0), picture.max(axis=0)
     per_metre = float((room_for_box(size_of(axes)) / (high - low)).min())
     centre = (low + high) / 2 + (BOX_MARGINS[1] - BOX_MARGINS[0]) / 2 / per_metre
-    half = size_of(axes) / per_metre / 2
-    axes.set(xlim=(centre[0] - half[0], centre[0] + half[0]), ylim=(centre[1] - half[1], centre[1] + half[1]))
+    set_scale(axes, centre, 1.0 / per_metre)
     axes.set_axis_off()
     return per_metre
 
