@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from aerobat.declaration import validated
@@ -11,7 +10,7 @@ from aerobat.evaluation.score import Score
 from aerobat.flatness import vehicle_of
 from aerobat.planning import Plan, Tube
 from aerobat.reporting.captions import error_caption, plan_captions, score_caption
-from aerobat.reporting.page import AXIS, COLUMNS, TITLES, Place, blank_page, heading, house_style, panel
+from aerobat.reporting.page import AXIS, COLUMNS, TITLES, blank_page, heading, house_style, panel
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
@@ -26,22 +25,6 @@ if TYPE_CHECKING:
 WIDTH = 4.75  # [in] of a timeline
 ROW = 1.45  # [in] its height
 PITCH = 1.72  # [in] from one row to the next
-
-
-@dataclass(frozen=True)
-class PictureLayout:
-    """The places of a report's two pictures, above the timelines."""
-
-    path: Place
-    stages: Place
-    height: float  # [in] of both, titles included
-
-
-PICTURES_SIDE_BY_SIDE = PictureLayout((0.3, 0.05, 6.1, 6.1), (7.0, 0.5, 4.3, 5.65), 6.7)
-PICTURES_STACKED = PictureLayout((0.3, 3.5, 11.0, 4.0), (0.74, 0.5, 10.53, 2.2), 8.05)
-
-
-PATH_ALONE = 5.2  # [in] the height of the path of a flight whose plan is not known
 
 
 @validated
@@ -69,9 +52,9 @@ def _bare_page(flight: Flight, vehicle: Vehicle) -> Figure:
     """A page on a flight whose plan is not known: path and attitude, errors, rotor thrusts."""
     foot = AXIS + PITCH + ROW + TITLES
     many = f"{len(flight.vehicles)} flights" if flight.is_batch else "flight"
-    height = foot + PATH_ALONE + TITLES
-    figure = blank_page(height, f"{many} of {vehicle.name}", [error_caption(flight)])
-    path, pieces = panel(figure, 0.3, foot, 11.0, PATH_ALONE), flight.environment.pieces.pieces
+    path_height = 5.2  # [in]
+    figure = blank_page(foot + path_height + TITLES, f"{many} of {vehicle.name}", [error_caption(flight)])
+    path, pieces = panel(figure, 0.3, foot, 11.0, path_height), flight.environment.pieces.pieces
     reference = reference_poses(flight)
     note = draw_path(path, reference, actual_poses(flight), vehicle, (), pieces=pieces)
     heading(path, "Path and attitude", note)
@@ -158,14 +141,14 @@ def _pictures(
     """
     problem, pieces = plan.problem, plan.problem.surroundings.pieces.pieces
     rows += bool(pieces)
-    layout = PICTURES_STACKED if reference.is_flat else PICTURES_SIDE_BY_SIDE
+    # [in] the places of path and stages above the timelines, and the height of both with their titles
+    places, height = ((0.3, 0.05, 6.1, 6.1), (7.0, 0.5, 4.3, 5.65)), 6.7
+    if reference.is_flat:  # one above the other
+        places, height = ((0.3, 3.5, 11.0, 4.0), (0.74, 0.5, 10.53, 2.2)), 8.05
     foot = AXIS + PITCH * (rows - 1) + ROW + TITLES
     warnings = () if plan.assessment is None else plan.assessment.warnings
-    figure = blank_page(foot + layout.height, f"{plan.problem.name} · {vehicle.name}", facts, warnings)
-    path, stages = (
-        panel(figure, left, foot + bottom, width, height)
-        for left, bottom, width, height in (layout.path, layout.stages)
-    )
+    figure = blank_page(foot + height, f"{plan.problem.name} · {vehicle.name}", facts, warnings)
+    path, stages = (panel(figure, left, foot + bottom, *size) for left, bottom, *size in places)
     note = draw_path(path, reference, actual, vehicle, problem.gates, plan.stages, pieces=pieces)
     heading(path, "Path and attitude", note)
     heading(stages, "Stages" if plan.stages else "Attitudes", draw_stages(stages, plan, vehicle))

@@ -10,19 +10,13 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.declaration import validated
 from aerobat.reporting.facts import Fact, Facts, facts, kept, picture
-from aerobat.reporting.page import AXIS, TITLES, blank_page, heading, house_style, panel
+from aerobat.reporting.page import blank_page, column, heading, house_style
 from aerobat.reporting.style import BLUE, FAINT, INK, RED
 from aerobat.studies.inspection import CAUSES, ErrorShare, Inspection
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-ERROR = 1.7  # [in] the height of the whole error's timeline
-CAUSE = 0.75  # [in] of one cause's
-GAP = 0.5  # [in] between causes, for a name
-LEFT = 0.9  # [in]
-WIDTH = 10.4  # [in]
 
 
 @facts.register
@@ -71,22 +65,21 @@ def inspection_figure(inspection: Inspection) -> Figure:
     The main cause is red; a line marks the time of the largest error.
     """
     with house_style():
-        height = AXIS + len(inspection.shares) * (CAUSE + GAP) + ERROR + TITLES
+        count = len(inspection.shares)
+        height = 2.9 + 1.2 * count  # [in] of the whole error, and of each cause with its name
         figure = blank_page(height, "What caused the error", [inspection.verdict])
-        top = height - TITLES - ERROR
-        whole = panel(figure, LEFT, top, WIDTH, ERROR)
+        whole, *rows = column(figure, height, [2.3, *[1.0] * count])
         heading(whole, "Position error", "[cm] distance from the set-point")
         _draw(whole, inspection, np.linalg.norm(inspection.error, axis=1), INK)
         direction = inspection.direction
         parts = {name: errors @ direction for name, errors in inspection.errors.items()}
         limit = 110.0 * max(float(np.abs(part).max()) for part in parts.values()) + 1e-3
-        for k, share in enumerate(inspection.shares, 1):
-            axes = panel(figure, LEFT, top - k * (CAUSE + GAP), WIDTH, CAUSE)
+        for share, axes in zip(inspection.shares, rows, strict=True):
             colour = RED if share.cause == inspection.cause else BLUE
             heading(axes, "", str(share))
             _draw(axes, inspection, parts[share.cause], colour)
             axes.set_ylim(-limit, limit)
-            axes.tick_params(labelbottom=k == len(inspection.shares))
+            axes.tick_params(labelbottom=axes is rows[-1])
         axes.set_xlabel("time [s]")
     return figure
 

@@ -111,6 +111,19 @@ def panel(figure: Figure, left: float, bottom: float, width: float, height: floa
     return figure.add_axes((left / across, bottom / up, width / across, height / up))
 
 
+def column(figure: Figure, height: float, rows: Sequence[float]) -> list[Axes]:
+    """Axes one above the other; as it draws them, matplotlib finds their size and makes room for their texts.
+
+    Args:
+        figure: Of `blank_page`.
+        height: What remains below the page's lines [in].
+        rows: The heights of the axes, relative to each other.
+    """
+    part = height / float(figure.get_size_inches()[1])
+    figure.set_layout_engine("constrained", rect=(0.04, 0.0, 0.95, part), h_pad=0.1, hspace=0.0)
+    return list(figure.subplots(len(rows), height_ratios=rows))
+
+
 def size_of(axes: Axes) -> Array:
     """Width and height of axes [in], (2,)."""
     return np.asarray(cast("Figure", axes.figure).get_size_inches() * axes.get_position().size)
