@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from cyclopts import App, CycloptsError, Group
+from cyclopts import App, CycloptsError, Group, Parameter
 
 from aerobat.cli.failures import IMPORT_FLAG, ExitCode
 from aerobat.errors import SpecError
@@ -62,6 +62,7 @@ app = App(
     plugin fails.
     """,
     suppress_keyboard_interrupt=False,
+    default_parameter=Parameter(negative=""),  # without a --no-OPTION or --empty-OPTION for each OPTION
 )
 for title, commands in COMMANDS.items():
     group = Group.create_ordered(title)

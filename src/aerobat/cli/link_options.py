@@ -143,7 +143,7 @@ class RosOptions(MissionOptions, RosNodeOptions):
     reserve: Annotated[float, Parameter(group=planning, validator=FRACTION)] = 0.15
     """The fraction of thrusts that plans leave to the controller."""
 
-    world: Annotated[bool, Parameter(group=planning, negative="")] = False
+    world: Annotated[bool, Parameter(group=planning)] = False
     """Gates and goals stay in the world where their problems have them. Default: they move along, so that
     each maneuver begins where the vehicle is."""
 
@@ -152,7 +152,7 @@ class RosOptions(MissionOptions, RosNodeOptions):
     protocol and its line, as msp:/dev/ttyACM0, crsf:/dev/ttyUSB0 or msp:socket://HOST:PORT; or a Crazyflie of
     crazyswarm2's server, as crazyswarm2:/cf231, whose odometry is /cf231/odom."""
 
-    onboard: Annotated[bool, Parameter(group=linking, negative="")] = False
+    onboard: Annotated[bool, Parameter(group=linking)] = False
     """Plans are uploaded to a Crazyflie and flown by itself, rather than streamed to it."""
 
     rate: Annotated[float, Parameter(group=linking, validator=validators.Number(gte=50, lte=250))] = 100.0
@@ -161,10 +161,10 @@ class RosOptions(MissionOptions, RosNodeOptions):
     takeoff_height: Annotated[float, Parameter(group=linking, validator=POSITIVE)] = 3.0
     """Metres that the service takeoff climbs."""
 
-    sim_time: Annotated[bool, Parameter(group=linking, negative="")] = False
+    sim_time: Annotated[bool, Parameter(group=linking)] = False
     """Time is that of the topic /clock (use_sim_time); of ROS 2."""
 
-    jerk: Annotated[bool, Parameter(group=linking)] = True
+    jerk: Annotated[bool, Parameter(group=linking, negative="--no-jerk")] = True
     """Goals tell the jerk, as a second joint; some controllers warn of more than one."""
 
 

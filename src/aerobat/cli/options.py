@@ -56,9 +56,7 @@ def how_many(least: int, most: int) -> Parameter:
 class PluginOptions:
     """Options of all commands that code of one's own may take part in."""
 
-    plugins: Annotated[
-        tuple[Path, ...], Parameter(name="--import", group=output, negative="", show_default=False)
-    ] = ()
+    plugins: Annotated[tuple[Path, ...], Parameter(name="--import", group=output, show_default=False)] = ()
     """A Python file that registers maneuvers, planners or control laws of your own; may be given several
     times."""
 
@@ -67,7 +65,7 @@ class PluginOptions:
 class RunOptions(PluginOptions):
     """Options of all commands that report what they made."""
 
-    json: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    json: Annotated[bool, Parameter(group=output, show_default=False)] = False
     """Print the report as JSON on standard output, and nothing else."""
 
 
@@ -117,7 +115,7 @@ class OutputOptions(RunOptions):
 class ExplainingOptions:
     """Options of a report on a plan."""
 
-    explain: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    explain: Annotated[bool, Parameter(group=output, show_default=False)] = False
     """Report all facts, and those that take seconds to know: the recoveries to a hover from all along the
     plan, and how many of a hundred flights succeed of a plan that is not flown. A plan that takes
     suspiciously long gets another planner's second opinion. Where there is no plan, the changes with which
@@ -164,7 +162,7 @@ def _with_planner_options(cls: Options) -> Options:
 def _field(flag: str, offers: dict[str, PlannerOption]) -> tuple[str, Any, Any]:
     first = next(iter(offers.values()))
     is_switch = first.type is bool
-    parameter = Parameter(name=flag, group=planning, help=_help(offers), negative="", show_default=False)
+    parameter = Parameter(name=flag, group=planning, help=_help(offers), show_default=False)
     kind = bool if is_switch else first.type | None
     return option_name(flag), Annotated[kind, parameter], field(default=False if is_switch else None)
 
@@ -210,7 +208,7 @@ class PlanningOptions(PlannerOptions):
     """The columns of plan.csv, with a header: any of time, position, velocity, acceleration, jerk, attitude,
     rates, thrusts; or paper, the bare layout of the paper's reference code."""
 
-    paper: Annotated[bool, Parameter(group=planning, negative="", show_default=False)] = False
+    paper: Annotated[bool, Parameter(group=planning, show_default=False)] = False
     """Exactly the paper's formulation with its reference parameters: miqp of order 3, bounds per axis,
     unsigned and unordered stages, dt the first feasible of 50 steps from 0.1 to 4 s; no vehicle in
     planning. Flown by --controller all the same."""

@@ -28,14 +28,14 @@ from aerobat.studies.feasibility.probe import TIME_LIMIT
 class FeasibilityOptions(PlannerOptions):
     """Options of a map of what is feasible, and of a search for the least."""
 
-    over: Annotated[tuple[str, ...], Parameter(group=planning, negative="", show_default=False)] = ()
+    over: Annotated[tuple[str, ...], Parameter(group=planning, show_default=False)] = ()
     """A field and its values, FIRST:LAST:STEP or values between commas, as angle=0:90:10; once or twice.
     Fields have the names of files, as limits.velocity, gate.width, vehicle.mass, or speed where no other
     field ends so; angle is the tilt of a half-flip's gate."""
 
     least: Annotated[
         tuple[Literal["thrust-to-weight", "ceiling", "gate", "gate-height"], ...],
-        Parameter(group=planning, negative="", show_default=False),
+        Parameter(group=planning, show_default=False),
     ] = ()
     """The quantity whose least value is sought, once or more often. Default: all that the problem has, but
     gate-height, which makes slits of openings."""

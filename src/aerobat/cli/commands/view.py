@@ -51,7 +51,7 @@ class ViewOptions(VehicleOptions):
     speed: Annotated[float, Parameter(group=output, validator=POSITIVE)] = 0.5
     """The pace of time in the video, 1 as it was flown."""
 
-    open: Annotated[bool, Parameter(group=output, negative="", show_default=False)] = False
+    open: Annotated[bool, Parameter(group=output, show_default=False)] = False
     """Open the page in the browser."""
 
 
@@ -60,7 +60,7 @@ class ViewOptions(VehicleOptions):
 class LiveOptions:
     """Options of the live page."""
 
-    live: Annotated[bool, Parameter(group=serving, negative="", show_default=False)] = False
+    live: Annotated[bool, Parameter(group=serving, show_default=False)] = False
     """Serve a page with sliders, at which the maneuver is planned and flown anew, until Ctrl-C."""
 
     planner: Annotated[str | None, Parameter(group=serving)] = None
@@ -75,7 +75,7 @@ class LiveOptions:
     )
     """The port of 127.0.0.1, which no other machine reaches. Default: one that is free."""
 
-    no_browser: Annotated[bool, Parameter(group=serving, negative="", show_default=False)] = False
+    no_browser: Annotated[bool, Parameter(group=serving, show_default=False)] = False
     """Open no browser, and only say where the page is."""
 
     def require_live(self) -> None:
