@@ -200,7 +200,7 @@ def test_without_any_one_cause_conditions_can_still_be_flown_in(name: str) -> No
         tried.append(conditions)
         return Share(0, 1)
 
-    standing_in_the_way(ab.load_dispersion(name), share)
+    standing_in_the_way(ab.load_dispersion(name), 0.95, share)
     plan = ab.plan("line", ab.MinSnap(), "agile-quad")
     for conditions in tried:
         ab.prepare(plan, conditions=conditions)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -28,33 +28,27 @@ SWITCHED_OFF: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # causes, and
 )
 
 
-@dataclass(frozen=True)
-class Freed:
-    """The share of flights that pass without one cause."""
-
-    cause: str
-    share: Share
-
-    def sentence(self, probability: float) -> str:
-        """Return a sentence that says whether this cause alone stands in the way of passing."""
-        without = f"without it {self.share} pass"
-        if self.share.fraction >= probability:
-            return f"{self.cause} stands in the way: {without}"
-        return f"no single cause stands in the way, {self.cause} the most: {without}"
-
-
-def standing_in_the_way(conditions: Dispersion, share: Callable[[Dispersion], Share]) -> Freed | None:
-    """The cause without which most flights pass; None where nothing varies.
+def standing_in_the_way(
+    conditions: Dispersion, probability: float, share: Callable[[Dispersion], Share]
+) -> str:
+    """Name the cause without which most flights pass, in a sentence; empty where nothing varies.
 
     Args:
         conditions: What varies.
+        probability: With which a flight shall pass.
         share: Flies the same flights under other conditions.
     """
-    freed = []
+    shares: dict[str, Share] = {}
     for cause, off in SWITCHED_OFF.items():
         without = replace(conditions, **off)
         period = 1.0 / (without.control_rate or FlightConfig().rate)
         without = replace(without, computation_delay=min(without.computation_delay, period))
         if without != conditions:
-            freed.append(Freed(cause, share(without)))
-    return max(freed, key=lambda each: each.share.count, default=None)
+            shares[cause] = share(without)
+    if not shares:
+        return ""
+    most = max(shares, key=lambda cause: shares[cause].count)
+    found = f"without it {shares[most]} pass"
+    if shares[most].fraction >= probability:
+        return f"{most} stands in the way: {found}"
+    return f"no single cause stands in the way, {most} the most: {found}"

@@ -188,12 +188,13 @@ class Tightening:
     def _unreachable(self, best: Round, flights: range) -> Infeasible:
         """The error that says how often flights pass at most, and which cause stands in the way."""
         task, share = self.task, self.task.share(best.plan, flights)
-        cause = standing_in_the_way(task.conditions, lambda without: task.share(best.plan, flights, without))
-        why = "" if cause is None else f"; {cause.sentence(task.probability)}"
+        why = standing_in_the_way(
+            task.conditions, task.probability, lambda without: task.share(best.plan, flights, without)
+        )
         return Infeasible(
             f"'{task.problem.name}' on {task.vehicle.name} is not proven to pass as often as asked, "
             f"{percent(task.probability)} %: under {task.conditions.name} {share} pass at best, with a "
-            f"reserve of {best.reserve:g}{why}; ask for less, or better that",
+            f"reserve of {best.reserve:g}{f'; {why}' if why else ''}; ask for less, or better that",
             [attempt for done in self.rounds for attempt in done.plan.attempts],
             remedy="",
         )

@@ -30,8 +30,6 @@ Batch = Annotated[int, Field(ge=1, le=CHUNK, description=f"whole number from 1 t
 
 _WELL = tuple(outcome.name.lower() for outcome in Outcome if outcome.is_success)
 
-Progress = Callable[[int, int], None]
-
 
 @validated
 def sweep(
@@ -47,7 +45,7 @@ def sweep(
     workers: Workers | None = None,
     executor: Executor | None = None,
     keep: PathName | None = None,
-    progress: Progress | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Sweep:
     """Fly a plan many times, each flight with its own draw of the conditions, and say what it comes to.
 
@@ -78,18 +76,27 @@ def sweep(
     task = FlightTask(plan, vehicle, conditions, seed, controller or vehicle.controller, engine, batch)
     kept = KeptParts.of(keep, ("flights", "sweep"), lambda: _asked(task))
     spans = cut(range(runs))
-    tally = _Tally(progress)
-    chunks = {}
+    chunks: dict[range, Chunk] = {}
+    done = well = 0
+
+    def take(flights: range, chunk: Chunk) -> None:
+        nonlocal done, well
+        chunks[flights] = chunk
+        done += len(flights)
+        well += int(np.isin(chunk.columns["outcome"], _WELL).sum())
+        if progress is not None:
+            progress(done, well)
+
     for flights in spans:
         found = Chunk.of(kept.read(_name(flights)), len(flights))
         if found is not None:
-            chunks[flights] = tally.counted(found)
+            take(flights, found)
     missing = [flights for flights in spans if flights not in chunks]
     with pool(workers, executor, len(missing)) as flying:
         flown = flying.results(fly_chunk, task, missing, together=TOGETHER, compiles=True)
         for flights, chunk in flown:
             kept.write(_name(flights), chunk.arrays)
-            chunks[flights] = tally.counted(chunk)
+            take(flights, chunk)
     return _joined(task, [chunks[flights] for flights in spans])
 
 
@@ -119,23 +126,6 @@ def _asked(task: FlightTask) -> dict[str, Any]:
         "engine": task.engine,
         "chunks": [CHUNK, SAMPLED, STRIDE],
     }
-
-
-class _Tally:
-    """Flights done, and how many of them went well."""
-
-    def __init__(self, progress: Progress | None) -> None:
-        self._progress = progress
-        self._done = self._well = 0
-
-    def counted(self, chunk: Chunk) -> Chunk:
-        """The chunk, once it is counted."""
-        outcomes = chunk.columns["outcome"]
-        self._done += len(outcomes)
-        self._well += int(np.isin(outcomes, _WELL).sum())
-        if self._progress is not None:
-            self._progress(self._done, self._well)
-        return chunk
 
 
 def _joined(task: FlightTask, chunks: Sequence[Chunk]) -> Sweep:
