@@ -57,7 +57,7 @@ def test_a_page_is_legible_however_many_cells_there_are(rows: int, columns: int,
     figure = ab.map_figure(made(rows, columns))
     if rows * columns > 6:
         require_legible(figure, monkeypatch)
-    legend = [text.get_text() for text in figure.texts]
+    legend = [line for text in figure.axes[0].texts for line in text.get_text().splitlines()]
     for kind in kinds_of(made(rows, columns)).values():
         assert sum(text.startswith(f"{kind.letter}   {kind.name} ({kind.count})") for text in legend) == 1
 

@@ -121,7 +121,7 @@ def column(figure: Figure, height: float, rows: Sequence[float]) -> list[Axes]:
     """
     part = height / float(figure.get_size_inches()[1])
     figure.set_layout_engine("constrained", rect=(0.04, 0.0, 0.95, part), h_pad=0.1, hspace=0.0)
-    return list(figure.subplots(len(rows), height_ratios=rows))
+    return list(figure.subplots(len(rows), height_ratios=rows, squeeze=False)[:, 0])
 
 
 def size_of(axes: Axes) -> Array:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from string import ascii_lowercase
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import validated
-from aerobat.reporting.page import AXIS, COLUMNS, MARGIN, PAGE_WIDTH, blank_page, house_style, panel, write
+from aerobat.reporting.page import blank_page, column, house_style
 from aerobat.reporting.style import BAND, BLUE, FAINT, HAIR, INK, MUTED, PAPER, RED, SMALL
 from aerobat.studies.feasibility.feasibility_map import Cell, FeasibilityMap
 from aerobat.studies.feasibility.probe import Feasibility
@@ -27,7 +28,7 @@ FILLS = {  # of cells without a plan that flies
     Feasibility.REFUSED: HAIR,
     Feasibility.NO_ANSWER: PAPER,
 }
-WIDTH, HEIGHTS = 9.6, (2.6, 6.5)  # [in] of a grid: across the page, and as high as its rows ask
+WIDTH = 9.6  # [in] of a grid, about
 ROW = 0.2  # [in] of the legend
 
 
@@ -38,29 +39,29 @@ def map_figure(found: FeasibilityMap) -> Figure:
     Of two fields a grid, the first one's values upward; of one a line. What has no plan is grey; a plan that
     is not flyable is red.
     """
-    legend = [f"{kind.letter}   {kind.name} ({kind.count})" for kind in kinds_of(found).values()]
-    foot = AXIS + ROW * len(legend) + 0.1
-    width, height = _size(found)
+    texts = [f"{kind.letter}   {kind.name} ({kind.count})" for kind in kinds_of(found).values()]
+    legend = [line for text in texts for line in wrap(text, 150)]  # letters fit the page
+    height = _height(found) + 0.95 + ROW * len(legend)
     counts = ", ".join(f"{count} {feasibility}" for feasibility, count in found.counts.items())
     with house_style():
         title = f"{found.problem.name} · feasible region for {found.vehicle.name}"
-        figure = blank_page(foot + height + MARGIN, title, [f"cells: {counts}"])
-        axes = panel(figure, COLUMNS[0], foot, width, height)
+        figure = blank_page(height, title, [f"cells: {counts}"])
+        (axes,) = column(figure, height, [1.0])
         if len(found.axes) == 1:
             _draw_line(axes, found)
         else:
             _draw_grid(figure, axes, found)
-        for row, text in enumerate(legend):
-            at = foot - AXIS - ROW * (row + 0.5)
-            write(figure, COLUMNS[0], at, text, size=SMALL, color=MUTED, va="center")
+        axes.annotate(
+            "\n".join(legend), (0.0, 0.0), (0.0, -40.0), xycoords="axes fraction", textcoords="offset points",
+            size=SMALL, color=MUTED, va="top", linespacing=1.9,
+        )  # fmt: skip
     return figure
 
 
-def _size(found: FeasibilityMap) -> tuple[float, float]:
-    """Width and height of the axes [in]."""
-    if len(found.axes) == 1:
-        return PAGE_WIDTH - COLUMNS[0] - MARGIN, 2.6
-    return WIDTH, float(np.clip(0.5 * len(found.axes[0].values), *HEIGHTS))
+def _height(found: FeasibilityMap) -> float:
+    """About the height of the axes [in]: as high as the rows of a grid ask."""
+    rows = len(found.axes[0].values) if len(found.axes) > 1 else 1
+    return float(np.clip(0.5 * rows, 2.6, 6.5))
 
 
 def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
@@ -70,7 +71,7 @@ def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
     scale, colours = _colours(found, durations)
     axes.imshow(colours.reshape(rows, columns, 4), origin="lower", aspect="auto", interpolation="nearest")
     for axis, set_ticks, set_label, size in (
-        (found.axes[0], axes.set_yticks, axes.set_ylabel, _size(found)[1] / ROW),
+        (found.axes[0], axes.set_yticks, axes.set_ylabel, _height(found) / ROW),
         (found.axes[1], axes.set_xticks, axes.set_xlabel, WIDTH / 0.37),
     ):
         step = max(1, int(np.ceil(len(axis.values) / size)))
@@ -86,7 +87,7 @@ def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
 def _write_cells(axes: Axes, found: FeasibilityMap, durations: Array) -> None:
     """Write into each cell of a grid what it has room for."""
     kinds, columns = kinds_of(found), len(found.axes[1].values)
-    width, height = _size(found) / np.array([columns, len(found.axes[0].values)])
+    width, height = WIDTH / columns, _height(found) / len(found.axes[0].values)
     for number, (cell, part) in enumerate(zip(found.cells, _parts(durations), strict=True)):
         row, column = divmod(number, columns)
         is_dark = cell.is_planned and part > 0.55  # of the scale: from there letters are white
@@ -125,11 +126,9 @@ def _draw_scale(figure: Figure, axes: Axes, scale: Colormap, durations: Array) -
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    box, across = axes.get_position(), float(figure.get_size_inches()[0])
-    side = figure.add_axes((box.x1 + 0.15 / across, box.y0, 0.14 / across, box.height))
     values = Normalize(float(np.nanmin(durations)), float(np.nanmax(durations)))
-    figure.colorbar(ScalarMappable(values, scale), cax=side, label="duration [s]")
-    side.grid(visible=False)
+    bar = figure.colorbar(ScalarMappable(values, scale), ax=axes, label="duration [s]", aspect=20, pad=0.02)
+    bar.ax.grid(visible=False)
 
 
 def _draw_line(axes: Axes, found: FeasibilityMap) -> None:
