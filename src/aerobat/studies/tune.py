@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from typing import Annotated
 
@@ -31,7 +31,7 @@ from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning import Plan
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, length
 from aerobat.studies.flights import FlightTask, cut, fly_scores
-from aerobat.studies.workers import Pool, Workers, pool
+from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle
 
 TUNED = (
@@ -60,6 +60,17 @@ class FlightCosts:
 
     max_position_error_m: Array  # of a flight that diverged, the radius from which none comes back
     failed: Array  # 1 where a flight was lost, missed a gate or hit its frame, else 0
+
+    @classmethod
+    def of(cls, scores: Sequence[Score]) -> FlightCosts:
+        """The flights of these scores, one of each plan."""
+        radius = DIVERGENCE_RADIUS
+        errors = [
+            np.where(np.isfinite(each.stop), radius, np.minimum(each.max_position_error_m, radius))
+            for each in scores
+        ]
+        failed = [1.0 - each.succeeded for each in scores]
+        return cls(frozen(errors, "max_position_error_m"), frozen(failed, "failed"))
 
     @property
     def error_quantile_m(self) -> float:
@@ -164,16 +175,19 @@ def tune(
     plans = (plan,) if isinstance(plan, Plan) else tuple(plan)
     flown = _vehicle_of(plans, vehicle)
     names = _checked(gains, flown.controller)
+    own, varied = flown.controller, as_dispersion(conditions)
     training, others = range(flights), range(flights, 2 * flights)
     with pool(workers, executor, len(plans) * len(cut(training))) as flying:
-        objective = _Objective(flying, plans, flown, as_dispersion(conditions), seed)
-        search = _GainSearch(objective, names, training, evaluations, progress)
+
+        def fly(controller: Controller, numbers: range = training) -> FlightCosts:
+            tasks = tuple(FlightTask(each, flown, varied, seed, controller) for each in plans)
+            return FlightCosts.of(fly_scores(flying, tasks, numbers))
+
         with within_time(time_limit):
-            search.run()
-        trained = objective.fly(flown.controller, training), search.best
-        fresh = objective.fly(flown.controller, others), objective.fly(search.controller, others)
-    interval = _confidence(*fresh, seed)
-    return Tuning(flown, search.controller, names, search.tried, trained, fresh, interval)
+            found, costs, tried = _search(fly, own, names, evaluations, progress)
+        trained = fly(own), costs
+        fresh = fly(own, others), fly(found, others)
+    return Tuning(flown, found, names, tried, trained, fresh, _confidence(*fresh, seed))
 
 
 def _vehicle_of(plans: Sequence[Plan], vehicle: Vehicle | str | None) -> Vehicle:
@@ -198,85 +212,54 @@ def _checked(gains: Sequence[str], controller: Controller) -> tuple[str, ...]:
     return tuple(dict.fromkeys(gains))
 
 
-@dataclass(frozen=True)
-class _Objective:
-    """What every set of gains is tried on."""
-
-    flying: Pool
-    plans: tuple[Plan, ...]
-    vehicle: Vehicle
-    conditions: Dispersion
-    seed: int
-
-    def fly(self, controller: Controller, flights: range) -> FlightCosts:
-        """The flights of these numbers, of each plan."""
-        tasks = tuple(
-            FlightTask(plan, self.vehicle, self.conditions, self.seed, controller) for plan in self.plans
-        )
-        scores = fly_scores(self.flying, tasks, flights)
-        errors, failed = [_errors(each) for each in scores], [1.0 - each.succeeded for each in scores]
-        return FlightCosts(frozen(errors, "max_position_error_m"), frozen(failed, "failed"))
-
-
-def _errors(scores: Score) -> Array:
-    lost = np.isfinite(scores.stop)
-    return np.where(lost, DIVERGENCE_RADIUS, np.minimum(scores.max_position_error_m, DIVERGENCE_RADIUS))
-
-
 class _Ended(Exception):
     """The search has had its time, or its share of tries."""
 
 
-class _GainSearch:
-    """Gains that are tried, and the best of them."""
+def _search(
+    fly: Callable[[Controller], FlightCosts],
+    own: Controller,
+    names: tuple[str, ...],
+    evaluations: int,
+    progress: Callable[[int, float], None] | None,
+) -> tuple[Controller, FlightCosts, int]:
+    """Return the best gains, what they cost, and how many sets were tried.
 
-    def __init__(
-        self,
-        objective: _Objective,
-        names: tuple[str, ...],
-        flights: range,
-        evaluations: int,
-        progress: Callable[[int, float], None] | None,
-    ) -> None:
-        self._objective, self._names, self._flights = objective, names, flights
-        self._evaluations = evaluations
-        self._progress = progress
-        self._lowest = inf
-        self.tried = 0
-        self.controller = objective.vehicle.controller
+    The vehicle's own gains are tried first, then others, until none are better or time or tries are over.
+    """
+    from scipy.optimize import minimize
 
-    def run(self) -> None:
-        """Try the vehicle's own gains, then others, until none are better or time or tries are over."""
-        from scipy.optimize import minimize
+    best: tuple[Controller, FlightCosts] | None = None
+    tried = 0
 
-        size = len(self._names)
-        first = np.vstack([np.zeros(size), np.log(_FIRST_FACTOR) * np.eye(size)])
-        reach = np.log(MAX_FACTOR)
-        options = {
-            "initial_simplex": first,
-            "adaptive": True,
-            "xatol": _RESOLUTION,
-            "fatol": inf,
-            "maxiter": self._evaluations,
-        }
-        bounds = [(-reach, reach)] * size
-        with suppress(_Ended):
-            minimize(self._cost, first[0], method="Nelder-Mead", bounds=bounds, options=options)
-
-    def _cost(self, logarithms: Array) -> float:
-        if self.tried and (self.tried >= self._evaluations or out_of_time()):
+    def cost(logarithms: Array) -> float:
+        nonlocal best, tried
+        if tried and (tried >= evaluations or out_of_time()):
             raise _Ended
-        own = self._objective.vehicle.controller
-        factors = dict(zip(self._names, np.exp(logarithms).tolist(), strict=True))
+        factors = dict(zip(names, np.exp(logarithms).tolist(), strict=True))
         changed = {name: getattr(own, name) * factor for name, factor in factors.items()}
         controller = replace(own, **changed)
-        costs = self._objective.fly(controller, self._flights)
-        self.tried += 1
-        if costs.cost < self._lowest:
-            self._lowest, self.best, self.controller = costs.cost, costs, controller
-        if self._progress is not None:
-            self._progress(self.tried, self._lowest)
+        costs = fly(controller)
+        tried += 1
+        if best is None or costs.cost < best[1].cost:
+            best = controller, costs
+        if progress is not None:
+            progress(tried, best[1].cost)
         return costs.cost
+
+    size, reach = len(names), np.log(MAX_FACTOR)
+    first = np.vstack([np.zeros(size), np.log(_FIRST_FACTOR) * np.eye(size)])
+    options = {
+        "initial_simplex": first,
+        "adaptive": True,
+        "xatol": _RESOLUTION,
+        "fatol": inf,
+        "maxiter": evaluations,
+    }
+    with suppress(_Ended):
+        minimize(cost, first[0], method="Nelder-Mead", bounds=[(-reach, reach)] * size, options=options)
+    assert best is not None, "the vehicle's own gains are tried"
+    return *best, tried
 
 
 def _confidence(before: FlightCosts, after: FlightCosts, seed: int) -> tuple[float, float]:
