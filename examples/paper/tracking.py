@@ -65,8 +65,7 @@ class TrackingPage:
     def draw_errors(self, place: Place) -> None:
         """Draw errors of position and attitude."""
         column = self._stacked(place, 2)
-        timelines.draw_position_error(column[0], self.flight)
-        timelines.draw_attitude_error(column[1], self.flight)
+        timelines.draw_errors(column, self.flight)
         for axes in column:
             shade(axes, self.flight.times, self.flight.saturated)
         timelines.finish_column(column, "Tracking error", self.plan.stages, self.plan.duration)

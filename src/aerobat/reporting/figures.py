@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from aerobat.declaration import validated
 from aerobat.evaluation.score import Score
 from aerobat.flatness import vehicle_of
-from aerobat.planning import Plan, Tube
+from aerobat.planning import Plan
 from aerobat.reporting.captions import error_caption, plan_captions, score_caption
 from aerobat.reporting.page import AXIS, COLUMNS, TITLES, blank_page, heading, house_style, panel
 from aerobat.reporting.panels import timelines
@@ -59,17 +59,12 @@ def _bare_page(flight: Flight, vehicle: Vehicle) -> Figure:
     note = draw_path(path, reference, actual_poses(flight), vehicle, (), pieces=pieces)
     heading(path, "Path and attitude", note)
     errors = [panel(figure, COLUMNS[0], y, WIDTH, ROW) for y in (AXIS + PITCH, AXIS)]
-    _draw_errors(errors, flight)
+    timelines.draw_errors(errors, flight)
     thrusts = panel(figure, COLUMNS[1], AXIS + PITCH, WIDTH, ROW)
     timelines.draw_rotor_thrusts(thrusts, flight.times, flight.thrusts, vehicle)
     for column, title in ((errors, "Tracking error"), ([thrusts], "Thrust of each rotor")):
         timelines.finish_column(column, title, (), float(reference.times[-1]))
     return figure
-
-
-def _draw_errors(panels: Sequence[Axes], flight: Flight, tube: Tube | None = None) -> None:
-    timelines.draw_position_error(panels[0], flight, tube)
-    timelines.draw_attitude_error(panels[1], flight, tube)
 
 
 def report_figure(
@@ -94,7 +89,7 @@ def _flight_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | No
     reference = reference_poses(plan_reference(plan, vehicle))
     figure, rows = _pictures(plan, vehicle, reference, actual_poses(flight), 2, facts)
     errors, thrusts = ([panel(figure, x, y, WIDTH, ROW) for y in rows[:2]] for x in COLUMNS)
-    _draw_errors(errors, flight, plan.tube)
+    timelines.draw_errors(errors, flight, plan.tube)
     timelines.draw_specific_thrust(thrusts[0], plan, vehicle)
     timelines.draw_rotor_thrusts(thrusts[1], flight.times, flight.thrusts, vehicle)
     errors += _clearance_panel(figure, rows[2:], plan, vehicle, reference)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -170,8 +171,7 @@ class MovingPicture:
         places = LINES if subject.flight is not None else LINES[-1:]
         column = [panel(self._figure, *place) for place in places]
         if subject.flight is not None:
-            timelines.draw_position_error(column[0], subject.flight)
-            timelines.draw_attitude_error(column[1], subject.flight)
+            timelines.draw_errors(column, subject.flight)
         times = subject.reference.times
         timelines.draw_rotor_thrusts(column[-1], times, subject.thrusts, subject.vehicle)
         stages = subject.stages if len(subject.stages) <= 6 else ()  # whose names have room
@@ -219,8 +219,8 @@ class MovingPicture:
         """The first vehicle at the stages until an instant, as a breath."""
         poses = self.subject.shown[0]
         rows = poses.rows([stage.time for stage in self.subject.stages if stage.time <= time])
-        shapes = [self._vehicle(poses.position[k], poses.q_world_body[k], opacity=0.35) for k in rows]
-        return [shape for shapes_of_one in shapes for shape in shapes_of_one]
+        each = (self._vehicle(poses.position[k], poses.q_world_body[k], opacity=0.35) for k in rows)
+        return list(chain.from_iterable(each))
 
     def _vehicle(self, position: Array, q_world_body: Array, opacity: float = 1.0) -> list[Shape]:
         """The vehicle's glyph."""

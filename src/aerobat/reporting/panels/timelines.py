@@ -64,35 +64,27 @@ def clearances(position: Array, q_world_body: Array, vehicle: Vehicle, pieces: P
     return found
 
 
-def draw_position_error(axes: Axes, flight: Flight, tube: Tube | None = None) -> None:
-    """Draw the distance between actual and reference position, in the unit that suits its largest value.
+def draw_errors(panels: Sequence[Axes], flight: Flight, tube: Tube | None = None) -> None:
+    """Draw the distance between actual and reference position, and below it the angle between attitudes.
 
-    With a plan's tube, what is within it is shaded.
+    The distance is in the unit that suits its largest value. With a plan's tube, what is within it is shaded.
     """
-    error = flight.position_error
-    bound = np.zeros(1) if tube is None else np.array(tube.position_error)
-    largest = max(error.max(), bound.max())
+    position, attitude = flight.position_error, np.rad2deg(flight.attitude_error)
+    within = np.zeros((2, 1))
+    if tube is not None:
+        within = np.array([tube.position_error, np.rad2deg(tube.attitude_error)])
+    largest = max(position.max(), within[0].max())
     unit, size = next((u for u in LENGTHS if largest >= u[1]), LENGTHS[-1])
-    draw_series(axes, flight.times, error / size, INK)
-    if tube is not None:
-        _shade_tube(axes, tube, bound / size)
-    axes.set(ylabel=f"position error [{unit}]", ylim=(0.0, _top(largest / size)))
-
-
-def draw_attitude_error(axes: Axes, flight: Flight, tube: Tube | None = None) -> None:
-    """Draw the angle between actual and reference attitude; with a plan's tube, that is shaded."""
-    error = np.rad2deg(flight.attitude_error)
-    bound = np.zeros(1) if tube is None else np.rad2deg(tube.attitude_error)
-    draw_series(axes, flight.times, error, INK)
-    if tube is not None:
-        _shade_tube(axes, tube, bound)
-    axes.set(ylabel="attitude error [°]", ylim=(0.0, _top(max(error.max(), bound.max()))))
-
-
-def _shade_tube(axes: Axes, tube: Tube, bound: Array) -> None:
-    """Shade what a tube's fraction of the flights keeps within, (T,)."""
-    label = f"{100 * tube.level:g} % of flights under {tube.conditions}"
-    axes.fill_between(tube.times, 0.0, bound, color=SKY, alpha=0.35, linewidth=0.0, label=label)
+    for axes, name, error, bound in (
+        (panels[0], f"position error [{unit}]", position / size, within[0] / size),
+        (panels[1], "attitude error [°]", attitude, within[1]),
+    ):
+        draw_series(axes, flight.times, error, INK)
+        if tube is not None:
+            label = f"{100 * tube.level:g} % of flights under {tube.conditions}"
+            axes.fill_between(tube.times, 0.0, bound, color=SKY, alpha=0.35, linewidth=0.0, label=label)
+        top = 1.12 * float(max(error.max(), bound.max()))
+        axes.set(ylabel=name, ylim=(0.0, max(top, 0.01)))  # what is smaller is noise
 
 
 def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicle) -> None:
@@ -228,8 +220,3 @@ def finish_column(column: Sequence[Axes], title: str, stages: Sequence[PlacedSta
             axes.tick_params(labelbottom=False)
     column[-1].set_xlabel("time [s]")
     heading(column[0], title)
-
-
-def _top(largest: float) -> float:
-    """Return the upper end of an axis that starts at zero; what is smaller than 0.01 is noise."""
-    return max(1.12 * float(largest), 0.01)
