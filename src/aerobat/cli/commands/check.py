@@ -71,25 +71,29 @@ def check(plan: Path, options: CheckOptions = CheckOptions()) -> ExitCode:
     """
     chosen = None if options.vehicle is None else named_vehicle(options.vehicle)
     found, facts = read_source(plan, options.rate)
-    trajectory = found.trajectory if isinstance(found, Plan) else found
+    if isinstance(found, Plan):
+        trajectory, own, environment = found.trajectory, found.vehicle, found.problem.environment
+    else:
+        trajectory, own, environment = found, None, Environment()
     if options.heading is not None:
         trajectory = replace(trajectory, heading=radians(options.heading))
-    own_vehicle = found.vehicle if isinstance(found, Plan) else None
-    vehicle = chosen or own_vehicle or load_vehicle(default_vehicle())
-    environment = found.problem.environment if isinstance(found, Plan) else Environment()
+    vehicle = chosen or own or load_vehicle(default_vehicle())
+    if isinstance(found, Plan):
+        envelope = Task.of(found.problem, vehicle).envelope(found.stages)
+        explained, assumed = _explained(found, trajectory, vehicle), []
+    else:
+        envelope, explained = Envelope(), None
+        beyond = ("no wind", "no limits, stages or gates of a problem")
+        assumed = [*assumed_of_path(options, vehicle, environment), *beyond, *facts]
     envelope = replace(
-        Task.of(found.problem, vehicle).envelope(found.stages) if isinstance(found, Plan) else Envelope(),
+        envelope,
         speed=options.max_speed or inf,
         tilt=inf if options.max_tilt is None else radians(options.max_tilt),
         body_rate=inf if options.max_rate is None else radians(options.max_rate),
         moment=options.max_moment or inf,
     )
     certificate = certify(trajectory, vehicle, environment, envelope)
-    explained = _explained(found, trajectory, vehicle) if isinstance(found, Plan) else None
-    beside, assumed = Facts(evidence(explained)), list[str]()
-    if not isinstance(found, Plan):
-        beyond = ("no wind", "no limits, stages or gates of a problem")
-        assumed = [*assumed_of_path(options, vehicle, environment), *beyond, *facts]
+    beside = Facts(evidence(explained))
     if options.json:
         print_json(to_json(plain(certificate) | plain(beside) | ({"assumed": assumed} if assumed else {})))
         return _judgement(certificate)
