@@ -15,14 +15,14 @@ from dataclasses import replace
 import pytest
 
 import aerobat as ab
-from aerobat.viewer.live.replan import FLIGHTS, MAX_PAGES, Answer, Desk, LiveVerdict, Overtaken, Replanner
+from aerobat.viewer.live.replan import FLIGHTS, MAX_PAGES, Answer, Desk, Overtaken, Replanner
 from aerobat.viewer.live.server import GRACE
 from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.live.view_live import LiveView
 from shared_plans import shared_plan
 
 JSON = {"Content-Type": "application/json"}
-FINE = Answer(LiveVerdict("Feasible", "fine", True))
+FINE = Answer("Feasible", "fine", True)
 
 
 @pytest.fixture(scope="module")
@@ -63,11 +63,9 @@ def test_a_plan_for_where_the_sliders_stand_is_the_plan_of_that_problem(replanne
     assert answer.scene.times[-1] == pytest.approx(again.duration)
     assert answer.scene.gates[0].position[2] == 4.0
     assert again.certificate is not None
-    assert answer.verdict == LiveVerdict(
-        "Feasible" if again.certified else "Not proven",
-        f"{again.duration:.2f} s, {again.certificate.why}",
-        again.certified,
-    )
+    assert answer.word == ("Feasible" if again.certified else "Not proven")
+    assert answer.sentence == f"{again.duration:.2f} s, {again.certificate.why}"
+    assert answer.is_well == again.certified
 
 
 def moved_gate(height: float) -> ab.Problem:
@@ -86,9 +84,9 @@ def test_what_cannot_be_is_said_in_a_sentence(
     replanner: Replanner, values: dict[str, float], word: str, sentence: str
 ) -> None:
     answer = replanner.answer(values, never)
-    assert answer.verdict.word == word
-    assert sentence in answer.verdict.sentence
-    assert not answer.verdict.is_well
+    assert answer.word == word
+    assert sentence in answer.sentence
+    assert not answer.is_well
     assert answer.scene is None
 
 
@@ -101,7 +99,7 @@ def test_dispersed_flights_are_of_the_same_plan_and_counted(replanner: Replanner
     assert many.scene is not None
     assert len(many.scene.tracks) == FLIGHTS
     failed = sum(track.failed for track in many.scene.tracks)
-    assert many.verdict.word == f"{failed} of {FLIGHTS} flights fail"
+    assert many.word == f"{failed} of {FLIGHTS} flights fail"
     assert (many.scene.planned[-1] == one.planned[-1]).all()
 
 

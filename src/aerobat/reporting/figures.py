@@ -13,7 +13,7 @@ from aerobat.reporting.captions import error_caption, plan_captions, score_capti
 from aerobat.reporting.page import AXIS, COLUMNS, TITLES, blank_page, heading, house_style, panel
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.path import draw_path
-from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
+from aerobat.reporting.panels.poses import PoseHistory, actual_poses, is_flat, plan_reference, reference_poses
 from aerobat.reporting.panels.stages import draw_stages
 from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle, as_vehicle
@@ -138,7 +138,7 @@ def _pictures(
     rows += bool(pieces)
     # [in] the places of path and stages above the timelines, and the height of both with their titles
     places, height = ((0.3, 0.05, 6.1, 6.1), (7.0, 0.5, 4.3, 5.65)), 6.7
-    if reference.is_flat:  # one above the other
+    if is_flat(reference.position):  # one above the other
         places, height = ((0.3, 3.5, 11.0, 4.0), (0.74, 0.5, 10.53, 2.2)), 8.05
     foot = AXIS + PITCH * (rows - 1) + ROW + TITLES
     warnings = () if plan.assessment is None else plan.assessment.warnings

@@ -37,11 +37,6 @@ class PoseHistory:
         """The longest side of the box around the path [m]."""
         return float(np.ptp(self.position, axis=0).max())
 
-    @property
-    def is_flat(self) -> bool:
-        """True if the path is much longer than high."""
-        return is_flat(self.position)
-
     def rows(self, times: Sequence[float] | Array) -> list[int]:
         """The first rows at or after `times` [s]."""
         rows = np.searchsorted(self.times, np.asarray(times, dtype=float) - 1e-9)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from aerobat.errors import AerobatError, Infeasible
@@ -30,25 +30,22 @@ class Overtaken(Exception):
 
 
 @dataclass(frozen=True)
-class LiveVerdict:
-    """An answer in words."""
+class Answer:
+    """The verdict on a setting in words, and its scene; None where there is no plan."""
 
     word: str
     sentence: str
     is_well: bool
-
-
-@dataclass(frozen=True)
-class Answer:
-    """The verdict on a setting, and what there is to see of it; nothing where there is no plan."""
-
-    verdict: LiveVerdict
     scene: Scene | None = None
 
+    @property
+    def verdict(self) -> dict[str, Any]:
+        """The words as plain data for the page."""
+        return {"word": self.word, "sentence": self.sentence, "is_well": self.is_well}
+
     def record(self) -> dict[str, Any]:
-        """Plain data for the page."""
-        shown = None if self.scene is None else packed(self.scene)
-        return {"verdict": asdict(self.verdict), "scene": shown}
+        """All of it as plain data for the page."""
+        return {"verdict": self.verdict, "scene": None if self.scene is None else packed(self.scene)}
 
 
 @dataclass
@@ -66,9 +63,9 @@ class Replanner:
             planned = self.plan(setting, is_overtaken)
             return judged(planned, flown(planned, setting))
         except Infeasible as error:
-            return Answer(LiveVerdict("Infeasible", _capitalized(error.sentence), False))
+            return Answer("Infeasible", _capitalized(error.sentence), False)
         except AerobatError as error:
-            return Answer(LiveVerdict("Refused", _capitalized(str(error)), False))
+            return Answer("Refused", _capitalized(str(error)), False)
 
     def plan(self, setting: Setting, is_overtaken: Callable[[], bool] = lambda: False) -> Plan:
         """The setting's plan, however it is flown."""
@@ -105,10 +102,10 @@ def judged(plan: Plan, flight: Flight) -> Answer:
     many = len(scene.tracks) > 1
     if failed:
         word = f"{len(failed)} of {len(scene.tracks)} flights fail" if many else "Planned, but fails"
-        return Answer(LiveVerdict(word, failed[0], False), scene)
+        return Answer(word, failed[0], False, scene)
     flown = f"; {scene.facts[0]}" if many else ""
     word = "Feasible" if plan.certified else "Not proven"
-    return Answer(LiveVerdict(word, f"{plan.duration:.2f} s, {proof}{flown}", plan.certified), scene)
+    return Answer(word, f"{plan.duration:.2f} s, {proof}{flown}", plan.certified, scene)
 
 
 def _planned(setting: Setting, is_overtaken: Callable[[], bool]) -> Plan:

@@ -17,7 +17,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from aerobat.errors import SpecError
-from aerobat.viewer.live.replan import Answer, Desk, LiveVerdict
+from aerobat.viewer.live.replan import Answer, Desk
 
 HOST = "127.0.0.1"
 MAX_CONNECTIONS = 64  # at a time, each with a thread: half of the files that the smallest shells let be open
@@ -28,7 +28,7 @@ MAX_QUESTION = 100_000  # bytes: a few numbers for each gate
 MAX_NAME = 100  # letters of a page's name for itself
 JSON = "application/json"
 HTML = "text/html; charset=utf-8"
-BROKEN = LiveVerdict("Broken", "Aerobat failed at this, which is its fault; the terminal says where.", False)
+BROKEN = Answer("Broken", "Aerobat failed at this, which is its fault; the terminal says where.", False)
 
 
 class LiveServer(ThreadingHTTPServer):
@@ -160,7 +160,7 @@ class _Handler(BaseHTTPRequestHandler):
             return self.server.desk.ask(question.page, question.number, question.values, self._has_hung_up)
         except Exception:
             traceback.print_exc()
-            return Answer(BROKEN)
+            return BROKEN
 
     def _has_hung_up(self) -> bool:
         """True once nobody waits for the answer any more."""

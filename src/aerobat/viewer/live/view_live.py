@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import webbrowser
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -91,10 +91,7 @@ def view_live(
     replanner = Replanner(setting, sliders_of(setting, plan))
     replanner.keep(setting, plan)
     first = judged(plan, flown(plan, setting))
-    controls = {
-        "sliders": [slider.record() for slider in replanner.sliders],
-        "verdict": asdict(first.verdict),
-    }
+    controls = {"sliders": [slider.record() for slider in replanner.sliders], "verdict": first.verdict}
     assert first.scene is not None, "a plan has one"
     page = document(first.scene, controls)
     live = LiveView(LiveServer(port, page, Desk(replanner.answer)))
