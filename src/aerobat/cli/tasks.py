@@ -50,41 +50,37 @@ def read_task(name: str, options: ProblemOptions, paper: bool = False) -> tuple[
     return (problem.as_in_paper() if paper else problem), vehicle
 
 
-def planned(
+def read_run(
     name: str,
     options: PlanningOptions,
     command: Literal["fly", "plan", "sweep"],
     flight: FlightSettings = FlightSettings(),
-    make: Callable[[RunRecord], Plan] | None = None,
-    explain: bool = False,
-    workers: str | None = None,
-) -> tuple[Plan, RunRecord]:
-    """The plan that a command names, certified for its vehicle, and what it takes to make it again.
+) -> tuple[RunRecord, Plan | None]:
+    """Return all that it takes to do a run, and its plan where that is read from a file and not made.
+
+    A plan that is read is certified for its vehicle.
 
     Args:
         name: Of a problem, or a plan's file or folder.
         options: As they were given.
         command: That plans.
         flight: How the plan is flown.
-        make: The way from a record to a plan, by default planning.
-        explain: Whether what takes seconds to know is found out too.
-        workers: Who flies what tells whether flights pass.
     """
     source, columns = plan_source(name), column_groups(options.columns)
     if source is not None:
         if flight.probability is not None:
             raise SpecError(f"--pass plans anew, and '{name}' is a plan; give a problem, or leave --pass out")
-        plan = read_saved_plan(source, options)
-        assert plan.vehicle is not None, "a plan that is read is certified for a vehicle"
+        saved = read_saved_plan(source, options)
+        assert saved.vehicle is not None, "a plan that is read is certified for a vehicle"
         record = RunRecord(
             command=command,
-            problem=plan.problem,
-            vehicle=plan.vehicle,
+            problem=saved.problem,
+            vehicle=saved.vehicle,
             source=name,
             flight=flight,
             columns=columns,
         )
-        return with_explanation(plan) if explain else plan, record
+        return record, saved
     for flag, value in (("--rate", options.rate), ("--heading", options.heading)):
         if value is not None:
             raise SpecError(f"{flag} is for a CSV file, not for the problem '{name}'; leave it out")
@@ -100,7 +96,7 @@ def planned(
         columns=columns,
         plugins=tuple(map(str, options.plugins)),
     )
-    return plan_of(record, explain, workers) if make is None else make(record), record
+    return record, None
 
 
 def flight_settings(options: ConditionsOptions, plant: str | None = None) -> FlightSettings:
@@ -140,17 +136,22 @@ def _controller(options: ConditionsOptions) -> str:
     return name
 
 
-def plan_of(record: RunRecord, explain: bool = False, workers: str | None = None) -> Plan:
-    """The plan of a run, made anew; explained on request, in what is left of its time.
+def plan_of(
+    record: RunRecord, saved: Plan | None = None, explain: bool = False, workers: str | None = None
+) -> Plan:
+    """The plan of a run, saved or made anew; explained on request, in what is left of its time.
 
     Raises Infeasible where there is none; on request with the changes that would help, once it is said that
     there is none.
 
     Args:
         record: What is planned, and how.
+        saved: The plan, where it is not made.
         explain: Whether what takes seconds to know is found out too.
         workers: Who flies what tells whether flights pass.
     """
+    if saved is not None:
+        return with_explanation(saved) if explain else saved
     planner = record.planner
     assert planner is not None, "a plan that came from a file is not made"
     if record.flight.probability is not None:

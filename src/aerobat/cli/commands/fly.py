@@ -11,7 +11,7 @@ from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ExplainingOptions, FlyingOptions, PlanningOptions
 from aerobat.cli.runs.folder import BLACKBOX, Flown, finish
 from aerobat.cli.runs.record import FlightSettings
-from aerobat.cli.tasks import flight_settings, planned
+from aerobat.cli.tasks import flight_settings, plan_of, read_run
 from aerobat.control import named_controller
 from aerobat.evaluation import score
 from aerobat.planning import Plan, nominal_flight
@@ -47,9 +47,8 @@ def fly(
     autopilot = AUTOPILOTS.instance(flying.autopilot)
     if autopilot is not None:
         autopilot.require()
-    plan, record = planned(
-        problem, options, "fly", settings, explain=explaining.explain, workers=flying.workers
-    )
+    record, saved = read_run(problem, options, "fly", settings)
+    plan = plan_of(record, saved, explaining.explain, flying.workers)
     return finish(plan, record, options, flown(plan, settings), explaining.explain)
 
 

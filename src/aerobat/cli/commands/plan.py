@@ -6,7 +6,7 @@ from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ConditionsOptions, ExplainingOptions, PlanningOptions
 from aerobat.cli.runs.folder import finish
 from aerobat.cli.runs.record import FlightSettings
-from aerobat.cli.tasks import flight_settings, planned
+from aerobat.cli.tasks import flight_settings, plan_of, read_run
 from aerobat.errors import SpecError
 
 
@@ -34,7 +34,6 @@ def plan(
             "--conditions, --seed, --controller, --autopilot and --workers are for --pass, or for "
             "`aerobat fly`; leave them out"
         )
-    found, record = planned(
-        problem, options, "plan", settings, explain=explaining.explain, workers=passing.workers
-    )
+    record, saved = read_run(problem, options, "plan", settings)
+    found = plan_of(record, saved, explaining.explain, passing.workers)
     return finish(found, record, options, explain=explaining.explain)

@@ -24,7 +24,7 @@ from aerobat.declaration.registry import imported_plugins
 from aerobat.documents import read_json
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_table
-from aerobat.planning import Plan, with_explanation
+from aerobat.planning import Plan
 from aerobat.simulation import Flight, load_flight
 
 
@@ -62,10 +62,7 @@ def repeat(folder: Path, options: RepeatOptions = RepeatOptions()) -> ExitCode:
         names = [name for name, value in _results(out, record).items() if not _same(value, earlier.get(name))]
         return _told(folder, record, f"{', '.join(names)} differ" if names else "", ExitCode.WELL)
     run = _Run.read(folder, record)
-    if record.planner is not None:
-        plan = plan_of(record, options.explain)
-    else:
-        plan = with_explanation(run.plan) if options.explain else run.plan
+    plan = plan_of(record, run.plan if record.planner is None else None, options.explain)
     flight = flown(plan, record.flight) if record.command == "fly" else None
     code = finish(plan, record, options, flight, options.explain)
     return _told(folder, record, run.difference(_Run(plan, flight.flight if flight else None)), code)

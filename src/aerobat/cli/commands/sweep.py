@@ -14,7 +14,7 @@ from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import finish_study, is_of_a_run
 from aerobat.cli.runs.record import RECORD, FlightSettings, RunRecord, read_record, write_record
 from aerobat.cli.runs.unfinished import Unfinished
-from aerobat.cli.tasks import plan_of, planned
+from aerobat.cli.tasks import plan_of, read_run
 from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
@@ -93,13 +93,11 @@ def sweep(
         table=sweeping.table,
     )
     require_writable(f"flights.{settings.table}")
-
-    def kept_or_new(record: RunRecord) -> Plan:
+    record, plan = read_run(problem, options, "sweep", settings)
+    if plan is None:
         folder = options.out or record.folder
         require_replaceable(folder, is_of_a_run)  # before hours of flying
-        return _plan_kept(Unfinished.beside(folder).folder, record)
-
-    plan, record = planned(problem, options, "sweep", settings, kept_or_new)
+        plan = _plan_kept(Unfinished.beside(folder).folder, record)
     run_sweep(plan, record, options, sweeping.workers)
 
 

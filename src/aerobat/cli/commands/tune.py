@@ -22,7 +22,7 @@ from aerobat.cli.options import (
     output,
 )
 from aerobat.cli.progress import Progress, showing
-from aerobat.cli.tasks import planned
+from aerobat.cli.tasks import plan_of, read_run
 from aerobat.cli.terminal import print_json, say
 from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
@@ -76,7 +76,7 @@ def tune(*problems: str, options: TuningOptions = TuningOptions()) -> ExitCode:
         raise SpecError(f"--out must be a vehicle's file, its name ending in .toml, got {out}")
     conditions = load_dispersion(options.conditions)
     planning = PlanningOptions(vehicle=options.vehicle, angle=options.angle, plugins=options.plugins)
-    plans = [planned(problem, planning, "plan")[0] for problem in problems]
+    plans = [plan_of(*read_run(problem, planning, "plan")) for problem in problems]
     with showing(Progress("sets of gains tried", options.evaluations)) as progress:
         tuning = tune_gains(
             plans,

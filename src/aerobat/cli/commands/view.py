@@ -14,7 +14,7 @@ from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import FLIGHT, REPLAY
 from aerobat.cli.runs.record import RECORD, USUAL_CONDITIONS, RunRecord, read_record
 from aerobat.cli.runs.saved_plans import named_vehicle, whole_plan
-from aerobat.cli.tasks import planned
+from aerobat.cli.tasks import plan_of, read_run
 from aerobat.cli.terminal import open_in_browser, print_json
 from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
@@ -95,7 +95,8 @@ def serve(source: Path | None, options: ViewOptions, serving: LiveOptions) -> No
             )
     conditions = load_dispersion(serving.conditions or USUAL_CONDITIONS)
     choice = PlanningOptions(vehicle=options.vehicle, planner=serving.planner, plugins=options.plugins)
-    plan, record = planned(PROBLEM if source is None else str(source), choice, "plan")
+    record, saved = read_run(PROBLEM if source is None else str(source), choice, "plan")
+    plan = plan_of(record, saved)
     with view_live(
         plan, record.planner, conditions=conditions, port=serving.port or 0, browser=False
     ) as page:
