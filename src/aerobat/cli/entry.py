@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(arguments: Sequence[str]) -> ExitCode:
-    """Run a command, and say in a sentence why where it comes to no end of its own."""
+    """Run a command; a failure is told in a sentence."""
     # matrices are small: a pool of threads takes longer to begin than all of them
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(500_000, 10, 10)  # a short process need not look for cyclic garbage,

@@ -1,4 +1,4 @@
-"""Ends that a run comes to without one of its own: a sentence each, and with --json the same as data."""
+"""Failures of runs: a sentence each, and with --json the same as data."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ExitCode(IntEnum):
 
 @dataclass(frozen=True)
 class Failure:
-    """The reason why a run came to no end of its own."""
+    """The reason why a run failed."""
 
     kind: str  # bad_input, no_plan, missing_backend, plugin, interrupted or terminated
     message: str  # one sentence

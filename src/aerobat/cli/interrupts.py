@@ -18,12 +18,14 @@ _noticed: list[int] = []
 
 @contextmanager
 def interruptible(afterwards: bool) -> Iterator[None]:
-    """Have either raise KeyboardInterrupt and be remembered, even where something swallows the exception.
+    """Have SIGINT and SIGTERM raise KeyboardInterrupt in the block, even where the exception is swallowed.
 
-    What fails once it is remembered fails of it: extensions written in C make other exceptions of this one.
-    Where Python can raise nothing, as in `__del__` and weak references' callbacks, it is raised right after.
+    A signal is remembered, and any later failure counts as caused by it: extensions written in C turn the
+    exception into others. Where Python can raise nothing, as in `__del__` and the callbacks of weak
+    references, it is raised right after.
 
-    `afterwards`: whether the process goes on when the block ends; if not, they mean nothing from there.
+    Args:
+        afterwards: Whether the process goes on when the block ends; if not, signals are ignored from there.
     """
     _noticed.clear()
     hook = sys.unraisablehook
@@ -42,7 +44,7 @@ def interruptible(afterwards: bool) -> Iterator[None]:
 
 
 def end_interrupts() -> None:
-    """Let nothing interrupt what follows. Raises KeyboardInterrupt where something has before."""
+    """Ignore signals from here on. Raises KeyboardInterrupt if one came before."""
     for number in _SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     if _noticed:
@@ -50,12 +52,12 @@ def end_interrupts() -> None:
 
 
 def is_interrupted() -> bool:
-    """True where a signal came, whatever became of the exception that it raised."""
+    """True if a signal came, whatever became of the exception that it raised."""
     return bool(_noticed)
 
 
 def interrupted_by() -> ExitCode:
-    """Return what a run that was interrupted comes to, by the signal that did it."""
+    """Return the exit code of an interrupted run, by the signal that came."""
     return ExitCode.TERMINATED if signal.SIGTERM in _noticed else ExitCode.INTERRUPTED
 
 

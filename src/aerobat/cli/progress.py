@@ -38,19 +38,19 @@ class Progress:
         self._done, self._note = 0, ""
 
     def tell(self, done: int, note: str = "") -> None:
-        """Take note of how many are done, and of what is to be said of them."""
+        """Record how many are done, with a note."""
         self._done, self._note = done, note
 
     def step(self, note: str) -> None:
-        """Take note of one more."""
+        """Record that one more is done, with a note."""
         self.tell(self._done + 1, note)
 
     def counting(self, name: str) -> Callable[[int, int], None]:
-        """Return what takes note of how many are done, and of how many of those are of that name."""
+        """Return a callback that records how many are done, and how many of these are so named."""
         return lambda done, some: self.tell(done, f"{some} {name}")
 
     def __str__(self) -> str:
-        """How many, for how long, what is to be said of them, and how long still."""
+        """The count, the time spent, the note, and the time left."""
         spent = self._clock() - self._began
         of = f" of {self._total}" if self._total else ""
         text = f"{self._doing} {self._done}{of} in {spent:.0f} s" + (f": {self._note}" if self._note else "")
@@ -81,7 +81,7 @@ class PlanningProgress(Progress):
         self.begin(planner)
 
     def begin(self, planner: str) -> None:
-        """Another planner's turn."""
+        """Start anew with another planner."""
         self._planner = planner
         self._began = self._clock()
         self._best = inf  # [s] the shortest duration that will do
@@ -89,20 +89,20 @@ class PlanningProgress(Progress):
         self._last = self._trial = ""
 
     def tried(self, trial: Round) -> None:
-        """Take note of flights of a plan that is to pass; the next one is planned anew."""
+        """Record a round of flights; after it the plan is sought anew."""
         self._best = inf
         self._rounds += 1
         self._trial = f"; round {self._rounds}, {trial}"
 
     def record(self, attempt: Attempt) -> None:
-        """Take note of an attempt that ended."""
+        """Record an attempt that ended."""
         self._tried += 1
         self._last = f"{attempt.duration:.3f} s, {attempt.outcome}"
         if attempt.feasible:
             self._best = min(self._best, attempt.duration)
 
     def __str__(self) -> str:
-        """Which planner, for how long, how good so far, and what it tried last."""
+        """The planner, the time spent, its best duration, and its last attempt."""
         best = "no plan so far" if self._best == inf else f"{self._best:.3f} s so far"
         last = f"; attempt {self._tried}: {self._last}" if self._tried else ""
         spent = self._clock() - self._began
@@ -111,7 +111,7 @@ class PlanningProgress(Progress):
 
 @contextmanager
 def showing(progress: P) -> Iterator[P]:
-    """Show what is recorded in the block, by whichever way standard error has."""
+    """Show progress while the block runs: live on a terminal, else as lines on standard error."""
     if sys.stderr.isatty():
         from rich.console import Console
 
@@ -129,11 +129,11 @@ def showing(progress: P) -> Iterator[P]:
 
 
 def tell(progress: Progress, wait: Callable[[float], bool], seconds: float) -> None:
-    """Say where work is, again and again.
+    """Print a line of progress at intervals until the work ends.
 
     Args:
-        progress: Where it is.
-        wait: Waits for so many seconds [s], less where the work ends: then it returns true.
+        progress: What is printed.
+        wait: Waits for so many seconds, and returns true as soon as the work ends.
         seconds: From one line to the next [s].
     """
     while not wait(seconds):

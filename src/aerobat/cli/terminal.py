@@ -55,13 +55,13 @@ def provide_streams() -> None:
 
 
 def discard(stream: TextIO) -> None:
-    """Let a stream that no longer takes anything take it in silence, what is in its buffer too."""
+    """Redirect a stream that takes nothing more to the null device, with what is left in its buffer."""
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def is_broken(stream: TextIO) -> bool:
-    """True of a stream that takes nothing more; it is tried with an empty line."""
+    """True if a stream cannot be written to any more; an empty line is written to find out."""
     try:
         stream.write("\n")
         stream.flush()
@@ -71,7 +71,7 @@ def is_broken(stream: TextIO) -> bool:
 
 
 def say(sentence: str) -> None:
-    """Print a sentence to standard error, if that takes it; on one line, whatever names it holds."""
+    """Print a sentence to standard error, on one line whatever names it holds; ignore a broken stream."""
     line = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in sentence)
     try:
         print(f"aerobat: {line}", file=sys.stderr, flush=True)
@@ -89,7 +89,7 @@ def open_in_browser(place: Path | str) -> None:
 
 
 def print_json(text: str) -> None:
-    """Print JSON, of which no character is lost: those that standard output cannot write are escaped."""
+    """Print JSON; characters that standard output cannot write are escaped."""
     encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     if codecs.lookup(encoding).name != "utf-8":
         text = "".join(sign if sign.isascii() else json.dumps(sign)[1:-1] for sign in text)

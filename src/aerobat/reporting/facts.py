@@ -90,7 +90,7 @@ class Rows(tuple[Any, ...]):
 def facts(result: object) -> Iterator[Fact]:
     """Yield the facts of a result. Raises SpecError for what is none.
 
-    A dataclass that nobody tells has its fields for facts, for files alone.
+    The facts of a dataclass without a registered function are its fields, for files alone.
     """
     told = _registered(facts, result)
     if told is not None:
@@ -129,7 +129,7 @@ def kept(**values: Any) -> Iterator[Fact]:
 
 
 def _registered(told: Any, result: object) -> Any:
-    """The function for a result that its room's module registers; None where there is none."""
+    """Import the module of `TOLD_IN` for a result, and return the function registered; None without one."""
     own = told.dispatch(object)
     for cls in type(result).__mro__:
         rooms = [room for room in TOLD_IN if f"{cls.__module__}.".startswith(f"{room}.")]

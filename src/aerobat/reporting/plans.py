@@ -225,7 +225,7 @@ def _limiting(found: Certificate) -> Iterator[Fact]:
 
 
 def _within(found: Finding, limit: float) -> str:
-    """What a quantity reaches, when, and what it may reach."""
+    """Name a quantity with the value that it reaches, the time, and its limit."""
     allowed = f"{'at most' if found.side is Side.MAX else 'at least'} {found.shown(limit, 2)}"
     return f"{found.name}: {found.shown(found.value, 2)} at {found.time:.2f} s, {allowed}"
 

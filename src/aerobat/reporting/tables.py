@@ -39,7 +39,7 @@ def print_table(table: Table | Group) -> None:
 
 
 def _told(result: Any, heading: str = "", inner: bool = False) -> Iterator[Told]:
-    """Yield what a table tells of a result; of one within another no lines."""
+    """Yield the facts that a table shows, with their headings; a result within another has no lines."""
     for fact in facts(result):
         if fact.text is not None or _is_plain(fact.value):
             shown = fact.value if fact.text is None else fact.text
@@ -69,7 +69,7 @@ def _parts(told: Iterable[Told]) -> Iterator[Table | Text]:
 
 
 def _kind(fact: Fact) -> str:
-    """The place of a fact: a line of its own, rows of a table, or a row."""
+    """The form of a fact: a line of its own, a table of rows, or a row."""
     if not fact.label:
         return "line"
     return "rows" if fact.text is None and isinstance(fact.value, list | tuple) else "row"

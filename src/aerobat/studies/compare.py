@@ -29,7 +29,7 @@ class Entry:
     score: Score | None
     planning_time: float  # [s]
     outcome: str  # a sentence
-    note: str = ""  # what else is to be said of the plan, a sentence
+    note: str = ""  # a remark on the plan, a sentence
 
     @property
     def certified(self) -> bool:

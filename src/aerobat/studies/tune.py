@@ -4,7 +4,7 @@ The search is Nelder and Mead's, by SciPy, over the logarithms of the gains. It 
 slopes of them, so that a quantile's kinks and the price of a lost flight do it no harm; six gains take it one
 or two hundred costs; and it draws nothing, so that all chance is in the flights. All costs of a search are of
 the same flights, each with its own draws (common random numbers): two sets of gains differ by what they do,
-not by their luck. The luck of the best is told by other flights, which the search has not seen.
+not by their luck. The best set is judged on other flights, which the search has not seen.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class FlightCosts:
         return self.error_quantile_m + FAILURE * self.failed_fraction
 
     def resampled(self, flights: NDArray[np.int64]) -> FlightCosts:
-        """The flights of these numbers, some of them perhaps many times."""
+        """Return the costs of the flights with these numbers, which may repeat."""
         return FlightCosts(self.max_position_error_m[:, flights], self.failed[:, flights])
 
     def __str__(self) -> str:
@@ -124,7 +124,7 @@ class Tuning:
 
     @property
     def verdict(self) -> str:
-        """In words, what the gains are worth."""
+        """A sentence on whether the gains are better, and by how much the cost changes."""
         low, high = (f"{100 * bound:+.2f}" for bound in self.interval)
         found = "better" if self.is_better else "no better"
         return f"the gains found are {found} on fresh flights, cost {low} to {high} cm (95 % confidence)"

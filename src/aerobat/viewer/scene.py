@@ -67,7 +67,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The content of a view: a vehicle, gates, the planned path and the tracks of those who flew it."""
+    """The content of a view: a vehicle, gates, the planned path and the flights along it."""
 
     title: str
     facts: tuple[str, ...]  # a line each

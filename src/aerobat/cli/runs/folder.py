@@ -76,17 +76,16 @@ def written(
     *tables: Group,
     hint: str = "",
 ) -> None:
-    """Put a run in its place as one, in place of an earlier run there, then say what it is.
+    """Write a run to its folder as a whole, in place of an earlier run there, then print its report.
 
-    Ctrl-C comes in time until the folder is in its place, and means nothing afterwards: a run is interrupted
-    or done.
+    Ctrl-C discards the run until the folder is in its place, and is ignored afterwards.
 
     Args:
         record: What it takes to do it again.
-        options: Where to write, and in what form to say it.
+        options: Where to write, and whether to print JSON.
         write: Writes all but the record to a folder.
-        facts: What it is, as JSON.
-        tables: The same for people.
+        facts: The report as JSON.
+        tables: The report for people.
         hint: What to type next.
     """
     folder = options.out or record.folder
@@ -142,7 +141,7 @@ class Flown:
 def finish(
     plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown | None = None, explain: bool = False
 ) -> ExitCode:
-    """Write what was made, then say what it is; the exit code tells if all is well.
+    """Write a plan, with its flight if it was flown, then print the report; return the exit code.
 
     Args:
         plan: What was planned.

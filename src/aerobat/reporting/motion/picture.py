@@ -106,7 +106,7 @@ def subject_of(shown: Flight | Plan, plan: Plan | None, vehicle: Vehicle | str |
 
 
 class MovingPicture:
-    """The picture of a subject; whatever stands still in it is drawn once.
+    """The picture of a subject; what does not move is drawn once.
 
     Args:
         subject: What it is of.
@@ -216,7 +216,7 @@ class MovingPicture:
         return shapes
 
     def _passed(self, time: float) -> list[Shape]:
-        """The first vehicle at the stages until an instant, as a breath."""
+        """The first vehicle at the stages until an instant, nearly transparent."""
         poses = self.subject.shown[0]
         rows = poses.rows([stage.time for stage in self.subject.stages if stage.time <= time])
         each = (self._vehicle(poses.position[k], poses.q_world_body[k], opacity=0.35) for k in rows)

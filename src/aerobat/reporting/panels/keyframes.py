@@ -60,7 +60,7 @@ class Keyframe:
     time: float  # [s]
     interval: int | None = None
     gate: str | None = None  # the name of the gate that is passed then
-    along: float | None = None  # [deg] the heading of the plane that it is shown in, where that is its own
+    along: float | None = None  # [deg] the heading of its own plane, where it is shown in one
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +78,17 @@ class Keyframes:
         return [k for k, keyframe in enumerate(self.instants) if keyframe.interval is not None]
 
     def only(self, kept: list[int]) -> Keyframes:
-        """Some of them."""
+        """The keyframes at these places."""
         instants = tuple(self.instants[k] for k in kept)
         return Keyframes(instants, self.position[kept], self.q_world_body[kept], self.thrust[kept])
 
     def numbered(self) -> Keyframes:
-        """The same, each with its number before its name, as timelines count stages."""
+        """The keyframes with numbers before their names, as timelines count stages."""
         instants = tuple(replace(each, name=f"{k} {each.name}") for k, each in enumerate(self.instants, 1))
         return replace(self, instants=instants)
 
     def storyboard(self, plane: ManeuverPlane, downward: bool, pitch: float) -> tuple[Keyframes, Array]:
-        """The same in a row, each turned about the vertical until its thrust lies in the plane.
+        """Lay the keyframes out in a row, each turned about the vertical until its thrust lies in the plane.
 
         Args:
             plane: That is shown.
@@ -96,7 +96,7 @@ class Keyframes:
             pitch: From one to the next [m].
 
         Returns:
-            The keyframes, told in which plane each is shown, and their turns, (k, 4).
+            The keyframes, each with the heading of its own plane, and their turns, (k, 4).
         """
         headings = [plane.of_thrust(thrust) for thrust in self.thrust]
         angles = np.deg2rad([plane.heading_deg - own.heading_deg for own in headings])

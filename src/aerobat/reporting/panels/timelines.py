@@ -100,13 +100,13 @@ def draw_rotor_thrusts(axes: Axes, times: Array, thrusts: Array, vehicle: Vehicl
 
 
 def draw_limits(axes: Axes, limits: Sequence[float], label: str = "") -> None:
-    """Draw dashed lines across axes, the last of them with a name."""
+    """Draw dashed lines across axes; the last one carries the label for the legend."""
     for limit in limits:
         axes.axhline(limit, **LIMIT, label=label if limit == limits[-1] else "")
 
 
 def fit_to_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
-    """Make the upright axis show limits and values (...), cut off, and saying so, far beyond the limits."""
+    """Fit the vertical axis to limits and values (...); what lies far beyond is cut off, with a note."""
     low, high = min(limits), max(limits)
     lowest = min(float(values.min()), low)
     highest = max(float(values.max()), high)

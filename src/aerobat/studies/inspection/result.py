@@ -91,7 +91,7 @@ class ErrorShare:
 
     @property
     def is_felt(self) -> bool:
-        """True where it is more than nothing."""
+        """True where its part is large enough to be told."""
         return abs(self.error) >= _SHOWN
 
 
@@ -158,7 +158,7 @@ class Inspection:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """All that bears on how far the result goes, a line each."""
+        """Sentences on what limits the result, a line each."""
         place = self.alignment
         shift = f"the log's clock reads {place.time_shift:.3f} s when the plan begins"
         moved = f"its axes are turned by {np.rad2deg(place.yaw):.2f}° and moved by {length(place.moved)}"

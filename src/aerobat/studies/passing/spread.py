@@ -97,7 +97,7 @@ def with_more_thrust(
 
 
 def _excess(strays: Array, fraction: float) -> float:
-    """The part of its tolerance within which a fraction of the flights keeps to an attitude; 0 for none."""
+    """The attitude error, over its tolerance, that a fraction of flights stays within; 0 for no flight."""
     known = strays[np.isfinite(strays)]
     return float(np.quantile(known, fraction)) if len(known) else 0.0
 
@@ -112,14 +112,14 @@ def _planned_thrust(plan: Plan, times: Array) -> float:
 
 
 def _pointed(gate: Gate, scores: Score) -> Gate:
-    """The gate with the rest of its tolerance of attitude."""
+    """The gate with its tolerance of attitude less the attitude error of flights."""
     strays = radians(_quantile(gate, scores, "attitude_error_deg"))
     left = max(gate.attitude_tolerance - strays, MIN_TOLERANCE * gate.attitude_tolerance)
     return replace(gate, attitude_tolerance=left)
 
 
 def _smaller(gate: Gate, scores: Score) -> Gate:
-    """The gate with the rest of its opening."""
+    """The gate with its opening less the offsets of flights, on both sides."""
     across, up = (
         max(1.0 - 2.0 * _quantile(gate, scores, offset) / side, MIN_OPENING)
         for side, offset in zip(gate.opening.size.tolist(), ("lateral", "up"), strict=True)

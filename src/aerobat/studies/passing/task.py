@@ -19,7 +19,7 @@ from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool
 from aerobat.vehicle import Vehicle
 
-SCREENED = 200  # flights after which a plan that passes too seldom for its share to be doubtful is left
+SCREENED = 200  # flights after which a plan is given up whose share is refuted by then
 # fractions of the plain plan's largest body rate, to which tightened ones keep: rotors that lag otherwise
 # than known are late, by the more degrees the faster a vehicle turns. Half the body rate made flips of five
 # vehicles at most 2 % longer, with a fifth as many off their attitude; a third gained nothing (lab book)
@@ -90,7 +90,7 @@ class PassingTask:
         return fly_scores(self.flying, (task,), flights)[0]
 
     def training(self, found: Plan, flights: range) -> Score:
-        """Scores of the flights that tell how to tighten, of the first ones where these tell that enough."""
+        """Scores of the training flights; of the first ones alone where these refute the probability."""
         first = self.scores(found, flights[:SCREENED])
         if len(flights) <= SCREENED or passed(first).interval[1] < self.probability:
             return first
@@ -102,11 +102,11 @@ class PassingTask:
         return passed(self.scores(found, flights, conditions))
 
     def is_enough(self, share: Share) -> bool:
-        """True where so many flights prove the probability."""
+        """True where this share of the flights proves the probability."""
         return share.interval[0] >= self.probability
 
     def is_likely_enough(self, share: Share) -> bool:
-        """True where others would prove it too, even if one standard deviation fewer of them pass."""
+        """True where the probability is proven even if one standard deviation fewer flights pass."""
         deviation = sqrt(share.of * share.fraction * (1.0 - share.fraction))
         return self.is_enough(Share(max(share.count - ceil(deviation), 0), share.of))
 

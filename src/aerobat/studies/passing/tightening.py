@@ -110,9 +110,9 @@ class Tightening:
     def _round(self, steps: int) -> Round | None:
         """The best round with so many steps of reserve; None where there is no such plan.
 
-        Variants are tried until enough flights pass, from when on none but the last one is. Until then the
-        best ones go on to the next round, and the best is tried again with more thrust in gates that flights
-        pass off their attitude, which stays if that helps.
+        Variants are tried until enough of one's flights pass; later rounds try that variant alone. Where none
+        is enough, the best ones go on to the next round. The best is also planned again with more thrust in
+        gates that flights pass off their attitude, and the added thrust stays if more flights pass.
         """
         tried: list[_Flown] = []
         for variant in self._variants:
@@ -130,7 +130,7 @@ class Tightening:
         return self._with_more_thrust(steps, tried[0])
 
     def _with_more_thrust(self, steps: int, best: _Flown) -> Round:
-        """A round with more thrust in gates, if more of its flights pass; else the one that is known."""
+        """The round planned again with more thrust in gates, if more of its flights pass; else the round."""
         kept = 0.5 * (1.0 + self.task.probability)  # half of those that may fail
         firm = with_more_thrust(self._problem, self.task.vehicle, best.round.plan, best.scores, kept)
         again = None if firm == self._problem else self._planned(steps, best.variant, firm)
@@ -140,7 +140,7 @@ class Tightening:
         return again.round
 
     def _planned(self, steps: int, variant: Variant, problem: Problem, longest: float = inf) -> _Flown | None:
-        """A round with so many steps of reserve; None without a plan, or one that is short enough."""
+        """The round with so many steps of reserve; None where there is no plan, or none short enough."""
         reserve = round(self._least + steps * STEP, 9)
         try:
             found = self.task.tightened(self.rounds[0].plan, reserve, variant, problem, self._limit)

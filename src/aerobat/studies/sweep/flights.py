@@ -95,7 +95,7 @@ def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> tuple[Columns,
 
 
 def _drawn(draws: Draws) -> Columns:
-    """What flights draw, in few numbers."""
+    """Columns of what flights draw: a few numbers a flight."""
     effectiveness = draws.columns["effectiveness"]
     return {
         "flight": np.array(draws.flights),
@@ -118,7 +118,7 @@ def _norms(vectors: Array) -> Array:
 
 
 def _scored(scores: Score) -> Columns:
-    """What flights came to."""
+    """Columns of how flights went: outcome, errors, nearest obstacle and passages."""
     flights = list(scores)
     columns: Columns = {"outcome": np.array([flight.outcome.name.lower() for flight in flights])}
     columns |= {name: np.array(getattr(scores, name)) for name in _ERRORS}
@@ -133,7 +133,7 @@ def _scored(scores: Score) -> Columns:
 
 
 def _passage_outcome(passage: Passage) -> str:
-    """One passage's end, as the outcome of a flight that has no other would be."""
+    """The outcome of one passage: passed, not reached, or its failure by the name of an `Outcome`."""
     if passage.failure is not None:
         return passage.failure.outcome.name.lower()
     return NOT_REACHED if np.isnan(passage.time) else PASSED

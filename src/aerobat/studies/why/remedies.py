@@ -191,5 +191,5 @@ def _planned(task: Request, planner: Planner) -> Plan | None:
 
 
 def _told(changes: tuple[str, ...]) -> str:
-    """Changes together, in words."""
+    """Join changes in words; without any, the task as it is."""
     return " and ".join(changes) or "as it is"

@@ -126,10 +126,10 @@ Answering = Callable[[Mapping[str, float], Callable[[], bool]], Answer]
 
 
 class Desk:
-    """Takes questions from many threads and has them answered in one, so that those who ask go on.
+    """Takes questions from many threads and answers them in one thread, one after another.
 
-    A question that was overtaken by another of the same page, or that nobody waits for any more, is given up,
-    before it is begun or on the way.
+    A question is given up, before or while it is answered, once the same page has asked another, or nobody
+    waits for the answer any more.
     """
 
     def __init__(self, answering: Answering) -> None:

@@ -87,7 +87,7 @@ class LiveServer(ThreadingHTTPServer):
             self._close_silent(PATIENCE)
 
     def keep(self, request: socket.socket, duration: float) -> None:
-        """Keep a connection for so long [s] from now on, whoever wants its place."""
+        """Keep a connection open for this duration [s], even where others wait for its place."""
         with self._changed:
             self._kept_until[request] = time.monotonic() + duration
 
@@ -95,7 +95,7 @@ class LiveServer(ThreadingHTTPServer):
         """Say nothing of a page that was closed, or went on to another question, before its answer came."""
 
     def _close_silent(self, patience: float) -> None:
-        """End all connections that are kept no longer, so much [s] later; their threads see that and end."""
+        """Shut down the connections whose time ended more than `patience` [s] ago; their threads then end."""
         now = time.monotonic()
         for request, until in list(self._kept_until.items()):
             if now > until + patience:
@@ -176,7 +176,7 @@ class _Handler(BaseHTTPRequestHandler):
                 self.connection.settimeout(PATIENCE)
 
     def _is_own_host(self) -> bool:
-        """True where the browser means this machine, whatever name some page gave it; else it is told no."""
+        """True if the request names this machine as its host; refuse it otherwise."""
         if self.headers.get("Host") in self.server.hosts:
             return True
         self._refuse(HTTPStatus.FORBIDDEN)
