@@ -15,7 +15,7 @@ from dataclasses import replace
 import pytest
 
 import aerobat as ab
-from aerobat.viewer.live.replan import FLIGHTS, MAX_PAGES, Answer, Desk, Overtaken, Replanner
+from aerobat.viewer.live.replan import FLIGHTS, MAX_PAGES, Answer, Desk, Replanner, Superseded
 from aerobat.viewer.live.server import GRACE
 from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.live.view_live import LiveView
@@ -103,9 +103,9 @@ def test_dispersed_flights_are_of_the_same_plan_and_counted(replanner: Replanner
     assert (many.scene.planned[-1] == one.planned[-1]).all()
 
 
-def test_planning_that_is_overtaken_is_given_up(replanner: Replanner) -> None:
+def test_planning_that_is_superseded_is_given_up(replanner: Replanner) -> None:
     plans = len(replanner.plans)
-    with pytest.raises(Overtaken):
+    with pytest.raises(Superseded):
         replanner.answer({"gates[0].position.z": 2.7}, lambda: True)
     assert len(replanner.plans) == plans
 
@@ -115,11 +115,11 @@ def test_the_last_question_of_each_page_is_answered_in_whichever_order_they_come
     begun, go_on, pause = threading.Event(), threading.Event(), threading.Event()
     seen: list[tuple[str, float]] = []
 
-    def answering(values: Mapping[str, float], is_overtaken: Callable[[], bool]) -> Answer:
+    def answering(values: Mapping[str, float], is_superseded: Callable[[], bool]) -> Answer:
         begun.set()
         go_on.wait()
-        if is_overtaken():
-            raise Overtaken
+        if is_superseded():
+            raise Superseded
         seen.append((values["page"], values["number"]))
         return FINE
 
@@ -150,7 +150,7 @@ def test_the_last_question_of_each_page_is_answered_in_whichever_order_they_come
 
 
 def test_a_question_that_nobody_waits_for_is_not_answered_and_pages_are_forgotten() -> None:
-    desk = Desk(lambda values, is_overtaken: FINE)
+    desk = Desk(lambda values, is_superseded: FINE)
     assert desk.ask("gone", 1, {}, lambda: True) is None
     for k in range(MAX_PAGES + 10):
         assert desk.ask(f"page {k}", 1, {}, never) == FINE
@@ -188,12 +188,12 @@ def test_the_page_is_served_to_this_machine_alone_and_to_pages_of_no_other_place
 def test_who_hangs_up_while_something_is_planned_is_planned_for_no_more(live: LiveView, monkeypatch) -> None:
     begun, ended, pause = threading.Event(), threading.Event(), threading.Event()
 
-    def answering(values: Mapping[str, float], is_overtaken: Callable[[], bool]) -> Answer:
+    def answering(values: Mapping[str, float], is_superseded: Callable[[], bool]) -> Answer:
         begun.set()
-        while not is_overtaken():
+        while not is_superseded():
             pause.wait(0.001)
         ended.set()
-        raise Overtaken
+        raise Superseded
 
     monkeypatch.setattr(live._server.desk, "_answering", answering)
     content = b'{"page": "gone", "number": 1, "values": {}}'

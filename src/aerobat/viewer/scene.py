@@ -38,7 +38,6 @@ class Ghost:
     """The vehicle as it is planned at one instant."""
 
     name: str  # of the stage, empty where there is none
-    time: float  # [s]
     position: Array  # [m], (3,)
     q_world_body: Array  # (4,)
 
@@ -261,6 +260,6 @@ def _ghosts(
         instants += [("", t) for t in steps if all(abs(t - known) > apart for _, known in instants)]
     rows = np.searchsorted(times, [time - 1e-9 for _, time in instants]).clip(0, len(times) - 1)
     return tuple(
-        Ghost(name, time, position[k], q_world_body[k])
-        for (name, time), k in zip(instants, rows.tolist(), strict=True)
+        Ghost(name, position[k], q_world_body[k])
+        for (name, _), k in zip(instants, rows.tolist(), strict=True)
     )

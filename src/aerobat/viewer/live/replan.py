@@ -25,7 +25,7 @@ POSES = 6000  # that are shown of all flights together, each some 7 ms of a flip
 KEPT = 32  # plans: sliders are moved to and fro
 
 
-class Overtaken(Exception):
+class Superseded(Exception):
     """The sliders were moved again meanwhile."""
 
 
@@ -56,22 +56,22 @@ class Replanner:
     sliders: Sequence[Slider]
     plans: dict[tuple[Any, ...], Plan] = field(default_factory=dict)
 
-    def answer(self, values: Mapping[str, float], is_overtaken: Callable[[], bool]) -> Answer:
-        """The answer to sliders that were moved, by their keys. Raises Overtaken once it is that."""
+    def answer(self, values: Mapping[str, float], is_superseded: Callable[[], bool]) -> Answer:
+        """Answer sliders that were moved, by their keys. Raises Superseded once they are moved again."""
         try:
             setting = moved(self.setting, self.sliders, values)
-            planned = self.plan(setting, is_overtaken)
+            planned = self.plan(setting, is_superseded)
             return judged(planned, flown(planned, setting))
         except Infeasible as error:
             return Answer("Infeasible", _capitalized(error.sentence), False)
         except AerobatError as error:
             return Answer("Refused", _capitalized(str(error)), False)
 
-    def plan(self, setting: Setting, is_overtaken: Callable[[], bool] = lambda: False) -> Plan:
+    def plan(self, setting: Setting, is_superseded: Callable[[], bool] = lambda: False) -> Plan:
         """The setting's plan, however it is flown."""
         key = _key(setting)
         if key not in self.plans:
-            self.keep(setting, _planned(setting, is_overtaken))
+            self.keep(setting, _planned(setting, is_superseded))
         return self.plans[key]
 
     def keep(self, setting: Setting, plan: Plan) -> None:
@@ -108,10 +108,10 @@ def judged(plan: Plan, flight: Flight) -> Answer:
     return Answer(word, f"{plan.duration:.2f} s, {proof}{flown}", plan.certified, scene)
 
 
-def _planned(setting: Setting, is_overtaken: Callable[[], bool]) -> Plan:
+def _planned(setting: Setting, is_superseded: Callable[[], bool]) -> Plan:
     def look_up(attempt: object) -> None:
-        if is_overtaken():
-            raise Overtaken
+        if is_superseded():
+            raise Superseded
 
     with within_time(PATIENCE):
         found = plan(setting.problem, setting.planner, setting.vehicle, look_up)
@@ -155,11 +155,11 @@ class Desk:
             if len(self._last) > MAX_PAGES:
                 del self._last[next(iter(self._last))]
 
-        def is_overtaken() -> bool:
+        def is_superseded() -> bool:
             return self._is_closed or self._last.get(page, number) > number or has_hung_up()
 
         try:
-            answer = self._worker.submit(self._answer, values, is_overtaken)
+            answer = self._worker.submit(self._answer, values, is_superseded)
         except RuntimeError:  # closed
             return None
         return answer.result()
@@ -169,8 +169,8 @@ class Desk:
         self._is_closed = True
         self._worker.shutdown(wait=False)
 
-    def _answer(self, values: Mapping[str, float], is_overtaken: Callable[[], bool]) -> Answer | None:
+    def _answer(self, values: Mapping[str, float], is_superseded: Callable[[], bool]) -> Answer | None:
         try:
-            return None if is_overtaken() else self._answering(values, is_overtaken)
-        except Overtaken:
+            return None if is_superseded() else self._answering(values, is_superseded)
+        except Superseded:
             return None

@@ -1,6 +1,6 @@
 // The sliders of a live page: wherever they stand, the server plans and flies anew, and the page shows what comes of it.
 
-const PAGE = `${Date.now()}-${Math.random()}`; // by which the server knows what was overtaken
+const PAGE = `${Date.now()}-${Math.random()}`; // by which the server knows which questions are superseded
 const GONE = "Nothing answers any more; start aerobat view --live again and load the page anew.";
 const AXES = ["x", "y", "z"];
 
