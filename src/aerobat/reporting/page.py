@@ -136,11 +136,11 @@ def set_scale(axes: Axes, centre: Array, per_inch: float) -> None:
     axes.set(xlim=(left, right), ylim=(bottom, top))
 
 
-def heading(axes: Axes, title: str, note: str = "") -> None:
-    """A title above axes, and a note under it."""
+def heading(axes: Axes, title: str, note: str = "", left: float = 0.0) -> None:
+    """A title above axes, and a note under it; both so far [in] left of the axes' edge."""
     place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "va": "bottom"}
-    axes.annotate(title, (0.0, 1.0), (0.0, 72.0 * HEADING), size=TITLE, weight="bold", **place)
-    axes.annotate(note, (0.0, 1.0), (0.0, 7.2), size=SMALL, color=MUTED, **place)
+    axes.annotate(title, (0.0, 1.0), (-72.0 * left, 72.0 * HEADING), size=TITLE, weight="bold", **place)
+    axes.annotate(note, (0.0, 1.0), (-72.0 * left, 7.2), size=SMALL, color=MUTED, **place)
 
 
 def legend(axes: Axes, above: float) -> None:

@@ -121,10 +121,8 @@ def _draw_gate(figure: Figure, name: str, crossed: Crossings, bottom: float) -> 
 def _draw_outcomes(figure: Figure, sweep: Sweep, left: float, bottom: float) -> None:
     """Draw a bar an outcome, the most frequent on top, with its interval."""
     shares = sweep.outcomes
-    column = panel(figure, left, bottom, THIRD, BAR * len(shares))
-    column.set_axis_off()
-    heading(column, "Outcomes", "lines: 95 % confidence")
     axes = panel(figure, left + NAMES, bottom, THIRD - NAMES, BAR * len(shares))
+    heading(axes, "Outcomes", "lines: 95 % confidence", left=NAMES)
     for row, (outcome, share) in enumerate(shares.items()):
         axes.barh(row, 100 * share.fraction, 0.5, color=BLUE if outcome.is_success else RED, linewidth=0.0)
         axes.plot(100 * np.array(share.interval), [row, row], color=INK, linewidth=1.2)
