@@ -66,9 +66,6 @@ def _(comparison: Comparison) -> Iterator[Fact]:
     yield from (Fact("", text=f"{_name(entry)}: {entry.note}") for entry in comparison.entries if entry.note)
 
 
-picture.register(Comparison, lambda comparison: comparison_figure(comparison))
-
-
 def _row(comparison: Comparison, entry: Entry) -> Facts:
     """A planner's result; None where there is no plan, and for ratios where none is time-optimal."""
     plan, ratio, margin = entry.plan, comparison.ratio(entry), _margin(entry.plan)
@@ -112,6 +109,9 @@ def comparison_figure(comparison: Comparison) -> Figure:
         heading(axes, "Paths")
         _draw_rows(figure, comparison, colours, rows)
     return figure
+
+
+picture.register(Comparison, comparison_figure)
 
 
 def _margin(plan: Plan | None) -> float | None:

@@ -55,9 +55,6 @@ def _(share: ErrorShare) -> Iterator[Fact]:
     yield Fact("end_s", share.end)
 
 
-picture.register(Inspection, lambda found: inspection_figure(found))
-
-
 @validated
 def inspection_figure(inspection: Inspection) -> Figure:
     """Draw a flight's position error, and below it each cause's part along the largest error.
@@ -82,6 +79,9 @@ def inspection_figure(inspection: Inspection) -> Figure:
             axes.tick_params(labelbottom=axes is rows[-1])
         axes.set_xlabel("time [s]")
     return figure
+
+
+picture.register(Inspection, inspection_figure)
 
 
 def _draw(axes: Axes, inspection: Inspection, error: Array, colour: str) -> None:
