@@ -19,13 +19,12 @@ from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, Probe, ProbedTask, probe
 from aerobat.studies.feasibility.quantities import NeededQuantity, named_quantities
 from aerobat.studies.lens import Scenario
-from aerobat.studies.workers import Pool, Workers, pool
+from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 GROWTH = 1.5  # from one value to the next, where what there is does not suffice
 MAX_STEPS = 5  # of it: 7.6 times as much at most
 Tolerance = Annotated[float, Bounds(ge=1e-4, le=0.5, description="number from 0.0001 to 0.5")]
-Tried = Callable[[str, float, bool], None]
 
 
 @by_value
@@ -70,7 +69,7 @@ def min_requirements(
     time_limit: NonNegative = TIME_LIMIT,
     workers: Workers | None = None,
     executor: Executor | None = None,
-    progress: Tried | None = None,
+    progress: Callable[[str, float, bool], None] | None = None,
 ) -> tuple[Requirement, ...]:
     """Find the least of each quantity for which a problem has a plan, the others as they are, by bisection.
 
@@ -99,32 +98,18 @@ def min_requirements(
     scenario = Scenario(as_problem(problem), as_vehicle(vehicle), chosen)
     searches = [_Search(q, scenario, tolerance) for q in named_quantities(of, scenario.problem)]
     tasks = tuple(ProbedTask(scenario, (search.quantity,), time_limit) for search in searches)
-    with pool(workers, executor, len(searches)) as planning:
-        _search(planning, tasks, searches, progress)
-    found = tuple(search.requirement for search in searches)
-    if all(each.plan is None for each in found):
-        raise Infeasible(f"'{scenario.problem.name}' has no plan on {scenario.vehicle.name}: {found[0]}")
-    return found
-
-
-def _search(
-    planning: Pool, tasks: tuple[ProbedTask, ...], searches: Sequence[_Search], tried: Tried | None
-) -> None:
-    """Run searches side by side, each of which has one plan made at a time.
-
-    Args:
-        planning: What plans.
-        tasks: The task of each search.
-        searches: Of a quantity each.
-        tried: Called with each value that was tried.
-    """
     runs = [search.run() for search in searches]
-    parts = deque((number, next(run)) for number, run in enumerate(runs))
-    for (number, value), found in planning.results(_probe, tasks, parts):
-        if tried is not None:
-            tried(searches[number].quantity.name, value, found.is_planned)
-        with suppress(StopIteration):
-            parts.append((number, runs[number].send(found)))
+    parts = deque((number, next(run)) for number, run in enumerate(runs))  # one value of each at a time
+    with pool(workers, executor, len(searches)) as planning:
+        for (number, value), found in planning.results(_probe, tasks, parts):
+            if progress is not None:
+                progress(searches[number].quantity.name, value, found.is_planned)
+            with suppress(StopIteration):
+                parts.append((number, runs[number].send(found)))
+    least = tuple(search.requirement for search in searches)
+    if all(each.plan is None for each in least):
+        raise Infeasible(f"'{scenario.problem.name}' has no plan on {scenario.vehicle.name}: {least[0]}")
+    return least
 
 
 def _probe(tasks: tuple[ProbedTask, ...], part: tuple[int, float]) -> Probe:
