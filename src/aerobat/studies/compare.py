@@ -15,7 +15,7 @@ from aerobat.planning import Attempt, Plan, Planner, TimeOptimal, as_planner, pl
 from aerobat.planning.time_limit import best_by_limit
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation import Flight, fly
-from aerobat.studies.workers import Pool, Workers, pool
+from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 
@@ -101,8 +101,18 @@ def compare(
         raise SpecError("planners must be one planner or more; leave them out for all")
     begin = begin or (lambda name: None)
     task = _ComparisonTask(problem, vehicle, time_limit)
+    found: list[Entry] = []
     with pool(workers, executor, len(compared)) as planning:
-        found = _entries(task, compared, progress, begin, planning)
+        if planning.is_here:
+            for named in compared:
+                begin(named[0])
+                found.append(_timed_entry(task, named, progress))
+        else:
+            done = {}
+            for named, entry in planning.results(_timed_entry, task, compared):
+                begin(entry.planner)
+                done[named] = entry
+            found = [done[named] for named in compared]
     for i, (name, planner) in enumerate(compared):
         if isinstance(planner, TimeOptimal):
             begin(f"{name} again")
@@ -124,35 +134,6 @@ class _ComparisonTask:
     problem: Problem
     vehicle: Vehicle
     time_limit: float | None  # [s] of each
-
-
-def _entries(
-    task: _ComparisonTask,
-    planners: Sequence[tuple[str, Planner]],
-    progress: Callable[[Attempt], None] | None,
-    begin: Callable[[str], None],
-    planning: Pool,
-) -> list[Entry]:
-    """The entries of planners, in their order.
-
-    Args:
-        task: What is planned.
-        planners: By their names.
-        progress: Called with every attempt in this process.
-        begin: Called with each planner's name.
-        planning: What plans.
-    """
-    if planning.is_here:
-        here = []
-        for each in planners:
-            begin(each[0])
-            here.append(_timed_entry(task, each, progress))
-        return here
-    entries = {}
-    for named, entry in planning.results(_timed_entry, task, planners):
-        begin(entry.planner)
-        entries[named] = entry
-    return [entries[named] for named in planners]
 
 
 def _timed_entry(
