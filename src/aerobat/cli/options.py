@@ -122,11 +122,6 @@ class ExplainingOptions:
     there is one are told."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class TaskOptions(ProblemOptions, OutputOptions):
-    """The problem's and the vehicle's options, and where results go."""
-
-
 def offered_options() -> dict[str, dict[str, PlannerOption]]:
     """The options of all registered planners: by flag, then by planner."""
     offered: dict[str, dict[str, PlannerOption]] = {}
@@ -186,7 +181,7 @@ def _planners_help() -> str:
 
 @_with_planner_options
 @dataclass(frozen=True, kw_only=True)
-class PlannerOptions(TaskOptions):
+class PlannerOptions(ProblemOptions, OutputOptions):
     """Options of all commands that plan by one planner."""
 
     planner: Annotated[str | None, Parameter(group=planning, help=_planners_help(), show_default=False)] = (

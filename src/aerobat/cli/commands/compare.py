@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import OutputOptions, TaskOptions, Workers, planning
+from aerobat.cli.options import OutputOptions, ProblemOptions, Workers, planning
 from aerobat.cli.progress import PlanningProgress, showing
 from aerobat.cli.runs.folder import finish_study
 from aerobat.cli.runs.record import RunRecord
@@ -21,7 +21,7 @@ WORKERS = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class CompareOptions(TaskOptions):
+class CompareOptions(ProblemOptions, OutputOptions):
     """Options of a comparison."""
 
     time_limit: Annotated[float | None, Parameter(group=planning, validator=validators.Number(gte=0))] = None
