@@ -92,9 +92,9 @@ def facts(result: object) -> Iterator[Fact]:
 
     The facts of a dataclass without a registered function are its fields, for files alone.
     """
-    told = _registered(facts, result)
-    if told is not None:
-        yield from told(result)
+    function = _registered(facts, result)
+    if function is not None:
+        yield from function(result)
     elif is_dataclass(result) and not isinstance(result, type):
         yield from fields_of(result)
     else:
@@ -128,12 +128,12 @@ def kept(**values: Any) -> Iterator[Fact]:
     yield from (Fact(key, value) for key, value in values.items())
 
 
-def _registered(told: Any, result: object) -> Any:
+def _registered(generic: Any, result: object) -> Any:
     """Import the module of `TOLD_IN` for a result, and return the function registered; None without one."""
-    own = told.dispatch(object)
+    own = generic.dispatch(object)
     for cls in type(result).__mro__:
         rooms = [room for room in TOLD_IN if f"{cls.__module__}.".startswith(f"{room}.")]
         if rooms:
             import_module(f"aerobat.reporting.{TOLD_IN[max(rooms, key=len)]}")
-    found = told.dispatch(type(result))
+    found = generic.dispatch(type(result))
     return None if found is own else found

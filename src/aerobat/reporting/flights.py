@@ -141,15 +141,15 @@ def _span(values: Sequence[float], unit: str) -> str:
 
 def _within_tolerance(score: Score) -> str:
     """How far at most a flight is off the goal and the stages that are kept to the problem's tolerance."""
-    told = []
+    parts = []
     if score.places:
         miss, allowed = max((place.miss, place.radius) for place in score.places)
-        told.append(f"{length(miss)} of {length(allowed)} off {_names(score.places)}")
+        parts.append(f"{length(miss)} of {length(allowed)} off {_names(score.places)}")
     if score.attitudes:
         angle, tolerance = max((each.angle_deg, each.tolerance_deg) for each in score.attitudes)
-        told.append(f"{angle:.2f}° of {tolerance:.3g}° off the attitudes of {len(score.attitudes)} stages")
+        parts.append(f"{angle:.2f}° of {tolerance:.3g}° off the attitudes of {len(score.attitudes)} stages")
     times = [place.time for place in score.places] + [attitude.time for attitude in score.attitudes]
-    return "not all reached" if any(map(isnan, times)) else f"{', '.join(told)}, at most"
+    return "not all reached" if any(map(isnan, times)) else f"{', '.join(parts)}, at most"
 
 
 def _names(places: Sequence[WaypointPassage]) -> str:

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from aerobat.reporting.facts import EXPLAIN, REPORT, WARNING, Fact, Facts, facts
 
-Told = tuple[str, Fact]  # the heading that a fact stands under, and the fact
+HeadedFact = tuple[str, Fact]  # the heading that a fact stands under, and the fact
 
 
 def table(result: Any, least: int = REPORT, most: int = EXPLAIN, title: str = "") -> Group:
@@ -26,10 +26,14 @@ def table(result: Any, least: int = REPORT, most: int = EXPLAIN, title: str = ""
         most: The last one; of a report's lines alone no headings are needed.
         title: In place of the result's own first line.
     """
-    told = [(heading if most else "", fact) for heading, fact in _told(result) if least <= fact.level <= most]
+    headed = [
+        (heading if most else "", fact)
+        for heading, fact in _headed_facts(result)
+        if least <= fact.level <= most
+    ]
     if title:
-        told = [("", Fact("", text=title)), *(told[1:] if told and not told[0][1].label else told)]
-    return Group(*_parts(told))
+        headed = [("", Fact("", text=title)), *(headed[1:] if headed and not headed[0][1].label else headed)]
+    return Group(*_parts(headed))
 
 
 def print_table(table: Table | Group) -> None:
@@ -38,7 +42,7 @@ def print_table(table: Table | Group) -> None:
     (console if console.is_terminal else Console(width=120)).print(table)
 
 
-def _told(result: Any, heading: str = "", inner: bool = False) -> Iterator[Told]:
+def _headed_facts(result: Any, heading: str = "", inner: bool = False) -> Iterator[HeadedFact]:
     """Yield the facts that a table shows, with their headings; a result within another has no lines."""
     for fact in facts(result):
         if fact.text is not None or _is_plain(fact.value):
@@ -50,16 +54,16 @@ def _told(result: Any, heading: str = "", inner: bool = False) -> Iterator[Told]
             if fact.label and fact.value:
                 yield heading, fact
         else:
-            yield from _told(fact.value, fact.label or heading, inner=True)
+            yield from _headed_facts(fact.value, fact.label or heading, inner=True)
 
 
 def _is_plain(value: Any) -> bool:
     return value is None or isinstance(value, dict | str | int | float | Enum | np.ndarray)
 
 
-def _parts(told: Iterable[Told]) -> Iterator[Table | Text]:
+def _parts(headed: Iterable[HeadedFact]) -> Iterator[Table | Text]:
     """Yield lines and tables, in their order."""
-    for kind, group in groupby(told, key=lambda each: _kind(each[1])):
+    for kind, group in groupby(headed, key=lambda each: _kind(each[1])):
         if kind == "line":
             yield from (Text(fact.said, style=fact.style or "italic") for _, fact in group)
         elif kind == "rows":
@@ -75,14 +79,14 @@ def _kind(fact: Fact) -> str:
     return "rows" if fact.text is None and isinstance(fact.value, list | tuple) else "row"
 
 
-def _facts_table(told: Iterable[Told]) -> Table:
+def _facts_table(headed: Iterable[HeadedFact]) -> Table:
     """Facts, one a row, under their headings."""
     made = Table(show_header=False, box=None)
     made.add_column(style="bold", no_wrap=True)
     made.add_column(no_wrap=True)
     made.add_column()
     before = ""
-    for heading, fact in told:
+    for heading, fact in headed:
         made.add_row("" if heading == before else heading, fact.label, _text(fact))
         before = heading
     return made
@@ -91,12 +95,12 @@ def _facts_table(told: Iterable[Told]) -> Table:
 def _rows(rows: list[tuple[Fact, ...]]) -> Table:
     """Results of a kind, one a row; numbers at the right of their columns."""
     made = Table(box=None, pad_edge=False)
-    told = [[fact for fact in row if fact.label] for row in rows]
-    for k, column in enumerate(zip(*told, strict=True)):
+    shown = [[fact for fact in row if fact.label] for row in rows]
+    for k, column in enumerate(zip(*shown, strict=True)):
         is_number = any(isinstance(fact.value, int | float) for fact in column)
         is_short = is_number or k == 0
         made.add_column(column[0].label, justify="right" if is_number else "left", no_wrap=is_short)
-    for row in told:
+    for row in shown:
         made.add_row(*map(_text, row))
     return made
 

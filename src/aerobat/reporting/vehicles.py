@@ -27,8 +27,8 @@ _NAMED = 1e-6  # [m] from an axis, where a rotor is neither to one side nor to t
 def _(vehicle: Vehicle) -> Iterator[Fact]:
     yield Fact("name", vehicle.name, vehicle.name, " ".join(vehicle.description.split()) or "a vehicle")
     moments = np.diag(vehicle.inertia).tolist()
-    told = ", ".join(f"{moment:.3g}" for moment in moments)
-    yield Fact("mass_kg", vehicle.mass, "mass", f"{vehicle.mass:.4g} kg, inertia {told} kg·m²")
+    diagonal = ", ".join(f"{moment:.3g}" for moment in moments)
+    yield Fact("mass_kg", vehicle.mass, "mass", f"{vehicle.mass:.4g} kg, inertia {diagonal} kg·m²")
     yield Fact("inertia_kg_m2", moments)
     places = ", ".join(map(_place, vehicle.rotors))
     yield Fact("rotors", len(vehicle.rotors), "rotors", f"{len(vehicle.rotors)}: {places}")
@@ -45,11 +45,11 @@ def _(vehicle: Vehicle) -> Iterator[Fact]:
         fleet, environment = Fleet.of([vehicle]), Environment()
         turns = hover_authority(fleet, environment)[0]
         roll, pitch, yaw = (f"{each:.3g}" for each in turns)
-        told = f"at up to {roll}, {pitch} and {yaw} rad/s² in roll, pitch and yaw from a hover"
-        yield Fact("turns_rad_s2", turns, "turns", told)
+        text = f"at up to {roll}, {pitch} and {yaw} rad/s² in roll, pitch and yaw from a hover"
+        yield Fact("turns_rad_s2", turns, "turns", text)
         bandwidth = float(max_bandwidth(fleet, environment)[0])
-        told = f"up to {bandwidth:.3g} rad/s, {bandwidth / tau:.2g} Hz"
-        yield Fact("attitude_loop_rad_s", bandwidth, "attitude loop", told)
+        text = f"up to {bandwidth:.3g} rad/s, {bandwidth / tau:.2g} Hz"
+        yield Fact("attitude_loop_rad_s", bandwidth, "attitude loop", text)
     doubts = (*implausibilities(vehicle), *_weaknesses(vehicle))
     yield from (said("looks wrong", doubt, style="red") for doubt in doubts)
     # an array: an empty tuple would be a table without rows

@@ -248,8 +248,8 @@ def _versions() -> tuple[tuple[str, str], ...]:
 def _unpacked(packed: bytes, plugins: tuple[str, ...], versions: tuple[tuple[str, str], ...]) -> _Shared:
     """Raises SpecError in a process whose numbers might be others."""
     if _versions() != versions:
-        told, mine = (", ".join(map(" ".join, each)) for each in (versions, _versions()))
-        raise SpecError(f"workers: one has {mine}, and not {told}; install the same versions for all")
+        theirs, mine = (", ".join(map(" ".join, each)) for each in (versions, _versions()))
+        raise SpecError(f"workers: one has {mine}, and not {theirs}; install the same versions for all")
     for path in plugins:
         import_plugin(path)
     return _Shared(pickle.loads(packed))

@@ -60,12 +60,12 @@ def repeat(folder: Path, options: RepeatOptions = RepeatOptions()) -> ExitCode:
         earlier = _results(folder, record)
         _run_study(folder, record, options)
         names = [name for name, value in _results(out, record).items() if not _same(value, earlier.get(name))]
-        return _told(folder, record, f"{', '.join(names)} differ" if names else "", ExitCode.WELL)
+        return _compared(folder, record, f"{', '.join(names)} differ" if names else "", ExitCode.WELL)
     run = _Run.read(folder, record)
     plan = plan_of(record, run.plan if record.planner is None else None, options.explain)
     flight = flown(plan, record.flight) if record.command == "fly" else None
     code = finish(plan, record, options, flight, options.explain)
-    return _told(folder, record, run.difference(_Run(plan, flight.flight if flight else None)), code)
+    return _compared(folder, record, run.difference(_Run(plan, flight.flight if flight else None)), code)
 
 
 def _run_study(folder: Path, record: RunRecord, options: RepeatOptions) -> None:
@@ -107,7 +107,7 @@ def _results(folder: Path, record: RunRecord) -> Mapping[str, Any]:
         raise SpecError(f"{folder}/{name} holds other facts than were written; run anew") from None
 
 
-def _told(folder: Path, record: RunRecord, difference: str, code: ExitCode) -> ExitCode:
+def _compared(folder: Path, record: RunRecord, difference: str, code: ExitCode) -> ExitCode:
     """Say on standard error how a repeated run compares; one that differs is not well."""
     if not difference:
         say(f"the same as in {folder}/, bit for bit")

@@ -113,17 +113,17 @@ def finish_study(
         options: Where to write, and in what form to say it.
         write_others: Writes what else there is to a folder.
     """
-    told, drawn = to_json(result), picture(result)
-    pixels = None if drawn is None else png(drawn)
+    facts, figure = to_json(result), picture(result)
+    pixels = None if figure is None else png(figure)
 
     def write(staging: Path) -> None:
-        (staging / f"{record.command}.json").write_text(told + "\n", encoding="utf-8")
+        (staging / f"{record.command}.json").write_text(facts + "\n", encoding="utf-8")
         if pixels is not None:
             (staging / f"{record.command}.png").write_bytes(pixels)
         if write_others is not None:
             write_others(staging)
 
-    written(record, options, write, told, table(result))
+    written(record, options, write, facts, table(result))
 
 
 @dataclass(frozen=True)

@@ -247,9 +247,9 @@ def feasibility_map(
             kept.write(_name(values), cell.arrays)
             if progress is not None:
                 progress(len(cells), sum(cell.is_planned for cell in cells.values()))
-    told = tuple(replace(axis, unit=field.unit) for axis, field in zip(axes, fields, strict=True))
+    axes = tuple(replace(axis, unit=field.unit) for axis, field in zip(axes, fields, strict=True))
     found = tuple(cells[values] for values in places)
-    return FeasibilityMap(scenario.problem, scenario.vehicle, told, found)
+    return FeasibilityMap(scenario.problem, scenario.vehicle, axes, found)
 
 
 def finished_cells(folder: Path) -> int:

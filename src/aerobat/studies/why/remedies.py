@@ -33,7 +33,7 @@ class Remedy:
 
     def __str__(self) -> str:
         """What is changed, and who plans it."""
-        return f"{_told(self.changes)} (by {self.plan.planner} in {self.plan.duration:.3f} s)"
+        return f"{_in_words(self.changes)} (by {self.plan.planner} in {self.plan.duration:.3f} s)"
 
 
 @short
@@ -151,7 +151,7 @@ class _RemedySearch:
         with within_time(CHANGE_TIME if several else TIME_LIMIT, processor):
             found = next(filter(None, (_planned(changed, planner) for planner in planners)), None)
         words = tuple(change.words for change in several)
-        self.progress(_told(words), found is not None)
+        self.progress(_in_words(words), found is not None)
         return None if found is None else Remedy(words, found)
 
 
@@ -190,6 +190,6 @@ def _planned(task: Request, planner: Planner) -> Plan | None:
     return found if found.keeps(task.reserve) and found.flies else None
 
 
-def _told(changes: tuple[str, ...]) -> str:
+def _in_words(changes: tuple[str, ...]) -> str:
     """Join changes in words; without any, the task as it is."""
     return " and ".join(changes) or "as it is"
