@@ -26,9 +26,8 @@ class Crossings:
     right: Array  # [m] of the opening's centre, NaN where a flight did not cross, (flights,)
     up: Array  # [m] likewise, (flights,)
     wrong: Mask  # true for those that did not pass as they should, (flights,)
-    smallest: (
-        tuple[float, float] | None
-    )  # [m] width and height of the opening of this kind that 99 % pass, if known
+    # [m] width and height of the opening of this kind that 99 % pass, if known
+    smallest: tuple[float, float] | None
 
     @property
     def crossed(self) -> Mask:
@@ -60,11 +59,8 @@ def draw_opening(axes: Axes, crossings: Crossings) -> None:
     axes.add_patch(Polygon(outline, facecolor=PAPER, edgecolor="none", zorder=0.2))
     axes.add_patch(Polygon(outline, fill=False, edgecolor=YELLOW, linewidth=3.0, zorder=1.5))
     if crossings.smallest is not None:
-        needed = Polygon(
-            outline * crossings.smallest / opening.size, fill=False, edgecolor=INK, linewidth=0.9
-        )
-        needed.set_linestyle((0, (4, 2)))
-        axes.add_patch(needed)
+        needed = outline * crossings.smallest / opening.size
+        axes.add_patch(Polygon(needed, fill=False, edgecolor=INK, linewidth=0.9, linestyle=(0, (4, 2))))
     half = np.abs(outline).max(axis=0) * 1.3
     off = np.nanmax(np.abs([crossings.right, crossings.up]), axis=1) if crossings.crossed.any() else half
     half = np.clip(1.05 * off, half, 2.0 * half)

@@ -175,15 +175,11 @@ def _with_shifted(k: int, axis: int, stands: float, setting: Setting, place: flo
 
 def _range(problem: Problem) -> tuple[float, float]:
     """How far something can be moved to either side [m], and by which steps [m]."""
-    reach = _reach(problem)
+    places = [end.position for end in problem.ends.values()] + [gate.position for gate in problem.gates]
+    size = float(np.ptp(places, axis=0).max()) if places else 0.0  # [m] of what is flown through
+    reach = max(0.5 * size, LEAST_REACH)
     step = _round_step(2 * reach / STEPS)
     return step * round(reach / step), step
-
-
-def _reach(problem: Problem) -> float:
-    """Half the size of what is flown through [m]."""
-    places = [end.position for end in problem.ends.values()] + [gate.position for gate in problem.gates]
-    return max(0.5 * float(np.ptp(places, axis=0).max()), LEAST_REACH) if places else LEAST_REACH
 
 
 def _round_step(length: float) -> float:
