@@ -136,11 +136,18 @@ def set_scale(axes: Axes, centre: Array, per_inch: float) -> None:
     axes.set(xlim=(left, right), ylim=(bottom, top))
 
 
+def write_by(
+    axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], **options: Any
+) -> None:
+    """Write text at a place of axes, from (0, 0) to (1, 1), moved to the right and up by an offset [in]."""
+    points = (72.0 * offset[0], 72.0 * offset[1])
+    axes.annotate(text, place, points, xycoords="axes fraction", textcoords="offset points", **options)
+
+
 def heading(axes: Axes, title: str, note: str = "", left: float = 0.0) -> None:
     """A title above axes, and a note under it; both so far [in] left of the axes' edge."""
-    place: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "va": "bottom"}
-    axes.annotate(title, (0.0, 1.0), (-72.0 * left, 72.0 * HEADING), size=TITLE, weight="bold", **place)
-    axes.annotate(note, (0.0, 1.0), (-72.0 * left, 7.2), size=SMALL, color=MUTED, **place)
+    write_by(axes, title, (0.0, 1.0), (-left, HEADING), size=TITLE, weight="bold", va="bottom")
+    write_by(axes, note, (0.0, 1.0), (-left, 0.1), size=SMALL, color=MUTED, va="bottom")
 
 
 def legend(axes: Axes, above: float) -> None:

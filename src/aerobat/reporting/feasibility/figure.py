@@ -12,7 +12,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import validated
-from aerobat.reporting.page import blank_page, column, house_style
+from aerobat.reporting.page import blank_page, column, house_style, write_by
 from aerobat.reporting.style import BAND, BLUE, FAINT, HAIR, INK, MUTED, PAPER, RED, SMALL
 from aerobat.studies.feasibility.feasibility_map import Cell, FeasibilityMap
 from aerobat.studies.feasibility.probe import Feasibility
@@ -51,10 +51,8 @@ def map_figure(found: FeasibilityMap) -> Figure:
             _draw_line(axes, found)
         else:
             _draw_grid(figure, axes, found)
-        axes.annotate(
-            "\n".join(legend), (0.0, 0.0), (0.0, -40.0), xycoords="axes fraction", textcoords="offset points",
-            size=SMALL, color=MUTED, va="top", linespacing=1.9,
-        )  # fmt: skip
+        style = {"size": SMALL, "color": MUTED, "va": "top", "linespacing": 1.9}
+        write_by(axes, "\n".join(legend), (0.0, 0.0), (0.0, -0.55), **style)
     return figure
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array, Mask
 from aerobat.problem.gate import Gate
-from aerobat.reporting.page import set_scale, size_of
+from aerobat.reporting.page import set_scale, size_of, write_by
 from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, PAPER, RED, SMALL, YELLOW
 
 if TYPE_CHECKING:
@@ -109,7 +109,5 @@ def _draw_crossings(axes: Axes, crossings: Crossings, half: Array, scale: float)
     beyond = int((crossings.crossed & ~inside).sum())
     if beyond:
         wrong = bool((crossings.crossed & ~inside & crossings.wrong).any())
-        axes.annotate(
-            f"{beyond} beyond", (0.0, 0.0), (5.8, 5.8), xycoords="axes fraction", textcoords="offset points",
-            size=SMALL, color=RED if wrong else MUTED, zorder=4,
-        )  # fmt: skip
+        colour = RED if wrong else MUTED
+        write_by(axes, f"{beyond} beyond", (0.0, 0.0), (0.08, 0.08), size=SMALL, color=colour, zorder=4)

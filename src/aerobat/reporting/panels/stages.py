@@ -34,7 +34,7 @@ VEHICLE = 0.6  # [in] a vehicle, about
 MOST_STAGES = 11  # that follow one another legibly
 STAGE_ROW = 0.5  # [in] kept free for names at the foot of a wide panel
 # [pt] from a hair line's end to the text, for each alignment of it
-GAPS = {"right": (-2.9, 0.0), "left": (2.9, 0.0), "center": (0.0, -2.9)}
+GAPS = {"right": (-2.88, 0.0), "left": (2.88, 0.0), "center": (0.0, -2.88)}
 COMPONENTS = np.eye(2)  # lateral, vertical
 KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s²] that a key may show
 

@@ -12,7 +12,7 @@ from aerobat.arrays import Array
 from aerobat.environment.obstacles import Pieces
 from aerobat.flatness import force_balance
 from aerobat.planning import PlacedStage, Plan, Tube
-from aerobat.reporting.page import HEADING, heading, legend, size_of, spread_out
+from aerobat.reporting.page import HEADING, heading, legend, size_of, spread_out, write_by
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
 from aerobat.reporting.panels.poses import PoseHistory
 from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, SKY, SMALL, YELLOW
@@ -116,9 +116,9 @@ def fit_to_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
     axes.set_ylim(bottom - pad, top + pad)
     if lowest < bottom or highest > top:
         note = f"cut off: {lowest:.4g} to {highest:.4g}".replace("-", "−")
-        axes.annotate(
-            note, (1.0, 1.0), (-4.3, -4.3), xycoords="axes fraction", textcoords="offset points", size=SMALL,
-            color=MUTED, ha="right", va="top", bbox={"fc": "white", "ec": "none", "pad": 1.5}, zorder=4.0,
+        write_by(
+            axes, note, (1.0, 1.0), (-0.06, -0.06), size=SMALL, color=MUTED, ha="right", va="top",
+            bbox={"fc": "white", "ec": "none", "pad": 1.5}, zorder=4.0,
         )  # fmt: skip
 
 
