@@ -1,1 +1,1 @@
-"""The one continuous optimizer: polynomials between knots, as fast as all limits allow, certified."""
+"""Trajectory refinement, the continuous optimizer: minimum-time polynomials between knots, certified."""

@@ -1,6 +1,7 @@
-"""Clearances from obstacles as constraints with two derivatives, as machine code.
+"""Clearances from obstacles as constraints with two derivatives, compiled to machine code.
 
-They are columns behind those of the limits on measures: the nearest pieces of each place, whichever they are.
+In the array of constraints these columns follow those of the limits. At each place they belong to the NEAREST
+pieces of obstacles there, so that a column stands for different pieces at different places.
 """
 
 from __future__ import annotations
@@ -17,43 +18,43 @@ from aerobat.kernels.ops import Ops, Scalar
 from aerobat.limits.clearance import NEAREST, SIZE, Clearance, Planes, left_between
 from aerobat.planning.task import Task
 
-MOVED = 6  # components of velocity and acceleration, in which clearances are not linear
-TINY = 1e-20  # [m/s²] beside any thrust
-FAR = 1e3  # [m] that is left to planes that do not count
+MOVED = 6  # number of components of velocity and acceleration, in which clearances are nonlinear
+TINY = 1e-20  # lower bound of specific thrusts in a division [m/s²], negligible
+FAR = 1e3  # clearance [m] from planes that stand for no obstacle
 
 
 @dataclass(frozen=True, eq=False)
 class ClearanceValues:
-    """Constraints of a margin beside planes, (margin − clearance) / SIZE ≤ 0."""
+    """Constraints (required clearance − clearance) / SIZE ≤ 0 beside separating planes."""
 
     task: Task
 
     @cached_property
     def clearance(self) -> Clearance | None:
-        """The clearance that is asked; None where nothing stands in the way."""
+        """The clearance of the body from all pieces of obstacles; None without obstacles."""
         pieces = self.task.environment.pieces
         return Clearance(pieces, self.task.vehicle.bounding_ellipsoid) if len(pieces) else None
 
     @property
     def count(self) -> int:
-        """The number of columns."""
+        """The number of constraints at a place."""
         return 0 if self.clearance is None else NEAREST
 
     def planes(self, times: Array, derivatives: Array) -> Planes:
-        """The planes at places of a path's derivatives (m, 6, 3) at times (m,)."""
+        """Return the separating planes of a path with derivatives (m, 6, 3) at times (m,)."""
         assert self.clearance is not None, "planes are asked for where there are obstacles"
         thrust = self._thrust(derivatives)
         size = np.linalg.norm(thrust, axis=1, keepdims=True)
         return self.clearance.planes(derivatives[:, 0], thrust / np.maximum(size, TINY), times)
 
     def values(self, derivatives: Array, planes: Planes) -> Array:
-        """The values at derivatives (m, 6, 3), (m, NEAREST)."""
+        """Return the values (m, NEAREST) at derivatives (m, 6, 3)."""
         left = _functions().values(*self._given(derivatives, planes), NO_DIRECTION)
         found = (self.task.clearance - left.reshape(-1, NEAREST)) / SIZE
         return np.asarray(np.where(np.isnan(found), np.inf, found))
 
     def slopes(self, derivatives: Array, planes: Planes) -> Array:
-        """The slopes by the derivatives, (m, NEAREST, 6, 3)."""
+        """Return the slopes by the derivatives, (m, NEAREST, 6, 3)."""
         by_thrust = _functions().slopes(*self._given(derivatives, planes), np.eye(3))[:, 0].T
         slopes = np.zeros((*planes.offsets.shape, 6, 3))
         slopes[..., 0, :] = -planes.normals / SIZE
@@ -62,12 +63,12 @@ class ClearanceValues:
         return slopes
 
     def curvature(self, derivatives: Array, planes: Planes, weights: Array) -> Array:
-        """Second derivatives of the weighted values by velocity and acceleration, (m, 6, 6).
+        """Return the Hessian of the weighted values by velocity and acceleration, (m, 6, 6).
 
         Args:
-            derivatives: Of the path, (m, 6, 3).
-            planes: At the places.
-            weights: Of the values, (m, NEAREST).
+            derivatives: Derivatives of the path, (m, 6, 3).
+            planes: Separating planes at the places.
+            weights: Weights of the values, (m, NEAREST).
         """
         given = self._given(derivatives, planes, weights.reshape(-1, 1) / -SIZE)
         found = _functions().curvature(*given, np.eye(3))
@@ -79,7 +80,7 @@ class ClearanceValues:
         return self.task.balance.specific_thrust(derivatives[:, 1], derivatives[:, 2])
 
     def _given(self, derivatives: Array, planes: Planes, *more: Array) -> tuple[Array, Array]:
-        """The body, and of every place and plane thrust, position, normal and offset, then more."""
+        """Return the functions' inputs: the body; thrust, position, normal, offset, `more` of each plane."""
         state = np.concatenate([self._thrust(derivatives), derivatives[:, 0]], axis=1)
         plane = planes.normals.reshape(-1, 3), np.maximum(planes.offsets, -FAR).reshape(-1, 1)
         own = np.concatenate([state.repeat(NEAREST, axis=0), *plane, *more], axis=1)
@@ -88,7 +89,7 @@ class ClearanceValues:
 
 @lru_cache(maxsize=1)
 def _functions() -> SmoothFunctions:
-    """What is left between a body and a plane [m], as the thrust moves."""
+    """Compile the distance [m] between a body and a plane, as a function of the thrust."""
 
     def kernel(
         ops: Ops, revolved: Sequence[Scalar], thrust: Sequence[Scalar], others: Sequence[Scalar]

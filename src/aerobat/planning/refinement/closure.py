@@ -1,7 +1,8 @@
-"""The turn of the body about its thrust axis once around a closed course, which ends as it begins.
+"""Closure of a closed course: after one lap the body has its initial attitude, yaw included.
 
-A body that never spins about its thrust axis comes back turned by the area on the unit sphere that the axis
-goes around. Where the thrust f = |f| n changes by δf, the turn changes by ∮ (n' × n) · δf/|f| dt.
+A body that never rotates about its thrust axis n returns turned about n by an angle, the holonomy. This angle
+is the area on the unit sphere that n encloses. A change δf of the thrust f = |f| n changes the angle by
+∮ (n' × n) · δf/|f| dt.
 """
 
 from __future__ import annotations
@@ -16,17 +17,17 @@ from aerobat.arrays import Array
 from aerobat.planning.refinement.excess import chebyshev
 from aerobat.planning.refinement.limit_values import LimitValues
 
-FRACTIONS = chebyshev(24)  # of every segment, (p,), its ends among them
+FRACTIONS = chebyshev(24)  # places of every segment, both ends included, (p,)
 
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """The turn as a constraint on derivatives at `FRACTIONS` of all segments."""
+    """The turn about the thrust axis, constrained to zero, as a function of derivatives at `FRACTIONS`."""
 
     limits: LimitValues
 
     def values(self, derivatives: Array, durations: Array) -> Array:
-        """The turn [rad], (1,), of derivatives (S, p, 6, 3) on segments that last so long [s], (S,)."""
+        """Return the turn [rad], (1,), from derivatives (S, p, 6, 3) and segment durations [s], (S,)."""
         ends = np.cumsum(durations)
         times = (ends - durations)[:, None] + durations[:, None] * FRACTIONS
         axes = self.limits.frames(times.ravel(), derivatives.reshape(-1, 6, 3)).axes
@@ -34,7 +35,7 @@ class Closure:
         return np.array([np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])])
 
     def slopes(self, derivatives: Array, durations: Array) -> Array:
-        """The turn's slopes by the derivatives, (S, p, 6, 3)."""
+        """Return the turn's slopes by the derivatives, (S, p, 6, 3)."""
         balance = self.limits.task.balance
         velocity, acceleration, jerk = np.moveaxis(derivatives[:, :, 1:4], 2, 0)
         thrust = balance.constant + acceleration + balance.drag * velocity
@@ -47,7 +48,7 @@ class Closure:
 
     @cached_property
     def _weights(self) -> Array:
-        """Weights on values at places that integrate polynomials along a segment, (p,)."""
+        """The quadrature weights of `FRACTIONS`, exact for polynomials of degree p − 1, (p,)."""
         count = len(FRACTIONS)
         values = legendre.legvander(2.0 * FRACTIONS - 1.0, count - 1)
         return np.asarray(np.linalg.solve(values.T, np.eye(count)[0]))

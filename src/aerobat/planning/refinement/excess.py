@@ -1,4 +1,4 @@
-"""By how much a path exceeds its limits, looked at densely: what places in a program leave between them."""
+"""Constraint violations of a path on dense samples, including those between the places of a program."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from aerobat.planning.refinement.limit_values import LimitValues
 from aerobat.planning.refinement.spline import DERIVATIVES
 from aerobat.trajectory import Trajectory
 
-LOOKED_AT = 64  # places of a segment
-JUST_INSIDE = 1e-9  # of a duration from its knots, where a segment is still itself and not its neighbour
-INWARD = 0.02  # of a segment, the ends that have no peaks: places are dense there, and motion stands still
-NEGLIGIBLE = 1e-9  # of a limit's size
+LOOKED_AT = 64  # samples of a segment
+JUST_INSIDE = 1e-9  # distance of samples from knots, as a fraction of a segment, to stay in that segment
+INWARD = 0.02  # fraction of a segment at either end without peaks: places are dense there, motion is slow
+NEGLIGIBLE = 1e-9  # constraint violation, relative to the limit's size, that counts as none
 
 
 @dataclass(frozen=True, eq=False)
 class Excess:
-    """The constraints of a path at their worst, as fractions of their limits' sizes; negative: they hold."""
+    """The largest constraint values of a path, as fractions of their limits' sizes; negative: satisfied."""
 
-    worst: Array  # in each segment, (S, c)
-    sides: tuple[tuple[Limit, float], ...]  # of each constraint
-    place: tuple[int, float]  # the constraint that is exceeded most, and when [s]
-    peaks: Array  # the fraction of each segment at which its worst is, its ends left out, (S,)
+    worst: Array  # largest value of each constraint in each segment, (S, c)
+    sides: tuple[tuple[Limit, float], ...]  # limit and end of each constraint
+    place: tuple[int, float]  # the constraint that is violated most, and the time [s]
+    peaks: Array  # fraction of each segment with its largest value, without samples near the ends, (S,)
 
     @classmethod
     def of(cls, trajectory: Trajectory, limits: LimitValues, places: int = LOOKED_AT) -> Excess:
-        """Along a trajectory.
+        """Return the constraint violations along a trajectory, the reserve included.
 
         Args:
             trajectory: The path.
-            limits: What holds along it, the reserve included.
-            places: Of a segment.
+            limits: The limits along the path.
+            places: Samples of a segment.
         """
         fractions = np.clip(chebyshev(places), JUST_INSIDE, 1.0 - JUST_INSIDE)
         each = [trajectory.on_segments(fractions, k) for k in range(DERIVATIVES)]
@@ -53,26 +53,26 @@ class Excess:
 
     @property
     def largest(self) -> float:
-        """The largest of all."""
+        """The largest constraint value."""
         return float(self.worst.max())
 
     @property
     def holds(self) -> bool:
-        """True if nothing is exceeded."""
+        """True if no constraint is violated."""
         return self.largest <= NEGLIGIBLE
 
     @property
     def reason(self) -> Reason:
-        """One sentence without its full stop about what is exceeded most."""
+        """A sentence, without its full stop, about the largest violation."""
         side, time = self.place
         limit, sign = self.sides[side]
         return limit.exceeded(self.largest, time, (limit.fields[sign > 0.0],))
 
     @property
     def nearby(self) -> Array:
-        """The worst in each segment and those beside it, where it moves when it is mended, (S, c).
+        """The largest values in each segment and its neighbours, where repaired violations move, (S, c).
 
-        Rotors count as one: they trade what they exceed.
+        Limits of one name count as one, such as those of all rotors: violations move between rotors.
         """
         names = np.array([limit.name for limit, _ in self.sides])
         alike = np.equal.outer(names, names)
@@ -82,5 +82,5 @@ class Excess:
 
 
 def chebyshev(count: int) -> Array:
-    """So many places in a segment, denser toward its ends, which are among them."""
+    """Return `count` Chebyshev points from 0 to 1, both ends included, denser toward the ends."""
     return np.asarray((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0)

@@ -1,4 +1,4 @@
-"""A refined path with a defect, refined again: more room in gates, or a reserve that its flight lacks."""
+"""Repair of refined paths: refine again with more room in gates, or with more reserve for the controller."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from aerobat.planning.flyability import OwnFlight, own_flight
 from aerobat.planning.gate_clearance import cleared, is_clear, more_direct
 from aerobat.planning.refinement.refine import RefinedPath, Refinement
 
-MAX_HALVINGS = 3  # of the bending that room in a gate allows for, where it leads to no path
-# [s] of the processor: one of 300 random problems is cleared in 15; three went on for minutes, in vain
+MAX_HALVINGS = 3  # attempts with the added room in gates, which is halved where an attempt finds no path
+# Processor time [s] for clearing frames: of 300 random problems one took 15 s, three failed after minutes.
 CLEARING_TIME = 20.0
-RESERVES = (0.02, 0.05, 0.1, 0.2)  # of the rotors' ranges, for paths that leave the controller too little
+RESERVES = (0.02, 0.05, 0.1, 0.2)  # reserves tried in turn, as fractions of the rotors' thrust ranges
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,37 +28,37 @@ class FlownPath:
 
     @classmethod
     def of(cls, refinement: Refinement, judged: Judged[RefinedPath]) -> FlownPath:
-        """The path, its stages placed."""
+        """Return the path with its stages placed."""
         return cls(refinement, judged.at(judged.solution.source.placed))
 
     @property
     def frames(self) -> tuple[Finding, ...]:
-        """The findings about its body and each gate's frame."""
+        """The findings about the body's clearance from each gate's frame."""
         return self.judged.frames
 
     @property
     def is_clear(self) -> bool:
-        """True if its body is clear of every gate's frame."""
+        """True if the body is proven clear of every gate's frame."""
         return is_clear(self.frames)
 
     @property
     def duration(self) -> float:
-        """Of the path [s]."""
+        """The duration of the path [s]."""
         return self.judged.solution.duration
 
     @property
     def flight(self) -> OwnFlight:
-        """The findings about the path's own flight, the nominal one."""
+        """The findings of the nominal simulated flight of the path."""
         source = self.judged.solution.source
         return own_flight(self.refinement.task, source.path.trajectory, source.placed)
 
     def through_gates(self) -> FlownPath:
-        """Return the path, or one with more room in the gates whose frames its body does not clear."""
+        """Return the path, or one with more room in the gates whose frames the body does not clear."""
         with within_time(CLEARING_TIME, processor):
             return cleared(self, FlownPath._more_direct)
 
     def with_reserves(self) -> FlownPath:
-        """Return the path itself, or one with a reserve that leaves the controller what its flight lacked."""
+        """Return the path, or the best of paths with larger reserves where its flight needs more reserve."""
         flight, found = self.flight, self
         best = flight, found
         for reserve in RESERVES:
@@ -72,7 +72,7 @@ class FlownPath:
         return best[1]
 
     def _more_direct(self) -> FlownPath | None:
-        """The path with more room in the gates whose frames are not clear; None where none is found."""
+        """Return a path with more room in the gates whose frames are not clear, or None."""
         refinement, stages = self.refinement, self.judged.solution.source.path.stages
         before = refinement.rooms(stages)
         in_gates = more_direct(before, stages, refinement.task, self.frames)
@@ -84,7 +84,7 @@ class FlownPath:
         return None
 
     def _refined(self) -> FlownPath | None:
-        """The path refined once more; None where that leads to none that is certified."""
+        """Return the path refined once more with this refinement, or None where no path is certified."""
         path, refinement = self.judged.solution.source.path, replace(self.refinement, grows=False)
         judged = refinement.finished(refinement.path(path))
         if not (judged.feasible or out_of_time()):
@@ -93,7 +93,7 @@ class FlownPath:
 
 
 def _halfway(before: Sequence[BodyInGate], in_gates: Sequence[BodyInGate]) -> tuple[BodyInGate, ...]:
-    """Room halfway between, of gates that had none that of half the bending."""
+    """Return rooms whose `bending` is halfway between both; a gate without room before counts as zero."""
     bending = {body.stage: body.bending for body in before}
     return tuple(
         replace(body, bending=0.5 * (body.bending + bending.get(body.stage, 0.0))) for body in in_gates

@@ -1,7 +1,8 @@
-"""Limits along a path as constraints with their first and second derivatives, as machine code.
+"""Limits along a path as constraints with first and second derivatives, compiled to machine code.
 
-Measures are taken in body axes that are carried with the thrust axis by the smallest rotation from those of a
-path nearby: exact where that is met, and exact to first order beside it, but for the angle about the axis.
+Measures are taken in body axes. These follow from the body axes of a nearby path by the smallest rotation
+that moves the thrust axis. They are exact on the nearby path. Beside it, they are exact to first order,
+except for the angle about the thrust axis.
 """
 
 from __future__ import annotations
@@ -30,21 +31,21 @@ from aerobat.planning.refinement.clearance_values import MOVED, ClearanceValues
 from aerobat.planning.task import Task
 from aerobat.states import FlatState
 
-MOVING = slice(1, 6)  # velocity to crackle: what measures depend on
-MOTION = 15  # their components
+MOVING = slice(1, 6)  # velocity to crackle, on which measures depend
+MOTION = 15  # number of their components
 DIRECTIONS = np.eye(MOTION)
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Body axes of a path nearby, as columns, and what is known in them."""
+    """Body axes along a nearby path, and the planes that separate its body from obstacles."""
 
-    axes: Array  # (m, 3, 3)
-    planes: Planes | None  # between body and obstacles, where there are any
+    axes: Array  # body axes in the world, as columns, (m, 3, 3)
+    planes: Planes | None  # between body and obstacles; None without obstacles
 
     @cached_property
     def triads(self) -> Array:
-        """The axes one after another, (m, 9)."""
+        """The three axes of each place one after another, (m, 9)."""
         return np.swapaxes(self.axes, 1, 2).reshape(-1, 9)
 
 
@@ -52,20 +53,20 @@ class Frames:
 class LimitValues:
     """Constraints c ≤ 0 on a path's derivatives, each as a fraction of its limit's size.
 
-    Those of held limits, then those of clearances from the obstacles that are nearest at a place.
+    First come the finite ends of all limits, then the clearances from the nearest obstacles at each place.
     """
 
     task: Task
 
     @cached_property
     def sides(self) -> tuple[tuple[Limit, float], ...]:
-        """The limit of each constraint, with -1 for its lower end and 1 for its upper one."""
+        """The limit of each constraint, and its end: -1 for the lower, 1 for the upper end."""
         clear = (clearance.limit(self.task.clearance), -1.0)
         return (*self._held, *([clear] * self.clearances.count))
 
     @cached_property
     def clearances(self) -> ClearanceValues:
-        """The constraints of clearances."""
+        """The clearance constraints."""
         return ClearanceValues(self.task)
 
     @cached_property
@@ -79,27 +80,30 @@ class LimitValues:
 
     @cached_property
     def of_path(self) -> Mask:
-        """The mask of the constraints that are linear in the path's derivatives, (c,)."""
+        """The mask of the limits' constraints that are linear in the path's derivatives, (c,)."""
         return self.at_ends & (np.arange(len(self.sides)) < len(self._held))
 
     @cached_property
     def at_ends(self) -> Mask:
-        """The mask of the constraints that are decided at ends, whose path is fixed, (c,)."""
+        """The mask of the constraints that the fixed derivatives decide at the path's ends, (c,)."""
         return np.array([limit.quantity.is_of_path for limit, _ in self.sides], dtype=bool)
 
     @cached_property
     def reserve(self) -> Array:
-        """The reserve for the controller that is kept from each, as a fraction of its limit's size, (c,)."""
+        """The reserve for the controller in each constraint, as a fraction of its limit's size, (c,)."""
         return np.array([limit.kept(self.task.reserve)[sign > 0.0] for limit, sign in self.sides])
 
     def frames(self, times: Array, derivatives: Array) -> Frames:
-        """Body axes along a path's derivatives (m, 6, 3) at times (m,)."""
+        """Return the body axes and planes of a path with derivatives (m, 6, 3) at times (m,)."""
         axes = self._axes(times, derivatives)
         planes = self.clearances.planes(times, derivatives) if self.clearances.count else None
         return Frames(axes, planes)
 
     def values(self, derivatives: Array, near: Frames) -> Array:
-        """The constraints at derivatives (m, 6, 3), (m, c), infinite where thrust is against its frame."""
+        """Return the constraints (m, c) at derivatives (m, 6, 3).
+
+        Values are infinite where the thrust is opposite to the thrust axis of its frame.
+        """
         found = self._functions.values(self._shared, self._given(derivatives, near), NO_DIRECTION)
         with np.errstate(invalid="ignore"):
             values = np.asarray(found[0].T @ self.measured.T)
@@ -111,21 +115,21 @@ class LimitValues:
         return np.concatenate([values, self.clearances.values(derivatives, near.planes)], axis=1)
 
     def slopes(self, derivatives: Array, near: Frames) -> LimitSlopes:
-        """The constraints' slopes by the derivatives (m, 6, 3)."""
+        """Return the constraints' slopes by the derivatives (m, 6, 3)."""
         found = self._functions.slopes(self._shared, self._given(derivatives, near), DIRECTIONS)
         beside = None if near.planes is None else self.clearances.slopes(derivatives, near.planes)
         return LimitSlopes(self, found.transpose(2, 1, 0), beside)
 
     def curvature(self, derivatives: Array, near: Frames, weights: Array, squares: Array) -> Array:
-        """Second derivatives by position to crackle of sums of constraints, (m, 18, 18).
+        """Return the Hessian of Σ weights · c plus Jᵀ diag(squares) J, by position to crackle, (m, 18, 18).
 
-        The sum is Σ weights · c + Σ squares · (slope of c along what moves)² / 2.
+        J is the Jacobian of the constraints.
 
         Args:
-            derivatives: Of the path, (m, 6, 3).
-            near: The frames.
-            weights: Of the constraints, (m, c).
-            squares: Likewise.
+            derivatives: Derivatives of the path, (m, 6, 3).
+            near: Frames of the nearby path.
+            weights: Weights of the constraints, (m, c).
+            squares: Weights of the squared slopes, (m, c).
         """
         held = len(self._held)
         of_measures = weights[:, :held] @ self.measured, squares[:, :held] @ self._products
@@ -140,12 +144,12 @@ class LimitValues:
         return second
 
     def _given(self, derivatives: Array, near: Frames, *more: Array) -> Array:
-        """Velocity to crackle, then body axes, then more, (m, 24 or more)."""
+        """Return the functions' inputs: velocity to crackle, body axes, then `more`, (m, 24 or more)."""
         motion = derivatives.reshape(-1, 18)[:, -MOTION:]
         return np.concatenate([motion, near.triads, *more], axis=1)
 
     def _axes(self, times: Array, derivatives: Array) -> Array:
-        """Body axes in the world, as columns, (m, 3, 3)."""
+        """Return the body axes in the world, as columns, (m, 3, 3)."""
         vehicle, environment = self.task.vehicle, self.task.environment
         heading = self.task.problem.heading.start
         flat = FlatState(*np.moveaxis(derivatives[:, :5], 1, 0))
@@ -158,7 +162,7 @@ class LimitValues:
 
     @cached_property
     def _functions(self) -> SmoothFunctions:
-        """Of the airframe's kind."""
+        """The compiled measures for the vehicle's kind of drag."""
         return measure_functions(has_unequal_drag(self.task.vehicle))
 
     @cached_property
@@ -171,35 +175,35 @@ class LimitValues:
 
     @cached_property
     def measured(self) -> Array:
-        """Weights on the measures, (c, 11)."""
+        """The weights of each constraint on the measures, (c, 11)."""
         rows = [sign / limit.size * limit.quantity.measured for limit, sign in self._held]
         return np.array(rows).reshape(-1, MEASURES)
 
     @cached_property
     def _products(self) -> Array:
-        """Products of each constraint's weights, those above the diagonal once, (c, 66)."""
+        """The products of each constraint's weights, the upper triangle with the diagonal, (c, 66)."""
         i, j = np.triu_indices(MEASURES)
         return np.asarray(self.measured[:, i] * self.measured[:, j])
 
     @cached_property
     def linear(self) -> Mask:
-        """The mask of the held limits that are linear in the path's derivatives."""
+        """The mask, without clearances, of the constraints that are linear in the path's derivatives."""
         return self.of_path[: len(self._held)]
 
     @cached_property
     def path(self) -> Array:
-        """Weights of the limits that are linear in the path's derivatives, (l, 18)."""
+        """The weights of the constraints that are linear in the path's derivatives, (l, 18)."""
         rows = [sign / limit.size * limit.quantity.path for limit, sign in self._held]
         return np.array(rows).reshape(-1, 18)[self.linear]
 
     @cached_property
     def _path_products(self) -> Array:
-        """Products of the weights of each of these, (l, 324)."""
+        """The outer products of these weights with themselves, (l, 324)."""
         return np.asarray((self.path[:, :, None] * self.path[:, None]).reshape(-1, 18 * 18))
 
     @cached_property
     def _bounds(self) -> Array:
-        """The ends that weighted values keep below, (c,)."""
+        """The upper bounds of the weighted values, (c,)."""
         return np.array([sign * limit.ends[int(sign > 0.0)] for limit, sign in self._held])
 
 
@@ -208,11 +212,11 @@ class LimitSlopes:
     """Slopes of constraints by a path's derivatives (m, 6, 3)."""
 
     limits: LimitValues
-    measures: Array  # by velocity to crackle, (m, 11, 15)
-    beside: Array | None  # of clearances, (m, NEAREST, 6, 3)
+    measures: Array  # slopes of the measures by velocity to crackle, (m, 11, 15)
+    beside: Array | None  # slopes of clearances, (m, NEAREST, 6, 3)
 
     def along(self, change: Array) -> Array:
-        """The change of the constraints (m, c) with the derivatives, (m, 6, 3)."""
+        """Return the change (m, c) of the constraints along a change of the derivatives (m, 6, 3)."""
         limits, count = self.limits, len(change)
         moved = self.measures @ change[:, MOVING].reshape(count, MOTION, 1)
         found = moved[..., 0] @ limits.measured.T
@@ -222,7 +226,7 @@ class LimitSlopes:
         return np.concatenate([found, np.einsum("mcka,mka->mc", self.beside, change)], axis=1)
 
     def weighted(self, weights: Array) -> Array:
-        """The sum of the slopes (m, 6, 3), weighted (m, c)."""
+        """Return the sum (m, 6, 3) of the slopes with weights (m, c)."""
         limits, held = self.limits, len(self.limits.measured)
         by_measure = weights[:, None, :held] @ limits.measured
         total = (weights[:, :held][:, limits.linear] @ limits.path).reshape(-1, 6, 3)
@@ -234,7 +238,10 @@ class LimitSlopes:
 
 @lru_cache(maxsize=2)
 def measure_functions(has_unequal_drag: bool) -> SmoothFunctions:
-    """Measures of a motion that moves: shared are weight, wind and airframe, a place's own its body axes."""
+    """Compile the measures as functions of velocity to crackle.
+
+    Weight, wind and airframe are shared by all places; each place has its own body axes.
+    """
 
     def kernel(
         ops: Ops, shared: Sequence[Scalar], moved: Sequence[Scalar], axes: Sequence[Scalar]

@@ -1,7 +1,7 @@
-"""The fastest polynomials near a path within all limits, as a program for the interior point method.
+"""Nonlinear program of one refinement round: minimum duration near a path, for the interior point method.
 
-Limits hold at places of every segment, stages at knots. All variables stay in a box around the path: limits
-hold at places only, and what is free to leap finds motions that cheat between them.
+Limits hold at places of every segment, stages at knots. All variables stay in a box (trust region) around the
+path. Without the box, large steps lead to motions that satisfy the limits at places and violate them between.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from aerobat.planning.refinement.limit_values import Frames, LimitSlopes, LimitV
 from aerobat.planning.refinement.spline import KnotData, Motion, Spline, basis
 from aerobat.planning.refinement.stage_values import KNOWN, STATE, StageValues
 
-AT_END = basis(np.array([1.0]))  # of a segment, (1, 6, 10)
+AT_END = basis(np.array([1.0]))  # the basis at a segment's end, (1, 6, 10)
 CLOSURE_PLACES = basis(FRACTIONS)  # (p, 6, 10)
-FADED = 0.1  # of the first and the last segment, along which constraints of the path grow from nothing,
-FADING = 3  # with this power of the way inward: positions leave rest no faster
-LEAST_FADED = 1e-6  # so that the very ends, which do not count, divide by no zero
-LIMITED = -1.0  # the value of a constraint that does not count
+FADED = 0.1  # fraction of the first and last segment over which constraints of the path are scaled up
+FADING = 3  # power of the distance from the end in that scaling: positions leave rest no faster
+LEAST_FADED = 1e-6  # lower bound that avoids division by zero at the very ends, which are masked out anyway
+LIMITED = -1.0  # value that replaces masked constraints: satisfied
 
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """The multipliers of a program's inequalities, and the places of its limits."""
+    """The multipliers of a program's inequalities and the places of its limits, for a warm start."""
 
     values: Array
     fractions: Array  # (S, p)
@@ -36,39 +36,39 @@ class Multipliers:
 
 @dataclass(frozen=True, eq=False)
 class RefinementProgram:
-    """Minimize ln h, the ratios of durations adding up to their number."""
+    """Minimize ln h, the logarithm of the mean segment duration, with duration ratios of mean one."""
 
     spline: Spline
     limits: LimitValues
     stages: StageValues
-    stage_segments: tuple[int, ...]  # at whose ends stages hold
-    fractions: Array  # of each segment, at which limits hold, rising, (S, p)
-    backoff: Array  # of each segment and constraint, (S, c)
-    radius: float  # of the box, of scaled derivatives
-    stretch: float  # the factor by which durations may differ
+    stage_segments: tuple[int, ...]  # the segment at whose end each stage holds
+    fractions: Array  # places of each segment at which limits hold, ascending, (S, p)
+    backoff: Array  # tightening of each constraint in each segment, (S, c)
+    radius: float  # half the width of the box of scaled derivatives
+    stretch: float  # factor by which durations may change
 
     @cached_property
     def cost(self) -> Array:
-        """ln h."""
+        """The gradient of the cost ln h, (n,)."""
         cost = np.zeros(self.spline.size)
         cost[self.spline.mean_column] = 1.0
         return cost
 
     @cached_property
     def box(self) -> tuple[Array, Array]:
-        """Around the path."""
+        """Lower and upper bounds of the variables, around the path, (n,) each."""
         reach = np.full(self.spline.size, self.radius)
         reach[[*self.spline.ratio_columns, self.spline.mean_column]] = np.log(self.stretch)
         return self.spline.start - reach, self.spline.start + reach
 
     def at(self, x: Array) -> RefinedPoint:
-        """The constraints at a point."""
+        """Return the constraints and their derivatives at variables (n,)."""
         return RefinedPoint(self, x)
 
     def at_its_places(self, multipliers: Multipliers) -> Array:
-        """Multipliers of a program with the same segments and stages, at the places of this one.
+        """Return multipliers of a program with the same segments and stages, moved to this program's places.
 
-        The two places here beside each of its places share its multipliers.
+        Each multiplier is divided between the two nearest places of this program, linearly by distance.
         """
         before, places = multipliers.fractions, np.arange(self.fractions.shape[1])
         at_places, others = np.split(multipliers.values, [before.size * self.counts.shape[-1]])
@@ -80,12 +80,12 @@ class RefinementProgram:
 
     @cached_property
     def places(self) -> Array:
-        """The basis at fractions, (S, p, 6, 10)."""
+        """The basis at the fractions, (S, p, 6, 10)."""
         return basis(self.fractions)
 
     @cached_property
     def near(self) -> Frames:
-        """Body axes along the path that it begins with."""
+        """The body axes, and planes beside obstacles, along the path around which the program is stated."""
         trajectory = self.spline.trajectory(self.spline.start)
         times = trajectory.knots[:-1, None] + trajectory.durations[:, None] * self.fractions
         derivatives = self.spline.data(self.spline.start).derivatives(self.places).reshape(-1, 6, 3)
@@ -93,10 +93,9 @@ class RefinementProgram:
 
     @cached_property
     def counts(self) -> Mask:
-        """The mask of the constraints that count, (S, p, c).
+        """The mask of the constraints that are enforced, (S, p, c).
 
-        Constraints of the path do not count at ends, which are fixed, and planes only where there are
-        obstacles near.
+        Constraints that the fixed ends decide are left out there. Planes count only near obstacles.
         """
         counts = np.ones((*self.fractions.shape, len(self.limits.sides)), dtype=bool)
         counts[0, 0, self.limits.at_ends] = counts[-1, -1, self.limits.at_ends] = self._is_closed
@@ -108,9 +107,9 @@ class RefinementProgram:
 
     @cached_property
     def weights(self) -> Array:
-        """Of every constraint (S, p, c): those of the path weigh more toward the ends, where nothing moves.
+        """Factor on every constraint, (S, p, c): larger on constraints of the path close to the fixed ends.
 
-        What is kept there from limits fades instead, as ends may lie on limits of the path.
+        So the back-off relative to these limits vanishes at the ends, which may lie on limits of the path.
         """
         weights = np.where(self.counts, 1.0, 0.0)
         ends = () if self._is_closed else ((0, self.fractions[0]), (-1, 1.0 - self.fractions[-1]))
@@ -132,7 +131,7 @@ class RefinementProgram:
 
     @cached_property
     def timed(self) -> tuple[Array, Array]:
-        """Ratios that add up, and stages at given fractions of the duration, as rows · ratios = targets.
+        """Equalities rows · ratios = targets: the mean ratio is one, some stages have a fixed fraction.
 
         The seam of a closed course lies half-way in time between the last stage and the first.
         """
@@ -145,7 +144,7 @@ class RefinementProgram:
 
     @cached_property
     def closure(self) -> Closure | None:
-        """The constraint that a closed course ends in the attitude in which it begins; None of others."""
+        """The constraint that a closed course ends in the attitude of its start; None for open courses."""
         return Closure(self.limits) if self._is_closed else None
 
     @property
@@ -154,26 +153,26 @@ class RefinementProgram:
 
     @property
     def _windows(self) -> Iterator[tuple[Array, tuple[float, float]]]:
-        """Of each stage the weights of ratios in the fraction that goes before it, and its window."""
+        """Yield each stage's weights on the ratios that give its fraction of the duration, and its window."""
         for stage, segment in zip(self.stages.stages, self.stage_segments, strict=True):
             yield (np.arange(self.spline.segments) <= segment) / self.spline.segments, stage.window
 
 
 def _stacked(rows: list[tuple[Array, float]], width: int) -> tuple[Array, Array]:
-    """Rows (r, width) and what they are held to, (r,)."""
+    """Return rows (r, width) and their right-hand sides (r,) as arrays."""
     return np.array([row for row, _ in rows]).reshape(-1, width), np.array([end for _, end in rows])
 
 
 @dataclass(frozen=True, eq=False)
 class RefinedPoint:
-    """One path of a program."""
+    """The constraints of a program at one point, with their first and second derivatives."""
 
     program: RefinementProgram
     x: Array
 
     @cached_property
     def inequalities(self) -> Array:
-        """Limits at places, windows of stages, and what stages ask."""
+        """The values of the inequalities: limits at places, windows of stages, conditions of stages."""
         program = self.program
         values = program.limits.values(self._derivatives.reshape(-1, 6, 3), program.near)
         values = values.reshape(program.counts.shape) * program.weights + program.backoff[:, None]
@@ -184,7 +183,7 @@ class RefinedPoint:
 
     @cached_property
     def equalities(self) -> Array:
-        """The values of the equality constraints on durations, then of those at stages, and of a closure."""
+        """The values of the equalities: of durations, of stages, and of a closed course's closure."""
         rows, targets = self.program.timed
         found = [rows @ self._data.ratios - targets, self.program.stages.equalities(self._at_stages)]
         if self.program.closure is not None:
@@ -194,7 +193,7 @@ class RefinedPoint:
 
     @cached_property
     def rows(self) -> RefinedRows:
-        """The slopes of the inequalities."""
+        """The Jacobian of the inequalities."""
         program = self.program
         limits = program.limits.slopes(self._motion.derivatives.reshape(-1, 6, 3), program.near)
         windows = np.zeros((len(program.windows[1]), len(self.x)))
@@ -204,7 +203,7 @@ class RefinedPoint:
 
     @cached_property
     def equality_rows(self) -> Array:
-        """The slopes of the equalities, (p, n)."""
+        """The Jacobian of the equalities, (p, n)."""
         rows, _ = self.program.timed
         timed = np.zeros((len(rows), len(self.x)))
         timed[:, self.program.spline.ratio_columns] = rows * self._data.ratios
@@ -217,7 +216,7 @@ class RefinedPoint:
         return np.concatenate(found)
 
     def curvature(self, inequality_weights: Array, equality_weights: Array, squares: Array) -> Array:
-        """The second derivatives of their weighted sum, and of squares of what moves inequalities, (n, n)."""
+        """Return the Hessian of the weighted constraints, plus Jᵀ diag(squares) J of inequalities, (n, n)."""
         program, spline = self.program, self.program.spline
         segments, count, kinds = program.counts.shape
         size, windows = program.counts.size, len(program.windows[1])
@@ -231,7 +230,7 @@ class RefinedPoint:
         bent = (second.reshape(segments, count, 18, 18) @ moving).reshape(segments, count * 18, -1)
         blocks = np.swapaxes(moving.reshape(bent.shape), 1, 2) @ bent
         blocks += self._motion.curvature(self.rows.limits.weighted(weights).reshape(segments, count, 6, 3))
-        # of the equalities those at stages: a closure's curvature is left out
+        # only the stages' equalities: the curvature of a closure is neglected
         first, end = len(program.timed[1]), len(equality_weights) - (program.closure is not None)
         blocks += self._stage_blocks(others[windows:], equality_weights[first:end])
         rows = self.rows.others
@@ -242,7 +241,7 @@ class RefinedPoint:
         return matrix
 
     def _stage_blocks(self, inequality_weights: Array, equality_weights: Array) -> Array:
-        """Second derivatives of what stages ask, by each segment's variables."""
+        """Return the Hessian of the stages' weighted constraints, in each segment's local variables."""
         stages = self.program.stages
         weights = np.zeros((self.program.spline.segments, 1, 6, 3))
         at, by_state = self._stage_slopes
@@ -258,7 +257,7 @@ class RefinedPoint:
         return blocks
 
     def _stage_rows(self, at: Indices, weights: Array) -> Array:
-        """Rows (q, n) of Σ weights · derivatives at stages (q,), (q, 6, 3)."""
+        """Return gradients (q, n) of Σ weights · derivatives, with weights (q, 6, 3) at the stages (q,)."""
         spline = self.program.spline
         segments = np.array(self.program.stage_segments, dtype=np.intp)[at]
         slopes = self._ends.slopes[segments, 0].reshape(len(at), 18, spline.columns.shape[1])
@@ -285,33 +284,36 @@ class RefinedPoint:
 
     @cached_property
     def _stage_slopes(self) -> tuple[Indices, Array]:
-        """The stages of what they ask, (q,), and its slopes by the derivatives there, (q, 6, 3)."""
+        """The stage of each stage inequality, (q,), and its slopes by the derivatives there, (q, 6, 3)."""
         return self.program.stages.inequality_slopes(self._at_stages)
 
     @cached_property
     def _at_stages(self) -> Array:
-        """Derivatives at stages, (stages, 6, 3)."""
+        """The derivatives of position at the stages, (stages, 6, 3)."""
         found = self._data.derivatives(AT_END)[:, 0]
         return np.asarray(found[list(self.program.stage_segments)])
 
 
 @dataclass(frozen=True, eq=False)
 class RefinedRows:
-    """Slopes of inequalities: of limits at places by way of the motion there, of others by all variables."""
+    """Jacobian of the inequalities, kept in factors: limits by motion, motion by local variables.
+
+    The other inequalities have dense rows.
+    """
 
     program: RefinementProgram
-    motion: Array  # by each segment's own variables, (S, p, 6, 3, K + 2)
+    motion: Array  # slopes of the derivatives by each segment's local variables, (S, p, 6, 3, K + 2)
     limits: LimitSlopes
-    others: Array  # (q, n)
+    others: Array  # dense rows, (q, n)
 
     def times(self, step: Array) -> Array:
-        """The rows times a step, (S p c + q,)."""
+        """Return the product of the Jacobian and a step, (S p c + q,)."""
         change = self._flat @ self.program.spline.gathered(step)[..., None]
         at_places = self.limits.along(change.reshape(-1, 6, 3)).ravel() * self.program.weights.ravel()
         return np.concatenate([at_places, self.others @ step])
 
     def transposed(self, weights: Array) -> Array:
-        """The sum of weighted rows, (n,)."""
+        """Return the product of the transposed Jacobian and weights, (n,)."""
         counts = self.program.counts
         at_places, others = weights[: counts.size], weights[counts.size :]
         at_places = at_places * self.program.weights.ravel()
@@ -321,5 +323,5 @@ class RefinedRows:
 
     @property
     def _flat(self) -> Array:
-        """The motion's slopes, (S, 18 p, K + 2)."""
+        """The motion's slopes as one matrix a segment, (S, 18 p, K + 2)."""
         return self.motion.reshape(len(self.motion), -1, self.motion.shape[-1])

@@ -1,10 +1,11 @@
-"""The one refinement: from a path through stages to the fastest certified polynomials near it.
+"""Trajectory refinement: from a path through stages to the fastest certified polynomials near the path.
 
-Limits on a path are infinitely many constraints. They are held at places. Where paths exceed them between,
-the next round has one more place (Blankenship and Falk, "Infinitely constrained optimization problems",
-1976). It also keeps some room (Mitsos, "Global optimization of semi-infinite programs via restriction of the
-right-hand side", 2011). Rough rounds, by a dense look, go on until the duration hardly falls. Fine rounds,
-which are damped so that what is mended stays mended, go on until the path is certified.
+Limits along a path form a semi-infinite program, which is solved with the limits held at discrete places.
+Where a path violates limits between places, the next round adds a place there (Blankenship and Falk,
+"Infinitely constrained optimization problems", 1976). The next round also tightens the limits by a back-off
+(Mitsos, "Global optimization of semi-infinite programs via restriction of the right-hand side", 2011).
+Rough rounds check limits on dense samples and end when the duration hardly falls. Fine rounds are more
+strongly damped, so that repaired violations do not return, and end when the path is certified.
 """
 
 from __future__ import annotations
@@ -40,16 +41,18 @@ from aerobat.problem.limits import UNITS
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory, polynomial
 
-SEGMENTS = 8  # of a maneuver: within a percent of the fastest; twice as many take three times as long
-LEG_SEGMENTS = 2  # of a course's leg
-MAX_SEGMENTS = 80  # of all: solves take a second each
-FIRST = Settings(least_barrier=1e-5, least_slack=0.1, gain=2e-4)  # from paths far beyond the limits
-ROUGH = Settings(barrier=1e-6, least_slack=1e-3)
+SEGMENTS = 8  # segments of a maneuver: within 1 % of the fastest; 16 segments take three times as long
+LEG_SEGMENTS = 2  # segments of each leg of a course
+MAX_SEGMENTS = 80  # largest number of segments of a path, where a solve takes about a second
+# Interior point settings of the first round, which begins at a path that may violate limits by far
+FIRST = Settings(least_barrier=1e-5, least_slack=0.1, gain=2e-4)
+ROUGH = Settings(barrier=1e-6, least_slack=1e-3)  # of the rough rounds after the first
 FINE = Settings(
     barrier=1e-6, least_slack=1e-3, damping=1e-2, iterations=30, tolerance=1e-5, violation=5e-5, gain=2e-4
 )
-# A barrier costs its parameter times the number of limits at places: of ten thousand of a course a hundredth
-# of the duration; fine rounds that begin with a larger one than rough rounds end with leave limits again.
+# Settings for `Refinement.close`. A barrier costs about its parameter times the number of limits at places:
+# with the ten thousand of a course, 1 % of the duration. Fine rounds must not begin with a larger barrier
+# parameter than rough rounds end with: paths would move away from the limits again.
 CLOSE_ROUGH = Settings(
     barrier=1e-6, least_barrier=1e-7, least_slack=1e-3, iterations=100, tolerance=1e-6, gain=1e-4
 )
@@ -63,50 +66,51 @@ CLOSE_FINE = Settings(
     violation=5e-5,
     gain=1e-4,
 )
-ROUGH_ROUNDS = 8  # at most
-FINE_ROUNDS = 16
-MORE_ROUNDS = 1  # of such fine rounds, from a path that is certified on
-SPREADS = 4  # of a rough path's knots anew, at most: 1.2 % shorter on average of 60 random problems
-ROUGH_SHARE = 0.5  # of the time that is left, so that there is some to certify what is found
-PLACES = 16  # of a segment at first: from 12, peaks between are found in vain
-MORE_PLACES = 1.5  # times as many where thrusts jump, as those of rotors without lag
-LOSS = 0.02  # of a rough path's duration, that makes one certified: more segments have less
-LITTLE_GAIN = 0.005  # of the duration, from one rough round to the next: the end
-SETTLED = 0.1  # of a limit's size: rough rounds go on where more is exceeded
-BEHIND = 0.02  # of a known path's duration: one that is so much longer after a round is not gone on with
-RADIUS = 2.0  # of the box in which scaled derivatives move at first,
-SHRINK = 1.5  # the factor by which it is smaller from one rough round to the next,
-LEAST_RADIUS = 1.0  # down to this
-STRETCH = 1.6  # the factor by which durations may differ in one round
-BACKOFF = 1e-4  # of every limit's size, at places
-MAX_BACKOFF = 0.03  # that one round adds: where much is exceeded, it moves elsewhere
-# More than so much of a limit's size is exceeded in peaks between places. There each segment gets one more
-# place, and less room is kept beside it: 27 random problems' plans are 1.4 % shorter on average by that, in
-# four fifths of the time.
+ROUGH_ROUNDS = 8  # largest number of rough rounds
+FINE_ROUNDS = 16  # largest number of fine rounds before a path is certified
+MORE_ROUNDS = 1  # further series of fine rounds, each from the last certified path
+SPREADS = 4  # most redistributions of knots: plans of 60 random problems get 1.2 % shorter on average
+ROUGH_SHARE = 0.5  # fraction of the remaining time for rough rounds; the rest is for certification
+PLACES = 16  # places of a segment in the first round: with 12, finding the peaks between them does not help
+MORE_PLACES = 1.5  # factor on PLACES where rotors have no lag and their thrusts may jump
+LOSS = 0.02  # increase of duration by certification, relative, from which twice as many segments are tried
+LITTLE_GAIN = 0.005  # relative decrease of duration below which rough rounds end
+SETTLED = 0.1  # constraint violation, relative to the limit's size, above which rough rounds continue
+BEHIND = 0.02  # relative excess over a known path's duration at which a slower path is given up
+RADIUS = 2.0  # half the width of the box (trust region) of scaled derivatives in the first round
+SHRINK = 1.5  # factor by which RADIUS shrinks from one rough round to the next
+LEAST_RADIUS = 1.0  # lower bound of the shrinking RADIUS
+STRETCH = 1.6  # factor by which segment durations may change in one round
+BACKOFF = 1e-4  # initial tightening of all limits at places, relative to their sizes
+MAX_BACKOFF = 0.03  # largest tightening that one round adds, as large violations move elsewhere
+# Constraint violation, relative to the limit's size, above which each segment gets one more place at its
+# peak, and limits are tightened less (BESIDE_PEAKS). Plans of 27 random problems get 1.4 % shorter on average
+# by that, in four fifths of the time.
 PEAKED = 1e-3
-PEAKS = 8  # places that a segment gets so; where more rounds are needed, they keep all the room
-APART = 0.25  # of the gap that a place comes into, from either end
-BESIDE_PEAKS = 0.1  # of the room that is kept otherwise
-STILL = 0.02  # of a duration, and of what is exceeded: rounds that differ by less stand still
-MORE_BACKOFF = 1.3  # times what is exceeded, in fine rounds
-FINE_BACKOFF = 2e-4  # of a limit's size, and so much more, as for what a certificate refutes beside
-# of a limit's size, beyond what is kept from it: there a certificate may refute what dense looks do not
+PEAKS = 8  # largest number of places added to a segment; later rounds tighten by the full amount instead
+APART = 0.25  # least distance of an added place from its neighbours, as a fraction of the gap between them
+BESIDE_PEAKS = 0.1  # factor on the tightening in rounds that add places
+STILL = 0.02  # relative change of duration and of violation below which rounds have stalled
+MORE_BACKOFF = 1.3  # factor on violations that gives the tightening of fine rounds
+FINE_BACKOFF = 2e-4  # constant added to that tightening, relative to the limit's size
+# Distance from the tightened limit, relative to the limit's size, within which a certificate may find a
+# violation that dense samples miss.
 NEARLY_EXCEEDED = 2e-3
-MENDABLE = 0.5  # of a limit's size: a solve that leaves more has lost its way
-RELATIVE_STAGE_TOLERANCE = 1e-5  # of a condition's size: by how much a stage may be missed through rounding
-NEARLY_MISSED = 0.02  # likewise, where rounds that follow may mend it
-NEWTON_STEPS = 3  # that meet what stages fix exactly
-CONVERGED = "locally optimal"  # the status of such a solution
+MENDABLE = 0.5  # largest constraint violation, relative to the limit's size, that further rounds may repair
+RELATIVE_STAGE_TOLERANCE = 1e-5  # violation of a stage's condition, relative to its size, that is rounding
+NEARLY_MISSED = 0.02  # violation of a stage's condition, relative to its size, that further rounds may repair
+NEWTON_STEPS = 3  # Newton steps that satisfy the equality constraints exactly after a solve
+CONVERGED = "locally optimal"  # the status of a converged solution
 
 
 @dataclass(frozen=True, eq=False)
 class RefinedPath:
-    """A path with its stages, and by how much it exceeds limits."""
+    """A path with its stages and its constraint violations."""
 
     path: WarmStart
-    excess: Excess
+    excess: Excess  # constraint violations on dense samples
     multipliers: Multipliers | None = None  # of the last program's inequalities
-    certified: Judged[RefinedPath] | None = None  # the shortest that is, of the rough rounds that led to it
+    certified: Judged[RefinedPath] | None = None  # the shortest certified path of the rough rounds up to here
 
     @property
     def placed(self) -> tuple[PlacedStage, ...]:
@@ -122,60 +126,60 @@ class Refinement:
 
     task: Task
     recorder: Recorder
-    in_gates: tuple[BodyInGate, ...] = ()  # that the stages cross
-    still_ends: bool = False  # without jerk
-    close: bool = False  # whether paths come within a thousandth of what they come near otherwise
-    grows: bool = False  # whether paths get twice as many segments where they are much slower otherwise
-    # whether paths of few segments that miss a stage get no more, which take several times as long, mostly in
-    # vain: where other starts are at hand
+    in_gates: tuple[BodyInGate, ...] = ()  # room of the body in the gates that stages cross
+    still_ends: bool = False  # whether the jerk is zero at the ends
+    close: bool = False  # whether solves are more accurate: within 0.1 % of the local optimum
+    grows: bool = False  # whether paths get twice as many segments where certification costs more than LOSS
+    # whether a path that misses a stage with few segments is given up: more segments take several times as
+    # long, mostly in vain. For planners that have other starts.
     hasty: bool = False
     _known: dict[tuple[Stage, ...], StageValues] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, task: Task, recorder: Recorder, still_ends: bool = False) -> Refinement:
-        """The refinement of a task's paths, with room for the body in all gates.
+        """Return the refinement of a task's paths, with room for the body in all gates.
 
         Args:
-            task: What is planned, with a vehicle.
-            recorder: Keeps an attempt a round.
-            still_ends: Whether ends are without jerk.
+            task: The task that is planned, with a vehicle.
+            recorder: Records one attempt a round.
+            still_ends: Whether the jerk is zero at the ends.
         """
         return cls(task, recorder, bodies_in_gates(task), still_ends)
 
     @property
     def settings(self) -> tuple[Settings, Settings]:
-        """Of rough rounds that go on, and of fine ones."""
+        """The interior point settings of rough rounds after the first, and of fine rounds."""
         return (CLOSE_ROUGH, CLOSE_FINE) if self.close else (ROUGH, FINE)
 
     @cached_property
     def limits(self) -> LimitValues:
-        """Everything that holds all along, but for what others imply."""
+        """The limits that hold along the whole path, without limits that others imply."""
         return LimitValues(self.task)
 
     @property
     def with_and_without_rooms(self) -> tuple[Refinement, ...]:
-        """The refinement, then one without rooms, which some gates do not leave where they are crossed."""
+        """This refinement, then one that asks no room for the body in gates: some gates leave too little."""
         return (self, replace(self, in_gates=())) if self.in_gates else (self,)
 
     def stage_values(self, stages: tuple[Stage, ...]) -> StageValues:
-        """Return the constraints of stages in the order of a path, compiled once."""
+        """Return the constraints of stages, which are in the order of a path; compiled once per order."""
         if stages not in self._known:
             self._known[stages] = StageValues(stages, self.task, self.rooms(stages))
         return self._known[stages]
 
     def rooms(self, stages: tuple[Stage, ...]) -> tuple[BodyInGate, ...]:
-        """The body's room in gates, with stages counted in the order of a path."""
+        """Return the body's room in gates, with the stages' numbers in the order of a path."""
         if self.task.stages.ordered:
             return self.in_gates
         gates = [stage.gate for stage in stages]
         return tuple(replace(body, stage=gates.index(body.gate.name)) for body in self.in_gates)
 
     def refined(self, guess: WarmStart, segments: int) -> Judged[RefinedPath]:
-        """The fastest certified path near a guess, or the last one that was tried.
+        """Return the fastest certified path near a guess, or the last path tried where none is certified.
 
         Args:
-            guess: A path through the stages, within limits or not.
-            segments: Of the path that is sought, with a knot at every stage.
+            guess: A path through the stages, feasible or not.
+            segments: Number of segments of the result, which has a knot at every stage.
         """
         rough = self.rough(guess, segments)
         if self.is_promising(rough):
@@ -183,27 +187,27 @@ class Refinement:
         return Judged(self.task, self.solution(rough, "unknown"), None, False)
 
     def rough(self, guess: WarmStart, segments: int, known: float = np.inf) -> RefinedPath:
-        """A path that is as fast as it gets, and may exceed limits a little between places.
+        """Return a path near a guess after rough rounds; it may violate limits a little between places.
 
-        It is sought with few segments first, which go far in one step, then with twice as many, until there
-        are as many as asked.
+        Mesh refinement: the first solves have few segments, which allow large steps. Then the number of
+        segments is doubled until `segments` is reached.
 
         Args:
-            guess: A path through the stages, within limits or not.
-            segments: Of the path that is sought, with a knot at every stage.
-            known: The duration [s] of a path that is known: one that stays far behind it is left early.
+            guess: A path through the stages, feasible or not.
+            segments: Number of segments of the result, which has a knot at every stage.
+            known: The duration [s] of a known path. A path that stays much slower is given up early.
         """
         number = min(segments, max(SEGMENTS, len(guess.phases)))
         with within_share(ROUGH_SHARE):
             return self.finer(self._rough(knots_at_stages(guess, number), known), segments, known)
 
     def finer(self, found: RefinedPath, segments: int, known: float = np.inf) -> RefinedPath:
-        """A rough path with more segments, twice as many at a time, its knots where it wants them.
+        """Return a rough path after mesh refinement: segments are doubled, then knots are redistributed.
 
         Args:
             found: A rough path.
-            segments: Of the path that is sought, at least its own.
-            known: The duration [s] of a path that is known: one that stays far behind it is left early.
+            segments: Number of segments of the result, at least that of `found`.
+            known: The duration [s] of a known path. A path that stays much slower is given up early.
         """
         number = found.path.trajectory.segments
         while number < segments and not out_of_time() and not self._gives_up(found):
@@ -212,7 +216,7 @@ class Refinement:
         return self._spread_anew(found, known)
 
     def _spread_anew(self, found: RefinedPath, known: float) -> RefinedPath:
-        """A rough path whose knots are spread evenly between stages again, as long as it gains by that."""
+        """Redistribute the knots evenly between stages and solve again, as long as the duration falls."""
         for _ in range(SPREADS):
             duration = found.path.trajectory.duration
             if out_of_time() or not self.is_promising(found) or duration > (1.0 + BEHIND) * known:
@@ -233,9 +237,9 @@ class Refinement:
         certified: Judged[RefinedPath] | None = None,
         multipliers: Multipliers | None = None,
     ) -> RefinedPath:
-        """The fastest path near one with knots at the stages, or one far behind a known duration [s].
+        """Run rough rounds from a guess with knots at its stages; stop early if far slower than `known` [s].
 
-        With it comes the shortest that is certified, of the rounds made here and before.
+        The result's `certified` is the shortest certified path of these rounds and of earlier ones.
         """
         rounds = Rounds(self, guess, multipliers=multipliers)
         before = np.inf
@@ -253,9 +257,9 @@ class Refinement:
         return replace(solution.source, certified=certified)
 
     def finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
-        """The shortest certified path near one that is as fast as it gets, or the last one that was tried.
+        """Return the shortest certified path near a rough one, or the last path tried if none is certified.
 
-        Where the duration still falls, it goes on from the path that is certified.
+        Where the duration has not converged, another series of fine rounds begins at the certified path.
         """
         judged = self._finished(rough)
         judged = _shortest(judged, rough.certified) or judged
@@ -270,10 +274,10 @@ class Refinement:
         return self._with_more_segments(rough, judged) if self.grows else judged
 
     def _with_more_segments(self, rough: RefinedPath, found: Judged[RefinedPath]) -> Judged[RefinedPath]:
-        """The certified path that was found near a rough one, or a shorter one with twice as many segments.
+        """Return the certified path, or a shorter certified path with twice as many segments.
 
-        They are given where it is much longer than the rough one. A course has many as it is. A path whose
-        body touches gates' frames is left as it is: it is refined again, with more room there.
+        More segments are tried where the certified path is much longer than the rough one. Courses have many
+        segments already. Paths whose body touches gates' frames are refined again elsewhere, with more room.
         """
         path, duration = rough.path.trajectory, found.solution.duration
         loses_little = not found.feasible or duration <= (1.0 + LOSS) * path.duration
@@ -287,38 +291,38 @@ class Refinement:
         return judged if is_better else found
 
     def _finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
-        """The certified path near one, or the last one that was tried."""
+        """Run one series of fine rounds; return the certified path, or the last path tried."""
         _, fine = self.settings
         rounds = Rounds(self, rough.path, fine, radius=LEAST_RADIUS, multipliers=rough.multipliers)
         rounds.back_off(rough.excess)
         return certified_solve(rounds, self.task, self.recorder, FINE_ROUNDS)
 
     def is_promising(self, path: RefinedPath) -> bool:
-        """True of a path that meets its stages and exceeds limits by so little that rounds may mend it."""
+        """Return whether further rounds may repair a path's constraint violations and missed stages."""
         return path.excess.largest <= MENDABLE and self._nearly_meets_stages(path)
 
     def _gives_up(self, path: RefinedPath) -> bool:
-        """True of a path that gets no more segments, although it has fewer than were asked."""
+        """Return whether a hasty refinement gives a path up before it has the requested segments."""
         return self.hasty and not self._nearly_meets_stages(path)
 
     def _nearly_meets_stages(self, path: RefinedPath) -> bool:
-        """True of a path whose stages rounds may still meet."""
+        """Return whether a path misses no stage by more than further rounds may repair."""
         return self._missed_stage(path.path, NEARLY_MISSED) is None
 
     def path(self, guess: WarmStart) -> RefinedPath:
-        """A path, looked at densely."""
+        """Return a path with its constraint violations on dense samples."""
         return RefinedPath(guess, Excess.of(guess.trajectory, self.limits))
 
     def solution(
         self, path: RefinedPath, status: str, iterations: int = 0, time: float = 0.0
     ) -> Solution[RefinedPath]:
-        """A path as a solution; a failure where it misses a stage, or exceeds limits.
+        """Return a path as a solution, with a failure if the path misses a stage or violates limits.
 
         Args:
-            path: What was found.
-            status: Of the solver.
-            iterations: Of the solver.
-            time: That it took [s].
+            path: The path.
+            status: The solver's status.
+            iterations: The solver's iterations.
+            time: The solver's time [s].
         """
         trajectory, excess = path.path.trajectory, path.excess
         failure = self._missed_stage(path.path)
@@ -336,11 +340,11 @@ class Refinement:
         )
 
     def _missed_stage(self, path: WarmStart, tolerance: float = RELATIVE_STAGE_TOLERANCE) -> Reason | None:
-        """The first stage that a path misses, in a sentence; or None.
+        """Return a sentence about the first stage that a path misses, or None.
 
         Args:
-            path: With its stages' times.
-            tolerance: By which a condition may be missed, as a fraction of its size.
+            path: The path, with its stages' times.
+            tolerance: By how much a condition may be missed, as a fraction of the condition's size.
         """
         for stage, time in zip(path.stages, path.times, strict=True):
             where = (f"stage '{stage.name}'",)
@@ -365,7 +369,7 @@ class Refinement:
 
 
 class Rounds:
-    """The program near a path, again and again, with limits backed off from."""
+    """Successive programs, each around the last path, with limits tightened where that path violates them."""
 
     def __init__(
         self,
@@ -392,7 +396,7 @@ class Rounds:
         self._multipliers = multipliers
 
     def solve(self) -> Solution[RefinedPath]:
-        """The fastest path near the last one."""
+        """Solve the program around the last path."""
         began, refinement = perf_counter(), self._refinement
         program = self._program
         known = None if self._multipliers is None else program.at_its_places(self._multipliers)
@@ -408,7 +412,10 @@ class Rounds:
         return refinement.solution(path, status, answer.iterations, perf_counter() - began)
 
     def tighten(self, solution: Solution[RefinedPath], certificate: Certificate | None) -> bool:
-        """Go on from a path with more room where it exceeds limits, or where its certificate refutes it."""
+        """Make a path the next guess and tighten limits where samples or its certificate show violations.
+
+        Return False where further rounds lead nowhere.
+        """
         excess = solution.source.excess
         if out_of_time() or self.is_stuck(solution) or not self._refinement.is_promising(solution.source):
             return False
@@ -423,24 +430,24 @@ class Rounds:
         return True
 
     def is_stuck(self, solution: Solution[RefinedPath]) -> bool:
-        """True if a solution exceeds limits by much, as the last path does, and takes as long."""
+        """Return whether rounds have stalled: large violation, hardly changed, in the same duration."""
         excess = solution.source.excess.largest
         pairs = (solution.duration, self._guess.trajectory.duration), (excess, self._exceeded)
         return excess > SETTLED and all(abs(new - old) < STILL * old for new, old in pairs)
 
     def go_on(self, path: RefinedPath) -> None:
-        """Go on from a path in a smaller region, with more room where it exceeds limits."""
+        """Make a path the next guess, shrink the box and tighten limits where the path violates them."""
         self._guess, (self._settings, _) = path.path, self._refinement.settings
         self._radius = max(self._radius / SHRINK, LEAST_RADIUS)
         self.back_off(path.excess)
 
     def back_off(self, excess: Excess, factor: float = 1.0, more: float = 0.0) -> None:
-        """Hold limits where each segment exceeds them most, and keep more room where they are exceeded.
+        """Add a place at each segment's largest violation, and tighten limits where they are violated.
 
         Args:
-            excess: Of the last path.
-            factor: Times what is exceeded.
-            more: And so much more, of a limit's size.
+            excess: The violations of the last path.
+            factor: Tightening per violation.
+            more: Constant that is added where a limit is violated, as a fraction of the limit's size.
         """
         exceeded = np.clip(excess.nearby, 0.0, MAX_BACKOFF)
         if excess.largest > PEAKED and self._hold_at(excess.peaks):
@@ -449,7 +456,7 @@ class Rounds:
         self._backoff += factor * exceeded + more * (exceeded > 0.0)
 
     def _hold_at(self, peaks: Array) -> bool:
-        """Hold limits at one more place of each segment (S,); False where there would be too many."""
+        """Add one place to each segment, near `peaks` (S,); return False where segments have too many."""
         if self._fractions.shape[1] >= self._most_places:
             return False
         held = np.array([_between(row, peak) for row, peak in zip(self._fractions, peaks, strict=True)])
@@ -474,13 +481,16 @@ class Rounds:
 
 
 def _shortest(*found: Judged[RefinedPath] | None) -> Judged[RefinedPath] | None:
-    """The shortest of the certified paths among those found; None where there is none."""
+    """Return the shortest of the certified paths among `found`, or None."""
     certified = (each for each in found if each is not None and each.feasible)
     return min(certified, key=lambda each: each.solution.duration, default=None)
 
 
 def _refuted(certificate: Certificate, reserve: float) -> tuple[float, list[float]]:
-    """The largest excess that a certificate refutes, or misses of the reserve; when limits are violated."""
+    """Return a certificate's largest violation or reserve shortfall, and the times [s] of its violations.
+
+    The first is a fraction of a limit's size, MAX_BACKOFF at most.
+    """
     refuted = [f for f in certificate.findings if f.verdict is Verdict.VIOLATED and f.limit is not None]
     beyond = [-(f.margin or 0.0) / (f.size or max(abs(f.limit or 0.0), 1.0)) for f in refuted]
     missed = [shortfall.size for shortfall in reserve_shortfalls(certificate, reserve)]
@@ -488,14 +498,14 @@ def _refuted(certificate: Certificate, reserve: float) -> tuple[float, list[floa
 
 
 def _between(places: Array, peak: float) -> float:
-    """The place nearest to a peak that keeps apart from rising places."""
+    """Return the fraction nearest to a peak that keeps its distance from sorted places."""
     after = int(np.searchsorted(places[1:-1], peak, side="right")) + 1
     before, gap = places[after - 1], places[after] - places[after - 1]
     return float(np.clip(peak, before + APART * gap, before + (1.0 - APART) * gap))
 
 
 def _with_times(peaks: Array, trajectory: Trajectory, times: Sequence[float]) -> Array:
-    """Fractions of segments (S,), some of them at these times [s] instead."""
+    """Return peaks (S,), those of segments with one of the times [s] moved there."""
     found = peaks.copy()
     for time in times:
         segment = int(np.searchsorted(trajectory.knots[1:-1], time))
@@ -505,11 +515,11 @@ def _with_times(peaks: Array, trajectory: Trajectory, times: Sequence[float]) ->
 
 
 def knots_at_stages(path: WarmStart, segments: int) -> WarmStart:
-    """Polynomials of degree 9 through a path up to snap, about so many, with a knot at every stage.
+    """Return degree-9 polynomials that interpolate a path up to snap, with a knot at every stage.
 
     Args:
-        path: Of any degree.
-        segments: Their number, where that is no less than the phases between stages.
+        path: A path of any degree.
+        segments: Number of segments; at least one for each phase between stages is made.
     """
     phases = path.phases
     parts = np.ones(len(phases), dtype=int)
@@ -525,14 +535,14 @@ def knots_at_stages(path: WarmStart, segments: int) -> WarmStart:
 
 
 def segments_for(sequence: StageSequence, asked: int = SEGMENTS) -> int:
-    """Return how many segments a path through stages has: of a course so many a leg, else as asked."""
+    """Return the number of a path's segments: `asked`, or one a leg if more, or LEG_SEGMENTS on a course."""
     legs = len(sequence.stages) + 1
     wanted = max(asked, LEG_SEGMENTS * legs) if is_course(sequence) else asked
     return min(max(wanted, legs), MAX_SEGMENTS)
 
 
 def _meeting_stages(program: RefinementProgram, answer: InteriorPointResult) -> Array:
-    """The point next to an answer that meets what stages fix exactly."""
+    """Return an answer after Newton steps (least norm) that satisfy the equality constraints exactly."""
     x = answer.x
     for _ in range(NEWTON_STEPS):
         point = program.at(x)
@@ -545,5 +555,5 @@ def _meeting_stages(program: RefinementProgram, answer: InteriorPointResult) -> 
 
 
 def _segment_that_ends(trajectory: Trajectory, time: float) -> int:
-    """The segment at whose end a stage holds."""
+    """Return the segment whose end is nearest to a stage's time."""
     return int(np.argmin(np.abs(trajectory.knots[1:] - time)))

@@ -1,10 +1,10 @@
-"""Polynomials of degree 9 between knots, as functions of free variables: what a refinement moves.
+"""Splines of degree 9 between knots, as functions of the variables that the refinement optimizes.
 
-With h a mean duration, the k-th derivative of position at a knot is Y_k/h^k, and a segment lasts τ h. The
-variables are the Y_k at the knots, scaled to a size of one, ln τ of every segment and ln h: with all others
-held, h changes how fast a path is flown and not the path. What ends fix, they fix in SI units. On a segment
-of duration T = τ h the normalised data of both its knots are Z_m = τ^m Y_m + T^m fixed_m. The k-th derivative
-of the motion that the data make is
+Let h be the mean duration of a segment. The k-th derivative of position at a knot is Y_k/h^k, and a segment
+lasts τ h. The variables are the Y_k at the knots, scaled to magnitudes near one, ln τ of every segment, and
+ln h. With all other variables held, h changes only how fast the path is flown. Derivatives that the ends fix
+are in SI units. On a segment of duration T = τ h the normalised data of both its knots are
+Z_m = τ^m Y_m + T^m fixed_m. The k-th derivative of position on the segment is
 
     D_k(s) = T^-k Σ_m B_km(s) Z_m.
 """
@@ -25,17 +25,20 @@ from aerobat.planning.task import Task
 from aerobat.problem.end_state import EndState
 from aerobat.trajectory import Trajectory, polynomial
 
-END_ORDER = 5  # derivatives at either end of a segment that make its polynomial: position to snap
+END_ORDER = 5  # derivatives at either end of a segment that determine its polynomial: position to snap
 DEGREE = 2 * END_ORDER - 1
 DERIVATIVES = 6  # position to crackle
 JERK, SNAP = 3, 4
 TO_COEFFICIENTS = polynomial.hermite(np.eye(2 * END_ORDER)[:END_ORDER], np.eye(2 * END_ORDER)[END_ORDER:])
-ORDERS = np.tile(np.arange(float(END_ORDER)), 2)  # of the derivatives at both ends
+ORDERS = np.tile(np.arange(float(END_ORDER)), 2)  # orders of the derivatives at both ends, (10,)
 POWERS = np.arange(float(DERIVATIVES))[:, None]  # k
 
 
 def basis(fractions: Array) -> Array:
-    """Return B: derivatives by normalised time, at fractions (..., p), of data at knots, (..., p, 6, 10)."""
+    """Return B, the map from normalised knot data to derivatives by normalised time.
+
+    The fractions of a segment are (..., p), the result is (..., p, 6, 10).
+    """
     powers = [
         np.stack([perm(p, k) * fractions ** max(p - k, 0) for p in range(DEGREE + 1)], axis=-1)
         for k in range(DERIVATIVES)
@@ -44,39 +47,39 @@ def basis(fractions: Array) -> Array:
 
 
 class KnotData(NamedTuple):
-    """The data of the knots at both ends of all segments, and how long these last."""
+    """Normalised derivatives at both ends of all segments, and the segments' durations."""
 
     values: Array  # Z, (S, 10, 3)
-    fixed: Array  # its part that is fixed in SI units
+    fixed: Array  # the part T^m fixed_m of Z, which the ends fix
     ratios: Array  # τ, (S,)
     durations: Array  # [s], (S,)
 
     def scaled(self, places: Array) -> Array:
-        """T^-k B at places, (S, p, 6, 10) or (p, 6, 10) as `basis` has them, (S, 6 p, 10)."""
+        """Return T^-k B, (S, 6 p, 10), for places from `basis`, (S, p, 6, 10) or (p, 6, 10)."""
         found = places * (self.durations[:, None] ** -POWERS[:, 0])[:, None, :, None]
         return np.asarray(found.reshape(len(self.durations), -1, 2 * END_ORDER))
 
     def derivatives(self, places: Array) -> Array:
-        """Derivatives of position at places, (S, p, 6, 3)."""
+        """Return the derivatives of position at places, (S, p, 6, 3)."""
         found = self.scaled(places) @ self.values
         return np.asarray(found.reshape(len(found), -1, DERIVATIVES, 3))
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Derivatives of position at places of all segments, and how they follow from the variables.
+    """Derivatives of position at places of all segments, with their slopes by the variables.
 
-    A segment's local variables are those of its knots, K of them, its ln τ, and ln h.
+    A segment's local variables are the K variables of its two knots, its ln τ, and ln h.
     """
 
-    derivatives: Array  # (S, p, 6, 3)
-    slopes: Array  # by local variables, (S, p, 6, 3, K + 2)
+    derivatives: Array  # of position, (S, p, 6, 3)
+    slopes: Array  # of the derivatives by local variables, (S, p, 6, 3, K + 2)
     _scaled: Array  # T^-k B, (S, 6 p, 10)
     _data: KnotData
-    _effect: Array  # of local variables on Z, (S, 10, 3, K)
+    _effect: Array  # slopes of Z by local variables, (S, 10, 3, K)
 
     def curvature(self, weights: Array) -> Array:
-        """Second derivatives of Σ weights · derivatives, weights (S, p, 6, 3), by local variables."""
+        """Return the Hessian (S, K + 2, K + 2) of Σ weights · derivatives, with weights (S, p, 6, 3)."""
         count = self._effect.shape[-1]
         found = np.zeros((len(weights), count + 2, count + 2))
         ratio, mean = count, count + 1
@@ -106,27 +109,27 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Spline:
-    """The variables of a problem's polynomials, and the path that begins there.
+    """The free variables of a piecewise polynomial path, and the path at which an optimization starts.
 
-    Free are position to jerk at the inner knots, and snap: one for both neighbours if rotors lag, whose
-    thrusts cannot jump, else one for each. At the ends the body does not turn but its thrust may be
-    changing: free are jerk along the thrust, unless ends are still, and snap along it if rotors lag, else
-    all of it; where any attitude will do, all from acceleration on. A closed course has no ends: the knot at
-    its seam is an inner one.
+    At inner knots position to jerk are free, and snap. Neighbouring segments share one snap if rotors have
+    lag, as thrusts cannot jump; otherwise each segment has its own. At the ends the body rate is zero, but
+    the thrust may change. There jerk along the thrust is free unless `still_ends`, and snap: along the thrust
+    only if rotors have lag. Ends with a free attitude have all derivatives free that the problem does not
+    fix. A closed course has no ends: the knot at its seam is an inner knot.
     """
 
     task: Task
-    begun: Trajectory  # of degree 9
-    still_ends: bool = False
+    begun: Trajectory  # the path at the start, of degree 9
+    still_ends: bool = False  # whether the jerk is zero at the ends
 
     @property
     def segments(self) -> int:
-        """Their number S."""
+        """The number S of segments."""
         return self.begun.segments
 
     @cached_property
     def mean_duration(self) -> float:
-        """h of the path that it begins with [s]."""
+        """The mean segment duration h of the path at the start [s]."""
         return self.begun.duration / self.segments
 
     @cached_property
@@ -136,22 +139,22 @@ class Spline:
 
     @property
     def mean_column(self) -> int:
-        """The variable ln h."""
+        """The index of the variable ln h."""
         return self._layout[2]
 
     @cached_property
     def ratio_columns(self) -> Indices:
-        """The variables ln τ, (S,)."""
+        """The indices of the variables ln τ, (S,)."""
         return np.array(self._layout[1], dtype=np.intp)
 
     @property
     def columns(self) -> Indices:
-        """The variables of each segment, (S, K + 2); n in place of those that a segment lacks."""
+        """The indices of each segment's local variables, (S, K + 2), padded with n."""
         return self._arranged[0]
 
     @cached_property
     def start(self) -> Array:
-        """The variables of the path that it begins with, (n,)."""
+        """The variables of the path at the start, (n,)."""
         x = np.zeros(self.size)
         for segment, row, direction, column in self._layout[0]:
             order = row % END_ORDER
@@ -162,13 +165,13 @@ class Spline:
         return x
 
     def trajectory(self, x: Array) -> Trajectory:
-        """The path of variables (n,)."""
+        """Return the path that variables (n,) give."""
         data = self.data(x)
         coefficients = TO_COEFFICIENTS @ data.values
         return Trajectory(data.durations, coefficients, self.task.problem.heading.start)
 
     def data(self, x: Array) -> KnotData:
-        """The data of all knots."""
+        """Return the knot data that variables (n,) give."""
         local = self.gathered(x)
         ratios = np.exp(local[:, -2])
         durations = ratios * np.exp(local[:, -1])
@@ -177,7 +180,7 @@ class Spline:
         return KnotData((ratios[:, None] ** ORDERS)[..., None] * moved + fixed, fixed, ratios, durations)
 
     def motion(self, data: KnotData, places: Array) -> Motion:
-        """Derivatives at places, as `KnotData.derivatives` has them, with their slopes."""
+        """Return the derivatives at places, as `KnotData.derivatives` does, with their slopes."""
         segments, scaled = self.segments, data.scaled(places)
         derivatives = (scaled @ data.values).reshape(segments, -1, DERIVATIVES, 3)
         effect = (data.ratios[:, None] ** ORDERS)[..., None, None] * self._arranged[1]
@@ -188,40 +191,43 @@ class Spline:
         return Motion(derivatives, slopes, scaled, data, effect)
 
     def gathered(self, step: Array) -> Array:
-        """Each segment's own part of a step (n,), (S, K + 2)."""
+        """Return each segment's local part (S, K + 2) of a step (n,)."""
         return np.append(step, 0.0)[self.columns]
 
     def scattered(self, parts: Array) -> Array:
-        """The sum (n,) of segments' parts (S, K + 2)."""
+        """Return the sum (n,) of the segments' local vectors (S, K + 2)."""
         total = np.bincount(self.columns.ravel(), parts.ravel(), self.size + 1)
         return np.asarray(total[:-1], dtype=float)
 
     def assembled(self, blocks: Array) -> Array:
-        """The sum (n, n) of segments' blocks (S, K + 2, K + 2)."""
+        """Return the matrix (n, n) that sums the segments' local blocks (S, K + 2, K + 2)."""
         width = self.size + 1
         total = np.bincount(self._entries, blocks.ravel(), width**2)
         return np.asarray(total.reshape(width, width)[:-1, :-1], dtype=float)
 
     @cached_property
     def _entries(self) -> Indices:
-        """Where the blocks' entries are in a matrix (n + 1, n + 1), flat."""
+        """The flat indices of the blocks' entries in a matrix (n + 1, n + 1)."""
         rows = self.columns[:, :, None] * (self.size + 1)
         return np.asarray((rows + self.columns[:, None]).ravel())
 
     @property
     def _shared(self) -> int:
-        """The number of derivatives that both neighbours of a knot share."""
+        """The number of derivatives that the two segments at a knot share, from position on."""
         return END_ORDER if self.task.vehicle.lags.any() else SNAP
 
     @cached_property
     def _sizes(self) -> Array:
-        """What one is of each normalised derivative [m]: what the greatest specific thrust does in h."""
+        """The scale of each normalised derivative Y_k [m], from the largest specific thrust acting over h."""
         length = self.task.vehicle.max_specific_thrust * self.mean_duration**2 / perm(DEGREE, 2)
         return np.array([length * perm(DEGREE, k) for k in range(END_ORDER)])
 
     @cached_property
     def _ends(self) -> Array:
-        """The derivatives of the path that it begins with at both ends of all segments, (S, 10, 3)."""
+        """The derivatives of the path at the start, at both ends of all segments, (S, 10, 3).
+
+        Derivatives that neighbours share are the mean of both sides.
+        """
         ends = np.stack([self.begun.on_segments([0.0, 1.0], k) for k in range(END_ORDER)], axis=2)
         for before, after, shared in self._joints:
             met = (ends[after, 0, :shared] + ends[before, 1, :shared]) / 2.0
@@ -230,14 +236,17 @@ class Spline:
 
     @property
     def _joints(self) -> list[tuple[int, int, int]]:
-        """Segments before and after each inner knot, and how many derivatives they share: all at a seam."""
+        """The segments before and after each inner knot, and the number of derivatives that they share.
+
+        At the seam of a closed course all derivatives are shared.
+        """
         order = range(self.segments)
         inner = [(before, after, self._shared) for before, after in pairwise(order)]
         return [*inner, (order[-1], 0, END_ORDER)] if self.task.stages.closed else inner
 
     @cached_property
     def _fixed_data(self) -> Array:
-        """What the ends fix of the derivatives, in SI units, zero elsewhere, (S, 10, 3)."""
+        """The derivatives that the ends fix, in SI units, zero elsewhere, (S, 10, 3)."""
         fixed = np.zeros((self.segments, 2 * END_ORDER, 3))
         drag = lateral_drag(self.task.vehicle)
         for segment, first, state in self._end_states:
@@ -255,18 +264,18 @@ class Spline:
 
     @property
     def _end_states(self) -> tuple[tuple[int, int, EndState], ...]:
-        """The segment, the row of its position and the state of both ends, if there are any."""
+        """The segment, the row of position in the data, and the state of each end, if there are ends."""
         places = {"start": (0, 0), "goal": (self.segments - 1, END_ORDER)}
         return tuple((*places[name], state) for name, state in self.task.problem.ends.items())
 
     def _thrust_direction(self, state: EndState) -> Array:
-        """Where the thrust points at an end, (3,)."""
+        """Return the direction of the thrust at an end, (3,)."""
         thrust = self.task.balance.specific_thrust(state.velocity, state.acceleration)
         return np.asarray(thrust / np.linalg.norm(thrust))
 
     @cached_property
     def _layout(self) -> tuple[list[tuple[int, int, Array, int]], list[int], int]:
-        """Segment, row, direction and column of all data that variables move; columns of ln τ; of ln h."""
+        """The segment, row, direction and column of all free data; the columns of ln τ; that of ln h."""
         moved: list[tuple[int, int, Array, int]] = []
         ratios: list[int] = []
         count = 0
@@ -296,7 +305,7 @@ class Spline:
     def _end_variables(
         self, segment: int, first: int, state: EndState
     ) -> list[tuple[Array, tuple[int, int]]]:
-        """The directions in which an end's data are free, each with its segment and row."""
+        """Return the directions in which an end's data are free, each with its segment and row."""
         orders = range(END_ORDER if state.leaves_attitude_free else JERK)
         free: list[tuple[Array, tuple[int, int]]] = [
             (axis, (segment, first + order))
@@ -317,7 +326,7 @@ class Spline:
 
     @cached_property
     def _arranged(self) -> tuple[Indices, Array]:
-        """`columns`, and the effect of each segment's variables on its data, (S, 10, 3, K)."""
+        """`columns`, and the slopes of each segment's data by its local variables, (S, 10, 3, K)."""
         moved, ratios, mean = self._layout
         local: list[dict[int, int]] = [{} for _ in range(self.segments)]
         for segment, _, _, column in moved:

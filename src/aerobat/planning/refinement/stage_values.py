@@ -1,4 +1,4 @@
-"""Constraints of stages at their knots and on the body's room in crossed gates, with two derivatives."""
+"""Constraints of stages at their knots, and on the body's room in crossed gates, with two derivatives."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ from aerobat.planning.task import Task
 from aerobat.problem.ball import Ball
 from aerobat.problem.stage import Stage
 
-KNOWN = 3  # derivatives that stages ask of: position, velocity, acceleration
-STATE = 3 * KNOWN  # their components
+KNOWN = 3  # number of derivatives that stages constrain: position, velocity, acceleration
+STATE = 3 * KNOWN  # number of their components
 DIRECTIONS = np.eye(STATE)
-BALL_SHARE = 1.0 - 1e-5  # of a ball's squared radius: rounding has the rest
+BALL_SHARE = 1.0 - 1e-5  # fraction of a ball's squared radius that is used; the rest allows for rounding
 
 
 @dataclass(frozen=True, eq=False)
 class StageValues:
-    """Inequalities ≤ 0 and equalities = 0 on derivatives at stages, (stages, 6, 3), as fractions of sizes.
+    """Constraints of stages on the derivatives there, (stages, 6, 3), as fractions of their sizes.
 
-    Inequalities are those of conditions, then of balls, then of room in gates.
+    Inequalities ≤ 0 are those of conditions, then of balls, then of room in gates. Equalities = 0 are those
+    of conditions.
     """
 
     stages: tuple[Stage, ...]
@@ -39,7 +40,7 @@ class StageValues:
     in_gates: tuple[BodyInGate, ...] = ()
 
     def inequalities(self, derivatives: Array) -> Array:
-        """The values, (q,)."""
+        """Return the values of the inequalities, (q,)."""
         linear = self._unequal.values(derivatives)
         balls = [float(offset @ offset) - BALL_SHARE for _, offset, _ in self._in_balls(derivatives)]
         rooms = [
@@ -50,16 +51,16 @@ class StageValues:
 
     @property
     def inequality_count(self) -> int:
-        """q."""
+        """The number q of inequalities."""
         rooms = sum(len(room.scale) for room in self._rooms)
         return len(self._unequal.bounds) + len(self._balls) + rooms
 
     def equalities(self, derivatives: Array) -> Array:
-        """The values, (p,)."""
+        """Return the values of the equalities, (p,)."""
         return self._equal.values(derivatives)
 
     def inequality_slopes(self, derivatives: Array) -> tuple[Indices, Array]:
-        """The stages of inequalities, (q,), and their slopes by the derivatives there, (q, 6, 3)."""
+        """Return each inequality's stage, (q,), and its slopes by the derivatives there, (q, 6, 3)."""
         at, weights, _ = self._unequal
         if not (self._balls or self._rooms):
             return at, weights
@@ -77,13 +78,13 @@ class StageValues:
         return np.array(stages, dtype=np.intp), np.array(slopes).reshape(-1, 6, 3)
 
     def equality_slopes(self) -> tuple[Indices, Array]:
-        """The stages of equalities, (p,), and their slopes by the derivatives there, (p, 6, 3)."""
+        """Return each equality's stage, (p,), and its slopes by the derivatives there, (p, 6, 3)."""
         return self._equal.at, self._equal.weights
 
     def second_derivatives(self, derivatives: Array, weights: Array) -> Array:
-        """Return the second derivatives of the weighted inequalities, (stages, 9, 9).
+        """Return the Hessian of the weighted inequalities, (stages, 9, 9).
 
-        The derivatives are by position, velocity and acceleration at stages.
+        The variables are position, velocity and acceleration at each stage.
         """
         found = np.zeros((len(self.stages), STATE, STATE))
         first = len(self._unequal.bounds)
@@ -97,7 +98,7 @@ class StageValues:
         return found
 
     def _in_balls(self, derivatives: Array) -> Iterator[tuple[int, Array, float]]:
-        """Stages with a ball, the place in it over its radius, and that [m]."""
+        """Yield each stage with a ball, its offset from the centre over the radius, and the radius [m]."""
         for stage, ball in self._balls:
             yield stage, (derivatives[stage, 0] - ball.centre) / ball.radius, ball.radius
 
@@ -114,7 +115,7 @@ class StageValues:
         return self._conditions(equal=True)
 
     def _conditions(self, equal: bool) -> _Linear:
-        """Those conditions of stages that are equalities, or those that are not."""
+        """Return the conditions of stages that are equalities, or the inequalities."""
         rows = [
             (k, *row)
             for k, stage in enumerate(self.stages)
@@ -130,7 +131,7 @@ class StageValues:
 
     @cached_property
     def _rooms(self) -> tuple[_Room, ...]:
-        """Each body in a gate, with the functions of its room."""
+        """The room of the body in each gate, as compiled functions."""
         balance, revolved = self.task.balance, self.task.vehicle.bounding_ellipsoid.revolved
         return tuple(
             _Room(
@@ -144,34 +145,34 @@ class StageValues:
 
 
 class _Linear(NamedTuple):
-    """Conditions as weights · derivatives ≤ bounds, or = bounds."""
+    """Linear conditions: weights · derivatives ≤ bounds, or = bounds."""
 
     at: Indices  # the stage of each, (q,)
     weights: Array  # (q, 6, 3)
     bounds: Array  # (q,)
 
     def values(self, derivatives: Array) -> Array:
-        """The excess over bounds of derivatives at stages (stages, 6, 3), (q,)."""
+        """Return the excess (q,) over the bounds, of derivatives at stages (stages, 6, 3)."""
         return np.asarray(np.einsum("qka,qka->q", self.weights, derivatives[self.at]) - self.bounds)
 
 
 class _Room(NamedTuple):
-    """The room of a body in a gate."""
+    """The room of the body in a gate."""
 
     stage: int
     functions: SmoothFunctions
-    shared: Array  # body, balance and opening, as the functions take them
-    scale: Array  # of the values, (2 K + 1,)
+    shared: Array  # parameters of body, balance and opening, in the functions' order
+    scale: Array  # factors on the values, (2 K + 1,)
 
     def given(self, derivatives: Array, *more: Array) -> tuple[Array, Array]:
-        """Inputs of the functions: what is shared, and the state at the stage, then more."""
+        """Return the functions' inputs: the shared parameters; the state at the stage, then `more`."""
         state = derivatives[self.stage, :KNOWN].ravel()
         return self.shared, np.concatenate([state, *more])[None]
 
 
 @lru_cache(maxsize=8)
 def room_functions(sides: int) -> SmoothFunctions:
-    """The room in an opening of so many sides, as the state of its stage moves."""
+    """Compile the room in an opening with `sides` sides, as functions of the state at its stage."""
 
     def kernel(
         ops: Ops, shared: Sequence[Scalar], state: Sequence[Scalar], _: Sequence[Scalar]
@@ -185,7 +186,7 @@ def room_functions(sides: int) -> SmoothFunctions:
 
 
 def _sides(limit: Limit, is_equality: bool) -> Iterator[tuple[Array, float]]:
-    """Yield a limit's sides as weights (6, 3) and the bound that they keep below; of an equality one."""
+    """Yield a limit's finite ends as weights (6, 3) and upper bound; of an equality only one."""
     for sign, end in zip((-1.0, 1.0), limit.ends, strict=True):
         if isfinite(end):
             yield sign / limit.size * limit.quantity.path, sign * end
@@ -194,6 +195,6 @@ def _sides(limit: Limit, is_equality: bool) -> Iterator[tuple[Array, float]]:
 
 
 def _room_scale(body: BodyInGate) -> Array:
-    """Factors that make what is missing of values of a room, as fractions of a size, (2 K + 1,)."""
+    """Return factors that turn room into scaled violations ≤ 0, (2 K + 1,)."""
     count = 2 * len(body.gate.opening.sides[1])
     return -1.0 / np.array([body.gate.opening.inradius * body.min_speed] * count + [body.min_speed])
