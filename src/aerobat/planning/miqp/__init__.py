@@ -1,1 +1,1 @@
-"""The paper's Section II: a mixed-integer QP over an integrator, stages put in intervals, a search on dt."""
+"""The paper's Section II: a mixed-integer QP over an integrator chain, which assigns stages to intervals."""

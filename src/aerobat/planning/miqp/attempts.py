@@ -1,4 +1,4 @@
-"""One program at one dt: attempts that are certified as they are, and paths that refinement begins from."""
+"""Attempts at one program and one dt: paths that are certified directly, and paths for the refinement."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from aerobat.problem.problem import Problem
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-COURSE_SCAN_NODES = 50  # of one along a scan, for which no bound is said
-COURSE_NODES = 5000  # of a search of a whole course: for its bound, windows place its stages better
-MOMENT_ORDER = 4  # the lowest order whose body rates do not jump; one more for thrusts that do not
+COURSE_SCAN_NODES = 50  # node limit of a course's program along a scan, where no bound is needed
+COURSE_NODES = 5000  # node limit of a course's program otherwise: gives the bound, windows place the stages
+MOMENT_ORDER = 4  # the lowest order without jumps of body rates; thrusts do not jump from 5 on
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,23 +35,23 @@ class Placement:
     dt: float  # [s]
 
     def times(self, trajectory: Trajectory) -> list[float]:
-        """The times [s] at which its path passes the stages."""
+        """Return the times [s] at which the answer's path passes the stages."""
         return [float(trajectory.knots[slot + 1]) for slot in self.answer.slots or ()]
 
 
 @dataclass
 class Attempts:
-    """All that attempts at one problem share."""
+    """The data that attempts at one problem share."""
 
     formulation: Formulation
     solver: Solver
     recorder: Recorder
-    slots: tuple[int, ...] | None = None  # of the last solution: where the next solve begins
+    slots: tuple[int, ...] | None = None  # slots of the last solution, the next solve's warm start
 
     def solve(self, dt: float, node_limit: int | None = None) -> Placement:
-        """The answer of the paper's program at one dt, exact where neither time nor nodes are limited.
+        """Return the answer of the paper's program at one dt, exact without limits on time and nodes.
 
-        Courses of more gates than are searched at once have their stages placed in windows that move along.
+        Long courses are not solved exactly: their stages are placed in moving windows.
         """
         program = self.formulation.program(dt)
         if not is_placed_in_windows(self.formulation.sequence):
@@ -70,12 +70,12 @@ class Attempts:
 
     @property
     def is_over(self) -> bool:
-        """True where no time is left for another; the first is made in any case."""
+        """True where no time is left for another attempt; the first one is made in any case."""
         return bool(self.recorder.attempts) and out_of_time()
 
     @property
     def jumps(self) -> bool:
-        """True if the order makes what no moment, or no rotor with lag, can do; its certificate says so."""
+        """True if paths of this order have jumps of body rates, or of thrusts of rotors with lag."""
         return self.formulation.chain.order < flyable_order(self.task.vehicle_if_any)
 
     def judge(
@@ -85,8 +85,8 @@ class Attempts:
 
         Args:
             placement: The answer.
-            failure: Why the vehicle cannot follow it, where that is known without a certificate.
-            excess: By how much, as a fraction of a constraint's range, negative.
+            failure: Why the vehicle cannot fly the path, where that is known without a certificate.
+            excess: The constraint violation, as a fraction of a constraint's range, negative.
         """
         vehicle = self.task.vehicle_if_any
         span = 0.0 if vehicle is None else float(vehicle.thrust_ranges.max())
@@ -107,14 +107,14 @@ class Attempts:
         return judge(solution, self.task, self.recorder, self.jumps)
 
     def certified(self, dt: float) -> Judged[Placement] | None:
-        """The certified answer at one dt; None where it is not certified, or no time is left."""
+        """Return the answer at one dt if it is certified; None otherwise, or where no time is left."""
         if self.is_over:
             return None
         judged = self.judge(self.solve(dt))
         return judged if judged.feasible else None
 
     def trajectory(self, placement: Placement) -> Trajectory:
-        """The path of an answer."""
+        """Return the path of an answer."""
         formulation, answer, dt = self.formulation, placement.answer, placement.dt
         assert answer.x is not None
         return Trajectory.from_inputs(
@@ -122,12 +122,12 @@ class Attempts:
         )
 
     def path(self, placement: Placement) -> WarmStart:
-        """The path of an answer, with the stages in their order."""
+        """Return the path of an answer as a warm start, with the stages in the order of their times."""
         trajectory = self.trajectory(placement)
         return WarmStart.through(trajectory, self.task.stages.stages, placement.times(trajectory))
 
     def plan(self, judged: Judged[Placement], backend: str) -> Plan:
-        """The plan of a program's own answer, with the bound on its cost."""
+        """Return the plan of a program's own path, with the bound on its cost."""
         placement, trajectory = judged.solution.source, judged.solution.trajectory
         assert trajectory is not None
         answer, times = placement.answer, placement.times(trajectory)
@@ -150,11 +150,11 @@ def _why_unsolved(answer: AssignmentResult) -> str:
 
 
 def flyable_order(vehicle: Vehicle | None) -> int:
-    """The lowest order whose paths jump in nothing that a vehicle cannot make jump."""
+    """Return the lowest order whose paths have no jumps that a vehicle cannot follow."""
     return MOMENT_ORDER + (vehicle is not None and bool(vehicle.lags.any()))
 
 
 def default_order(problem: Problem, vehicle: Vehicle | None) -> int:
-    """The lowest order that is flyable, and whose input the problem's limits bound or leave alone."""
+    """Return the lowest order that is flyable and not below any derivative that the problem limits."""
     limited = [k for k in INPUT_NAMES if np.isfinite(problem.limits.of(k)[1]).any()]
     return max([flyable_order(vehicle), *limited])

@@ -1,4 +1,4 @@
-"""Why nothing feasible was found: which bound binds, by a few relaxed programs in a second at most."""
+"""Diagnosis of an infeasible problem: a few relaxed programs show the bound that binds, within a second."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from aerobat.problem.stage import Stage
 OUT_OF_TIME = "no solution was found in time"
 NOT_CONVERGED = "the solver did not converge"
 GROUND = "environment.ground"
-MORE_INTERVALS = (1.3, 1.8, 2.5)  # times as many as there are that are tried, or as there are stages
-DIAGNOSIS_TIME = 1.0  # [s] of the processor, for all relaxed problems together
-PROBES = 4  # durations at which a relaxed problem is tried
+MORE_INTERVALS = (1.3, 1.8, 2.5)  # factors tried on the number of intervals, or of stages if larger
+DIAGNOSIS_TIME = 1.0  # processor time [s] of all relaxed programs
+PROBES = 4  # number of dt at which a relaxed problem is tried
 
 
 def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt]) -> str:
-    """One sentence: the vehicle, when some program had a solution, otherwise the bounds that exclude all."""
+    """Return a sentence: the vehicle's limit if some program had a solution, else the bounds that bind."""
     tried = [a.duration / formulation.chain.intervals for a in attempts]
     said = f"'{formulation.problem.name}' has no plan at any dt from {min(tried):.3g} to {max(tried):.3g} s"
     solved = [a for a in attempts if a.cost is not None]
@@ -58,10 +58,10 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt]) -> str
 
 
 def leg_without_room(formulation: Formulation, dt: float) -> str | None:
-    """One sentence: the first leg of a course that has no path, and how many intervals free it.
+    """Return a sentence on the first leg of a course that has no path, and how many intervals remedy that.
 
-    Its stages are spread evenly, as where windows begin. None where all legs have a path, where no number of
-    intervals that is tried gives them one, and of sequences that are searched whole.
+    The stages are spread evenly, as at the start of a search in windows. Return None where all legs have a
+    path, where none of the tried numbers of intervals helps, and for sequences that are searched as a whole.
     """
     if not is_placed_in_windows(formulation.sequence):
         return None
@@ -82,7 +82,7 @@ def leg_without_room(formulation: Formulation, dt: float) -> str | None:
 
 
 def _placed_when_spread(formulation: Formulation, dt: float) -> int | None:
-    """How many stages, from the first on, have a path through slots spread evenly; None without slots."""
+    """Return the number of leading stages that have a path with evenly spread slots; None without slots."""
     program = formulation.program(dt)
     slots = evenly_spread(program)
     if slots is None:
@@ -96,13 +96,13 @@ def _placed_when_spread(formulation: Formulation, dt: float) -> int | None:
 
 
 def _stage_name(stages: Sequence[Stage], number: int) -> str:
-    """A stage's name, with its lap where there are several."""
+    """Return a stage's name, with its lap where there are several."""
     stage = stages[number]
     return f"'{stage.name}'" + (f" of lap {stage.lap}" if stages[-1].lap > 1 else "")
 
 
 def _binding(formulation: Formulation, dts: Sequence[float]) -> Iterator[tuple[str, str]]:
-    """Each bound whose removal, alone, makes some duration feasible, in words and by its field."""
+    """Yield each bound whose removal alone makes some dt feasible, in words and by its field."""
     probes = np.unique(np.quantile(dts, np.linspace(0.0, 1.0, PROBES), method="nearest"))
     for name, field, relaxed in _relaxations(formulation):
         search = solver("builtin")
@@ -111,7 +111,7 @@ def _binding(formulation: Formulation, dts: Sequence[float]) -> Iterator[tuple[s
 
 
 def _relaxations(formulation: Formulation) -> Iterator[tuple[str, str, Formulation]]:
-    """Yield each bound in words, by its field, and the problem without it."""
+    """Yield each bound in words, its field, and the formulation without the bound."""
     task = formulation.task
     problem, sequence = task.problem, task.stages
 
@@ -122,7 +122,7 @@ def _relaxations(formulation: Formulation) -> Iterator[tuple[str, str, Formulati
         if np.isfinite(np.concatenate(problem.path_limits.of(derivative))).any():
             name, field = field_with_value(derivative, problem.path_limits), FIELDS[derivative]
             unlimited = replace(problem, limits=problem.limits.without(derivative))
-            if derivative == 0:  # the ground is one of them
+            if derivative == 0:  # the ground is a bound on position, too
                 unlimited = replace(unlimited, environment=replace(problem.environment, ground=None))
                 is_bounded = np.isfinite(np.concatenate(problem.limits.of(0))).any()
                 name, field = (f"the volume between {name}", field) if is_bounded else (GROUND, GROUND)

@@ -1,8 +1,9 @@
-"""Problem → program: the paper's (1) as a convex QP over the inputs, plus stages assigned to intervals.
+"""From a problem to its program: the paper's (1) as a convex QP over the inputs, with stages in intervals.
 
-The variables are the normalised inputs of the integrator chain, axis by axis: x = (w_x, w_y, w_z), 3N of them
-with w = dt^r u. The matrices do not depend on dt; only the bounds do. Where a vehicle has drag, conditions on
-its specific thrust weigh velocity and acceleration together, which dt weighs differently: then the rows do.
+The 3N variables are the normalised inputs of the integrator chain, axis by axis: x = (w_x, w_y, w_z) with
+w = dt^r u. The matrices do not depend on dt; only the bounds do. The exception are vehicles with drag, whose
+conditions on specific thrust combine velocity and acceleration. These scale with different powers of dt, so
+that the rows depend on dt.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ from aerobat.problem.stage import Stage, StageSequence
 
 @dataclass(frozen=True)
 class Row:
-    """direction · (derivative of position at the end of an interval), or the input over it.
+    """A scalar row: direction · (derivative of position at an interval's end, or input over the interval).
 
-    `drag` times the derivative below it is added.
+    `drag` times the next lower derivative is added to the derivative.
     """
 
     interval: int
@@ -44,8 +45,8 @@ class Row:
 class Formulation:
     """A problem on N intervals of a chain of integrators, for any dt.
 
-    As in the authors' reference code, bounds on the state and the stages hold at the ends of intervals
-    0..N−2, bounds on the input on all N; the goal is met at the end of the last.
+    As in the authors' reference code, bounds on the state hold at the ends of intervals 0..N−2, and stages
+    are placed there. Bounds on the input hold on all N intervals. The goal is met at the end of the last.
 
     Raises SpecError when there are fewer interval ends than stages, or a limit on a derivative above the
     input.
@@ -55,7 +56,7 @@ class Formulation:
     chain: IntegratorChain
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check that there are enough intervals, and that the input's order can hold all limits."""
         ends, stages = self.chain.intervals - 1, len(self.sequence.stages)
         nowhere = [s for s in self.sequence.stages if not self._slots(s)]
         if nowhere and ends >= max(stages, 1):
@@ -83,11 +84,11 @@ class Formulation:
 
     @cached_property
     def sequence(self) -> StageSequence:
-        """The task's stages, all that they ask linear: a polytope in each ball."""
+        """The task's stages with linear conditions only: each ball is replaced by a polytope inside it."""
         return self.task.stages.linear
 
     def program(self, dt: float) -> AssignmentProgram:
-        """The program at one dt [s]; without drag its matrices are the same arrays for all dt."""
+        """Return the program at one dt [s]; without drag its matrices are the same arrays for all dt."""
         scale, free = dt**self._derivatives, self._free(dt)
         lower, upper = self._limits
         goal = self.problem.goal.derivatives(self.chain.order) * self.chain.scales(dt)[:, None]
@@ -104,11 +105,11 @@ class Formulation:
         )
 
     def inputs(self, x: Array, dt: float) -> Array:
-        """The inputs in SI units, (N, 3), of a program's solution."""
+        """Return the inputs in SI units, (N, 3), of a program's solution."""
         return x.reshape(3, -1).T / dt**self.chain.order
 
     def cost(self, program_cost: float, dt: float) -> float:
-        """The paper's Σ|u|² in SI units of a program's cost."""
+        """Return the paper's cost Σ|u|² in SI units from a program's cost."""
         return program_cost / dt ** (2 * self.chain.order)
 
     @cached_property
@@ -118,17 +119,17 @@ class Formulation:
 
     @cached_property
     def _equality(self) -> Array:
-        """The goal: the derivatives below the order that it fixes at the end of the last interval."""
+        """The equality rows: derivatives below the order that the goal fixes at the last interval's end."""
         return frozen(np.kron(np.eye(3), self.chain.forced[-1][self._met]), "equality")
 
     @property
     def _met(self) -> Array:
-        """The derivatives below the order that the goal fixes."""
+        """The mask of the derivatives below the order that the goal fixes."""
         return self.problem.goal.fixed(self.chain.order)
 
     @cached_property
     def _rows(self) -> dict[Row, tuple[float, float]]:
-        """Every row that limits or stages speak of, with the limits in SI units."""
+        """All rows that limits or stages use, with the lower and upper limit in SI units."""
         rows: dict[Row, tuple[float, float]] = {}
         for row, lower, upper in self._limit_rows():
             low, high = rows.get(row, (-inf, inf))
@@ -140,7 +141,7 @@ class Formulation:
         return rows
 
     def _limit_rows(self) -> Iterable[tuple[Row, float, float]]:
-        """What holds all along, as far as it is linear; the vehicle's limits are left to the refinement."""
+        """Yield the rows of linear limits along the path; the vehicle's limits are left to the refinement."""
         for limit in self.task.limits:
             for linear in limit.linear:
                 *_, derivative = linear.quantity.derivatives
@@ -173,11 +174,11 @@ class Formulation:
 
     @cached_property
     def _matrix(self) -> Array:
-        """All rows over the inputs without drag, (m, 3N)."""
+        """The matrix of all rows by the inputs, without drag, (m, 3N)."""
         return self._assembled(self._response[self._places])
 
     def _rows_at(self, dt: float) -> Array:
-        """All rows over the inputs at one dt, (m, 3N)."""
+        """Return the matrix of all rows by the inputs at one dt, with drag, (m, 3N)."""
         intervals, derivatives = self._places
         below = self._response[intervals, np.maximum(derivatives - 1, 0)]
         return self._assembled(self._response[self._places] + (dt * self._drags)[:, None] * below)
@@ -188,7 +189,7 @@ class Formulation:
 
     @cached_property
     def _response(self) -> Array:
-        """Effect of the inputs on the derivatives at interval ends and on themselves, (N, r + 1, N)."""
+        """The effect of the inputs on the derivatives at interval ends, and on the inputs, (N, r + 1, N)."""
         return np.concatenate([self.chain.forced, np.eye(self.chain.intervals)[:, None]], axis=1)
 
     @cached_property
@@ -198,7 +199,7 @@ class Formulation:
         return intervals, self._derivatives.astype(np.intp)
 
     def _free(self, dt: float) -> Array:
-        """Value of each row without input, normalised, (m,)."""
+        """Return the normalised value of each row for zero input, (m,)."""
         free = np.concatenate(
             [self.chain.free(self.initial, dt), np.zeros((self.chain.intervals, 1, 3))], axis=1
         )
@@ -214,12 +215,12 @@ class Formulation:
         return Row(interval, condition.quantity.derivative, (x, y, z), drag)
 
     def _slots(self, stage: Stage) -> range:
-        """The intervals at whose ends a stage may hold; none when it is fixed outside them."""
+        """Return the intervals at whose ends a stage may hold; none when its window contains no such end."""
         return stage.slots(self.chain.intervals)
 
     @cached_property
     def _stage_rows(self) -> tuple[Indices, ...]:
-        """For each stage the rows of its conditions, (slots, conditions)."""
+        """The indices of the rows of each stage's conditions, (slots, conditions)."""
         index = {row: i for i, row in enumerate(self._rows)}
         tables = (
             [[index[self._row(c, n)] for c in stage.conditions] for n in self._slots(stage)]
@@ -229,7 +230,7 @@ class Formulation:
 
     @cached_property
     def _stage_bounds(self) -> tuple[Array, ...]:
-        """For each stage the bounds of its conditions in SI units, (conditions, 2)."""
+        """The bounds of each stage's conditions in SI units, (conditions, 2)."""
         bounds = ([c.bound(self.task.balance) for c in stage.conditions] for stage in self.sequence.stages)
         return tuple(np.array([b.limits for b in stage]).reshape(-1, 2) for stage in bounds)
 

@@ -43,11 +43,12 @@ INTERVALS = 20  # the paper's
 class Miqp(Planner):
     """The paper's mixed-integer program (Section II), refined within what a vehicle can do.
 
-    Without a vehicle, dt is the first feasible of the paper's grid, or what `search` finds. With one,
-    programs along a scan on dt say where stages lie; from there polynomials between knots become as fast as
-    rotors, their commands, body rate, limits and conditions allow. With a vehicle and a `search` nothing is
-    refined: the plan is the program's own path, at the search's first dt that the vehicle can fly. What is
-    returned is certified, but for orders whose jumps no rotor can make, as the certificate then says.
+    Without a vehicle, dt is the first feasible value of the paper's grid, or the one that `search` finds.
+    With a vehicle, the programs of several dt place the stages. Then piecewise polynomials from their paths
+    are refined until they are as fast as rotors, rotor commands, body rate, limits and conditions allow. With
+    a vehicle and a `search` nothing is refined: the plan is the program's own path, at the first dt of the
+    search that the vehicle can fly. Plans for a vehicle are certified. The exception are orders whose jumps
+    no rotor can make; the certificate then names the jumps.
     """
 
     order: Order | None = option(
@@ -75,18 +76,18 @@ class Miqp(Planner):
     rescue: bool = option(
         True, "Give up where nothing is found, and try no other intervals, order or planner.", off="no-rescue"
     )
-    segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = SEGMENTS  # of a refined path, but of a course's
-    # whether it flies what it finds, mends what that flight lacks, and looks for what is faster with more
-    # segments; not where others begin from there
+    segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = SEGMENTS  # of a refined path; courses have more
+    # whether paths are flown in simulation and repaired by it, and refined with more segments where that is
+    # faster; False where other planners only start from the path
     flies: bool = True
 
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
     ) -> Plan:
-        """The shortest plan found.
+        """Return the shortest plan found; with a vehicle, the plan is certified.
 
-        With a vehicle, it is certified. Raises Infeasible, naming the bound that binds, SpecError for input
-        that makes no sense, and BackendMissing when the solver is not installed.
+        Raises Infeasible, naming the bound that binds, SpecError for invalid input, and BackendMissing when
+        the solver is not installed.
         """
         recorder = Recorder(progress)
         with within_time(self.time_limit):
@@ -106,7 +107,7 @@ class Miqp(Planner):
                 raise Infeasible(why, infeasible.attempts) from None
 
     def intervals_for(self, stages: StageSequence) -> int:
-        """Return N for these stages."""
+        """Return the number N of intervals for these stages."""
         return stages.intervals_from(INTERVALS) if self.intervals is None else self.intervals
 
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
@@ -131,12 +132,12 @@ class Miqp(Planner):
         return attempts.plan(found, self.backend)
 
     def _refined(self, attempts: Attempts, scanned: tuple[float, float], least: float) -> Plan:
-        """The plan of the shortest path from programs along a scan on dt.
+        """Return the plan of the shortest path that is refined from programs along a scan on dt.
 
         Args:
-            attempts: Made here.
+            attempts: Solves and records the programs.
             scanned: The scan's smallest and largest dt [s].
-            least: The duration [s] that no motion falls short of.
+            least: A lower bound on the duration of any motion [s].
         """
         task, recorder = attempts.task, attempts.recorder
         whole = replace(Refinement.of(task, recorder), grows=self.flies)
@@ -162,7 +163,7 @@ class Miqp(Planner):
         )
 
     def _nothing_found(self, attempts: Attempts) -> Infeasible:
-        """The refusal: too little time, or the bound that binds."""
+        """Return the error: too little time, or the bound that binds."""
         made = tuple(attempts.recorder.attempts)
         if out_of_time():
             quicker = "take the backend builtin, which is quicker"
@@ -173,14 +174,14 @@ class Miqp(Planner):
 
 
 def formulate(task: Task, order: int, intervals: int) -> Formulation:
-    """A task's program for any dt.
+    """Return a task's program for any dt.
 
     Raises Infeasible when a stage asks more thrust than the vehicle has.
 
     Args:
-        task: What is planned.
-        order: Of the derivative of position that is the input.
-        intervals: Their number, N.
+        task: The task that is planned.
+        order: The derivative of position that is the input.
+        intervals: The number N of intervals.
     """
     if task.vehicle_if_any is not None:
         _check_thrust(task.stages, task.vehicle)
@@ -189,7 +190,7 @@ def formulate(task: Task, order: int, intervals: int) -> Formulation:
 
 
 def _check_stages(task: Task) -> None:
-    """Refuse a stage whose own conditions exclude each other, at whatever time."""
+    """Raise Infeasible for a stage whose conditions exclude each other at any time."""
     for stage in task.stages.linear.stages:
         bounds = [condition.bound(task.balance) for condition in stage.conditions]
         if bounds and not is_possible(bounds, Limits()):
@@ -201,7 +202,7 @@ def _check_stages(task: Task) -> None:
 
 
 def _check_thrust(sequence: StageSequence, vehicle: Vehicle) -> None:
-    """Refuse at once what no duration can mend."""
+    """Raise Infeasible for a stage that asks more thrust than the vehicle has, which no duration changes."""
     for stage in sequence.stages:
         for condition in stage.conditions:
             thrust = condition.min_thrust
@@ -215,7 +216,10 @@ def _check_thrust(sequence: StageSequence, vehicle: Vehicle) -> None:
 
 
 def duration_lower_bound(problem: Problem, vehicle: Vehicle) -> float:
-    """Half the time that full thrust would take straight through the gates [s]: where the search starts."""
+    """Return the duration [s] at which the search starts: half the time from rest to rest at full thrust.
+
+    The distance is that of straight lines through the gates.
+    """
     gates = [gate.position for gate in problem.gates]
     points = [problem.start.position, *gates, problem.goal.position]
     distance = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -1,6 +1,6 @@
-"""Other ways to a plan where the intervals and the order asked for find none, or a poor one.
+"""Fallbacks of miqp: other settings and planners where the requested ones find no plan, or a poor one.
 
-A problem is not refused before other settings and planners are asked, within RESCUE_TIME.
+A problem is not refused before the fallbacks are tried, within RESCUE_TIME.
 """
 
 from __future__ import annotations
@@ -23,36 +23,36 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
-MORE_INTERVALS = (1.3, 2.0)  # times as many
-A_STAGE = 2  # intervals at least: fewer leave the path of a course no choice
-MANY_INTERVALS = 40  # where that is more still: a narrow window at an end needs intervals on either side
-# [s] of the processor for all other ways together, so that refusals take 5 s (benchmarks/audit.py)
-RESCUE_TIME = 4.0
-# [s] of the processor where there most likely is a plan, for a path was found that nearly holds
+MORE_INTERVALS = (1.3, 2.0)  # factors on the requested number of intervals
+A_STAGE = 2  # least intervals a stage: with fewer, the path of a course has no freedom
+MANY_INTERVALS = 40  # tried too if larger: a narrow window near an end needs intervals on both its sides
+RESCUE_TIME = 4.0  # processor time [s] of all fallbacks, so that refusals take 5 s (benchmarks/audit.py)
+# processor time [s] where a plan most likely exists, as a path with small constraint violations was found
 PROMISING_TIME = 15.0
-ONE_WAY = 0.75  # of the time that is left, for one way, so that the next has some
-# times the duration of a path that nearly held: of 300 random problems' plans those far from the best
+ONE_WAY = 0.75  # fraction of the remaining time for one fallback, so that the next has some
+# factor on the duration of a nearly feasible path above which a plan is poor: of 300 random problems, such
+# plans are those far from the best
 POOR = 1.1
-FREE_KNOTS = "free-knots"  # the planner that begins at other paths too, quickly
-MOTION = "time-optimal"  # the planner that begins at the most paths
-MOTIONS = 2  # that time-optimal starts from: further ones make motions faster, but seldom find the first,
-ALL_MOTIONS = 8  # which is worth its time only where there most likely is one
+FREE_KNOTS = "free-knots"  # a quick planner that starts from other paths too
+MOTION = "time-optimal"  # the planner that starts from the most paths
+MOTIONS = 2  # starts of time-optimal: more starts give faster plans, but seldom the first plan
+ALL_MOTIONS = 8  # starts where a plan most likely exists
 
 
 @dataclass
 class Rescue:
-    """The search for a plan by other ways than one that found none."""
+    """The search for a plan by fallbacks, after a requested planner found none or a poor one."""
 
-    asked: Any  # a Miqp, whose own module asks this one
+    asked: Any  # the requested planner, a Miqp (not imported: its module imports this one)
     problem: Problem
     vehicle: Vehicle
-    recorder: Recorder  # whose attempts come first; those that follow are passed on to its `progress`
-    failed: list[str] = field(default_factory=list)  # ways that find none
-    unanswered: list[str] = field(default_factory=list)  # ways for which there was too little time
-    is_promising: bool = False  # whether a path was found that nearly holds, and no time was left for more
+    recorder: Recorder  # of the requested planner; attempts of fallbacks are passed on to its `progress`
+    failed: list[str] = field(default_factory=list)  # fallbacks that found no plan
+    unanswered: list[str] = field(default_factory=list)  # fallbacks that had too little time
+    is_promising: bool = False  # whether time-optimal failed, but found a path that is nearly feasible
 
     def plan(self) -> Plan | None:
-        """The first certified plan that another way finds, which says so; None where all fail."""
+        """Return the first certified plan of the fallbacks, or None; its `rescue` names the fallback."""
         with within_time(RESCUE_TIME, processor):
             found = self._first(self._ways(), self._none_found)
         if found is None and self.is_promising:
@@ -69,7 +69,7 @@ class Rescue:
 
     @property
     def _intervals(self) -> int:
-        """The number of intervals of the plan that was sought."""
+        """The number of intervals of the requested planner."""
         return int(self.asked.intervals_for(self._stages))
 
     @property
@@ -77,13 +77,13 @@ class Rescue:
         return self.problem.stages(self.vehicle.max_specific_thrust)
 
     def shortened(self, plan: Plan) -> Plan:
-        """The plan, or where it is poor a better one by another way, which says so.
+        """Return the plan, or where it is poor a faster plan by a fallback, which its `rescue` names.
 
-        It is poor where it is not certified, a program's own answer, far from all that is asked, or turns
-        over more often than that. It is so where paths that nearly held are faster, and where stages have
-        windows and it is suspiciously long.
+        A plan is poor if it is not certified, is a program's own path, goes astray, or turns over more often
+        than its stages ask. A plan is also poor if a nearly feasible path is much faster, or if stages have
+        windows and the plan is suspiciously long.
         """
-        # programs have a dt; of paths those that nearly hold have a cost
+        # attempts of programs have a dt; attempts at paths have a cost if the path is nearly feasible
         paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
         fastest = min((path.duration for path in paths), default=inf)
         is_fast = plan.certified and plan.bound is None and plan.duration <= POOR * fastest
@@ -98,14 +98,14 @@ class Rescue:
             return self._first(chain([(others, f"by {FREE_KNOTS}")], more), said, longest) or plan
 
     def _looks_poor(self, plan: Plan) -> bool:
-        """True of a plan that goes astray, turns over too often, or is suspiciously long through windows."""
+        """Return whether a plan goes astray, turns over too often, or is suspiciously long with windows."""
         found, is_timed = plan.assessment, any(stage.at != "free" for stage in self._stages.stages)
         if found is None:
             return False
         return found.goes_astray or found.extra_turns > 0 or (is_timed and found.suspicious)
 
     def __str__(self) -> str:
-        """The ways that were tried in vain, in a part of a sentence."""
+        """The fallbacks that found no plan, as a part of a sentence."""
         said = ["not proven"]
         if self.failed:
             said.append(f"but none was found {', '.join(self.failed)}")
@@ -120,12 +120,12 @@ class Rescue:
         failed: str,
         shorter_than: float = inf,
     ) -> Plan | None:
-        """The first certified plan of several ways, which says what failed; None where none is short enough.
+        """Return the first certified plan of several planners that is short enough, or None.
 
         Args:
-            ways: Planners, and how they plan in words.
-            failed: Why they are asked.
-            shorter_than: The duration, turns priced, that a plan must fall short of [s].
+            ways: Planners, each with words on how it plans.
+            failed: Why fallbacks are tried, which the plan's `rescue` repeats.
+            shorter_than: Upper bound of the plan's priced duration (`priced_duration`) [s].
         """
         for planner, how in ways:
             with within_share(ONE_WAY):
@@ -137,7 +137,7 @@ class Rescue:
         return None
 
     def _planned(self, planner: Planner, how: str) -> Plan | None:
-        """The plan of one way; None where there is none, which is noted."""
+        """Return the plan of one fallback; None where there is none, which is noted in this object."""
         if out_of_time():
             self.unanswered.append(how)
             return None
@@ -152,12 +152,12 @@ class Rescue:
         return None
 
     def _ways(self) -> Iterator[tuple[Planner, str]]:
-        """Planners, and how they plan in words, the likeliest first.
+        """Yield planners, each with words on how it plans, the most promising first.
 
-        Where programs have solutions, but none that the vehicle can fly, that is a motion of the rigid body;
-        where they have none, more intervals.
+        Where programs have solutions that the vehicle cannot fly, time-optimal comes first. Where programs
+        have no solution, more intervals come first.
         """
-        if self.asked.reserve == FLYING_RESERVE:  # is kept where it can be
+        if self.asked.reserve == FLYING_RESERVE:  # the default, which is given up where no plan keeps it
             yield replace(self.asked, reserve=0.0, rescue=False), "without a reserve"
         more = with_more_intervals(self.asked, self.problem, self.vehicle)
         if any(attempt.cost is not None for attempt in self.recorder.attempts):
@@ -169,24 +169,24 @@ class Rescue:
         yield from self._others()
 
     def _motion_from_all(self, starts: int) -> tuple[Planner, str]:
-        """Time-optimal from so many starts and from the path without rotors."""
+        """Return time-optimal, started from the path without a vehicle too, and words on how it plans."""
         return self._motion(self._path_without_rotors(), starts), f"by {MOTION}"
 
     def _motion(self, start: Plan | None, starts: int) -> Planner:
-        """Time-optimal with no reserve but the one that is asked: that tells soonest of none."""
+        """Return time-optimal with the requested reserve, zero included: a refusal comes soonest so."""
         cls: Any = planner_class(MOTION)
         guess = replace(self.asked, rescue=False)
         return cast(Planner, cls(reserve=self.asked.reserve, starts=starts, guess=guess, start=start))
 
     def _path_without_rotors(self) -> Plan | None:
-        """The MIQP's plan for no vehicle."""
+        """Return the MIQP's plan without a vehicle, or None."""
         try:
             return cast(Plan, replace(self.asked, rescue=False).plan(self.problem))
         except Infeasible:
             return None
 
     def _with_reserve(self, found: Plan) -> Plan:
-        """A path near a plan that keeps the reserve to fly by, or the plan where there is none."""
+        """Return a plan near a plan that keeps the requested reserve, or the plan where there is none."""
         name = MOTION if found.planner == MOTION else FREE_KNOTS
         again = self._planned(planner_with_reserve(name, self.asked.reserve, start=found), f"by {name}")
         if again is None or not again.keeps(self.asked.reserve):
@@ -195,7 +195,7 @@ class Rescue:
         return replace(again, attempts=(*found.attempts, *again.attempts), rescue=said)
 
     def _others(self) -> Iterator[tuple[Planner, str]]:
-        """The ways that seldom find what those before them do not."""
+        """Yield the fallbacks that seldom succeed where the earlier ones fail."""
         first = default_order(self.problem, self.vehicle)
         for order in range(first, max(INPUT_NAMES) + 1):
             if order != (self.asked.order or first):
@@ -208,13 +208,13 @@ class Rescue:
 
 
 def _priced(plan: Plan) -> float:
-    """The duration of a vehicle's plan [s], longer for each turn beyond those asked."""
+    """Return the duration of a vehicle's plan [s], increased for each turn that its stages do not ask."""
     assert plan.evidence is not None
     return priced_duration(plan.evidence.task, plan.trajectory)
 
 
 def with_more_intervals(asked: Any, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
-    """Return the planner with more intervals than were asked for, the fewest first, and how in words."""
+    """Yield the planner with more intervals than requested, fewest first, and words on how it plans."""
     sequence = problem.stages(vehicle.max_specific_thrust)
     first, least = asked.intervals_for(sequence), A_STAGE * len(sequence.stages)
     more = {sequence.intervals_from(max(round(factor * first), least)) for factor in MORE_INTERVALS}

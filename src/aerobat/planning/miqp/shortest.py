@@ -1,7 +1,7 @@
-"""The shortest path that a vehicle can fly: from programs along a scan on dt, each refined from its path.
+"""The shortest path that a vehicle can fly, refined from the paths of programs along a scan on dt.
 
-The programs know no rotors. Those of small dt, which the vehicle cannot fly, have their stages where a fast
-path has them: from there refinement ends at shorter paths than from those that it can.
+The programs know no rotors. The vehicle cannot fly the paths of programs with small dt, but these place the
+stages as a fast path does. From such paths, refinement ends at shorter paths than from flyable ones.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from aerobat.planning.refinement.excess import Excess
 from aerobat.planning.refinement.refine import RefinedPath, Refinement
 from aerobat.planning.warm_start import WarmStart
 
-GROWTH = 1.15  # of dt, from one program to the next
-COARSE_GROWTH = 1.3  # where a path is further off than that
-COARSE = 4.0  # of a limit's size
-FAR = 1.3  # of a limit's size: a path that exceeds it by more is no place to begin
-STARTS = 2  # that are refined roughly, of which the fastest is refined finely first
-MAX_STARTS = 4
-SCAN_NODES = 500  # of a program's branch and bound: paths begin at its slots, which need not be the cheapest
-SCAN_PLACES = 5  # of an interval, at which limits are looked at along a scan
-UNSOLVED = 3  # programs without an answer, after others that have one: the longer ones are no better
-SLOW = 1.2  # times what no motion falls short of: a path that takes longer is looked for once more,
-SHORTER = (0.8, 0.9, 0.97)  # from programs of such fractions of its duration
+GROWTH = 1.15  # factor on dt from one program to the next
+COARSE_GROWTH = 1.3  # the same factor where the constraint violation is COARSE or more
+COARSE = 4.0  # constraint violation, relative to a limit's size
+FAR = 1.3  # largest constraint violation, relative to a limit's size, of a path that is refined
+STARTS = 2  # number of promising rough paths that is enough; the fastest is refined finely first
+MAX_STARTS = 4  # largest number of starts that are refined roughly
+SCAN_NODES = 500  # node limit of a program's branch and bound: slots for a start need not be optimal
+SCAN_PLACES = 5  # samples of an interval at which limits are evaluated along a scan
+UNSOLVED = 3  # programs in a row without an answer, after solved ones, that end a scan: longer ones fail too
+SLOW = 1.2  # ratio to the lower bound on the duration, above which a path is improved from more programs,
+SHORTER = (0.8, 0.9, 0.97)  # whose durations are these fractions of the path's duration
 
 _Slots = tuple[int, ...] | None
 
@@ -43,14 +43,14 @@ def shortest(
     scanned: tuple[float, float],
     least: float,
 ) -> Judged[RefinedPath] | Judged[Placement] | None:
-    """The shortest certified path found, or the first of a program that is flown as it is, or None.
+    """Return the shortest certified path found, else the certified path of a program itself, or None.
 
     Args:
-        attempts: Made and recorded here.
-        refinement: Of their paths.
-        segments: Of a refined path.
+        attempts: Solves and records the programs.
+        refinement: Refines the programs' paths.
+        segments: Number of segments of a refined path.
         scanned: The scan's smallest and largest dt [s].
-        least: The duration [s] that no motion falls short of: shorter programs are left out.
+        least: A lower bound on the duration of any motion [s]; programs far below it are skipped.
     """
     scan, rough = _Scan(attempts, refinement, scanned, least), list[RefinedPath]()
     for begun, (slots, guess) in enumerate(scan.starts(), 1):
@@ -72,7 +72,7 @@ def shortest(
 def _from_closed_form(
     known: Judged[RefinedPath] | None, scan: _Scan, segments: int
 ) -> Judged[RefinedPath] | None:
-    """A path from the closed form through points where the known one is slow, or missing; else that one."""
+    """Return the known path, or a shorter one from min-snap's closed form where it is slow or missing."""
     task = scan.refinement.task
     is_slow = known is None or known.solution.duration > SUSPICIOUS * scan.least
     if not (is_slow and task.problem.maneuver.through_points) or is_course(task.stages) or out_of_time():
@@ -85,9 +85,9 @@ def _from_closed_form(
 
 
 def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judged[RefinedPath]:
-    """The same, or a shorter one from programs shorter than it, where it is slow beside what is possible.
+    """Return a path, or a shorter one from shorter programs where the path is slow beside the lower bound.
 
-    The scan's starts are slower than what they lead to, and have stages where a slower path has them.
+    The scan's starts are slower than the paths refined from them, and place the stages as slower paths do.
     """
     best = judged
     for fraction in SHORTER:
@@ -104,7 +104,7 @@ def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judge
 def _shorter(
     scan: _Scan, start: WarmStart, segments: int, known: Judged[RefinedPath] | None
 ) -> Judged[RefinedPath] | None:
-    """The certified path near a start, where it is shorter than a known one; else None."""
+    """Return the certified path refined from a start if it is shorter than a known one, else None."""
     refinement, longest = scan.refinement, inf if known is None else known.solution.duration
     path = refinement.rough(start, segments, longest)
     if not refinement.is_promising(path) or _duration(path) >= longest:
@@ -119,17 +119,17 @@ def _duration(path: RefinedPath) -> float:
 
 @dataclass
 class _Scan:
-    """Programs along dt, up to the first whose own path the vehicle can fly."""
+    """A scan of programs with rising dt, up to the first whose own path the vehicle can fly."""
 
     attempts: Attempts
     refinement: Refinement
     scanned: tuple[float, float]  # the smallest and the largest dt [s]
-    least: float  # [s] of all intervals together
-    known: list[_Slots] = field(default_factory=list)  # that lead to a path
-    flown: Placement | None = None  # the answer that the vehicle can fly as it is
+    least: float  # lower bound on the duration of any motion [s]
+    known: list[_Slots] = field(default_factory=list)  # slots of stages from which a path was refined
+    flown: Placement | None = None  # the answer whose own path satisfies the limits at samples
 
     def starts(self) -> Iterator[tuple[_Slots, WarmStart]]:
-        """Slots and paths of answers near what the vehicle can do, but of those through known slots."""
+        """Yield slots and paths of answers that violate limits by FAR at most, without known slots."""
         (dt, last), solved, unsolved = self.scanned, False, 0
         while COARSE_GROWTH * dt * self.attempts.formulation.chain.intervals < self.least:
             dt *= COARSE_GROWTH
@@ -151,7 +151,7 @@ class _Scan:
             dt *= GROWTH if excess < COARSE else COARSE_GROWTH
 
     def start(self, dt: float) -> WarmStart | None:
-        """The path of the program of a dt through slots that led nowhere yet; None where it has none."""
+        """Return the path of the program at a dt; None where it has none, or its slots are known."""
         placement = self.attempts.solve(dt, SCAN_NODES)
         if placement.answer.x is None or placement.answer.slots in self.known:
             return None
@@ -159,14 +159,14 @@ class _Scan:
         return self.attempts.path(placement)
 
     def certified(self) -> Judged[Placement] | None:
-        """The answer that the vehicle can fly as it is, certified, or None."""
+        """Return the answer whose own path the vehicle can fly if it is certified, else None."""
         if self.flown is None:
             return None
         judged = self.attempts.judge(self.flown)
         return judged if judged.feasible else None
 
     def _recorded(self, placement: Placement, guess: WarmStart) -> float:
-        """The largest excess of an answer's path, which is kept as an attempt where there is one."""
+        """Return the largest constraint violation of an answer's path; record an attempt if there is one."""
         found = Excess.of(guess.trajectory, self.refinement.limits, SCAN_PLACES)
         if not found.holds:
             self.attempts.judge(placement, found.reason, -found.largest)
