@@ -1,1 +1,1 @@
-"""Ways around obstacles: routes on different sides of them, and the paths along them that are refined."""
+"""Planning around obstacles: routes on different sides of them, and refined paths along the routes."""

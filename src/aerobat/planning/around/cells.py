@@ -1,9 +1,10 @@
-"""A grid of cells between obstacles, with what a step through each of them costs.
+"""A grid of cells between obstacles, with the cost of a step through each cell.
 
-A cell is free where a point in its middle is clear of all pieces by the body's least semi-axis: a body on its
-side passes where it does not level. Cells nearer to a piece than the body reaches cost more, so that a way
-keeps off where there is room. Pieces that move are where they are when the body comes by: a cell is passed as
-late as it is far from the start beside the goal.
+A cell is free if its centre is clear of all obstacle pieces by the body's smallest semi-axis, as a body on
+its side passes where a level body does not fit. Cells closer to a piece than the body's reach cost more, so
+that routes keep their distance where there is room. Moving pieces are evaluated when the body is expected in
+a cell. That time is the expected duration times the distance from the start, over the sum of the distances
+from start and goal.
 """
 
 from __future__ import annotations
@@ -19,39 +20,39 @@ from aerobat.arrays import Array, Indices, Mask
 from aerobat.environment.obstacles import Pieces
 from aerobat.vehicle import Ellipsoid
 
-CELLS = 25_000  # about so many: a way through takes a tenth of a second
-FINEST = 0.1  # [m] of a cell
-AROUND = 3.0  # [m] beyond the places to pass, that a grid reaches to all sides
-LOOKED_WITHIN = 1.2  # [m] from a piece's box, beyond which that is as good as the piece
-ROOM = 0.15  # [m] beyond the body's reach, within which cells cost more
-CLOSE = 4.0  # times its length, that a step costs more where the body on its side just fits
+CELLS = 25_000  # approximate number of cells, with which a shortest path takes 0.1 s
+FINEST = 0.1  # least side of a cell [m]
+AROUND = 3.0  # margin of the grid around the positions to pass [m]
+LOOKED_WITHIN = 1.2  # distance [m] from a piece within which it is exact; farther away its box is used
+ROOM = 0.15  # distance [m] beyond the body's reach within which cells cost more
+CLOSE = 4.0  # added cost per metre where the body on its side just fits
 STEPS = np.array([step for step in product((-1, 0, 1), repeat=3) if step > (0, 0, 0)])
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells of a box in the world."""
+    """A grid of cells in a box in the world."""
 
     pieces: Pieces
     body: Ellipsoid
-    lower: Array  # [m] the box's corner, (3,)
-    upper: Array  # [m] the opposite one, (3,)
-    ends: Array  # [m] where all begins and ends, (2, 3)
-    duration: float  # [s] from end to end, about: when the body is in a cell, where pieces are then
+    lower: Array  # [m] lower corner of the box, (3,)
+    upper: Array  # [m] upper corner of the box, (3,)
+    ends: Array  # [m] start and goal, (2, 3)
+    duration: float  # [s] expected from start to goal, for the positions of moving pieces
 
     @classmethod
     def around(
         cls, pieces: Pieces, body: Ellipsoid, places: Array, lower: Array, upper: Array, duration: float
     ) -> Cells:
-        """Return the grid around places to pass.
+        """Return the grid around positions to pass.
 
         Args:
-            pieces: Of all obstacles.
-            body: That passes.
-            places: [m] (k, 3), in the order in which they are passed.
-            lower: The corner of the volume allowed [m], −infinite where it is open.
-            upper: The opposite one.
-            duration: From the first place to the last [s], about.
+            pieces: Pieces of all obstacles.
+            body: The body that passes between them.
+            places: Positions [m], (k, 3), in the order in which they are passed.
+            lower: Lower corner of the allowed volume [m], −infinite where it is open.
+            upper: Upper corner of the allowed volume [m], infinite where it is open.
+            duration: Expected duration from the first position to the last [s].
         """
         low = np.maximum(places.min(axis=0) - AROUND, lower)
         high = np.minimum(places.max(axis=0) + AROUND, upper)
@@ -59,12 +60,12 @@ class Cells:
 
     @property
     def room(self) -> float:
-        """The distance [m] from pieces at which the body has room, however it lies."""
+        """The distance [m] from pieces at which the body has room in any attitude."""
         return self.body.revolved.reach + ROOM
 
     @cached_property
     def step(self) -> float:
-        """The length of a cell's side [m], about."""
+        """The approximate length of a cell's side [m]."""
         return max(FINEST, float((np.prod(self.upper - self.lower) / CELLS) ** (1.0 / 3.0)))
 
     @cached_property
@@ -75,7 +76,7 @@ class Cells:
 
     @cached_property
     def centres(self) -> Array:
-        """The middle of all cells [m], (n, 3)."""
+        """The centres of all cells [m], (n, 3)."""
         axes = [
             low + (np.arange(count) + 0.5) * (high - low) / count
             for low, high, count in zip(self.lower, self.upper, self.shape, strict=True)
@@ -83,14 +84,17 @@ class Cells:
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
     def distances(self, points: Array, exact_within: float) -> Array:
-        """Return the distances of points to the nearest piece, at least [m], when the body is there, (n,)."""
+        """Return lower bounds on the distances of points to the nearest piece [m], (n,).
+
+        Moving pieces are where they are when the body is expected at the point.
+        """
         before, after = np.linalg.norm(points - self.ends[:, None], axis=-1)
         times = self.duration * before / np.maximum(before + after, self.step)
         return self.pieces.distances(points, exact_within, times)
 
     @cached_property
     def clearance(self) -> Array:
-        """The distance of all cells to the nearest piece, at least [m], (n,)."""
+        """Lower bounds on the distances of all centres to the nearest piece [m], (n,)."""
         return self.distances(self.centres, LOOKED_WITHIN)
 
     @cached_property
@@ -105,19 +109,22 @@ class Cells:
         return 1.0 + CLOSE * np.clip(close, 0.0, 1.0)
 
     def cell(self, points: Array) -> Indices:
-        """The cells that points [m] (..., 3) lie in, or next to, (...)."""
+        """Return the cells (...) that contain points [m] (..., 3), or are nearest to points outside."""
         counts = np.array(self.shape)
         found = np.floor((points - self.lower) / (self.upper - self.lower) * counts).astype(np.intp)
         x, y, z = np.moveaxis(np.clip(found, 0, counts - 1), -1, 0)
         return np.asarray((x * counts[1] + y) * counts[2] + z)
 
     def nearest(self, place: Array) -> int:
-        """The free cell that is nearest to a place [m] (3,)."""
+        """Return the free cell that is nearest to a position [m] (3,)."""
         away = np.linalg.norm(self.centres - place, axis=1)
         return int(np.argmin(np.where(self.free, away, np.inf)))
 
     def way(self, begin: int, end: int, factor: Array) -> Indices | None:
-        """The cells (k,) of the cheapest way between two, costs times a factor (n,); None: no way."""
+        """Return the cells (k,) of the cheapest route between two cells, with costs times `factor` (n,).
+
+        Return None where there is no route.
+        """
         from scipy.sparse import csr_matrix
         from scipy.sparse.csgraph import dijkstra
 
@@ -135,7 +142,7 @@ class Cells:
 
     @cached_property
     def _edges(self) -> tuple[Indices, Indices, Array]:
-        """Neighbours that are both free, and how far apart they are [m]."""
+        """The pairs of neighbouring cells that are both free, and the distances of their centres [m]."""
         numbers = np.arange(len(self.centres)).reshape(self.shape)
         sides = (self.upper - self.lower) / self.shape
         firsts, seconds, lengths = [], [], []

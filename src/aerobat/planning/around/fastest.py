@@ -1,4 +1,4 @@
-"""The fastest certified path around obstacles: one quick round along every route, the best of them finely."""
+"""The fastest certified path around obstacles: a quick round along every route, fine rounds for the best."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ from aerobat.planning.refinement.refine import (
 )
 from aerobat.planning.warm_start import WarmStart
 
-QUICK_SEGMENTS = 6  # of a quick round's path: with fewer variables it goes farther, in half the time
-QUICK_PLACES = 12  # of a segment
+QUICK_SEGMENTS = 6  # segments in a quick round: with fewer variables a round moves farther, in half the time
+QUICK_PLACES = 12  # places of a segment in a quick round
 QUICK = Settings(iterations=40)
-QUICK_STRETCHES = (2.0, 1.6)  # the factors by which durations may differ in it, a batch each in turn
-FOLLOWED = 2  # of the paths after it, the shortest ones, at a time: which is the best it tells nearly always
-LONG = 12  # segments: a way of so many is refined roughly at once, few would lose it
-LONGEST = 0.5  # [s] of a guess's segment: with longer ones 100 m past trunks lose their way
+QUICK_STRETCHES = (2.0, 1.6)  # factors by which durations may change in a quick round, alternating by batch
+FOLLOWED = 2  # shortest quick paths that are refined at a time; the best is nearly always among the first
+LONG = 12  # number of segments from which a path skips the quick round: few segments would lose its route
+LONGEST = 0.5  # longest segment of a guess [s]: with longer ones, 100 m between tree trunks fail
 
 
 @dataclass(frozen=True, eq=False)
 class _Rough:
-    """A path along a route that further rounds may make a plan of."""
+    """A path along a route that further rounds may turn into a plan."""
 
     refinement: Refinement
     path: RefinedPath
 
     @property
     def duration(self) -> float:
-        """Of the path [s]."""
+        """The duration of the path [s]."""
         return self.path.path.trajectory.duration
 
 
 def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -> FlownPath | None:
-    """Return the fastest certified path that is found along routes around obstacles; None where none is.
+    """Return the fastest certified path of the first batch of guesses that leads to one, or None.
 
     Args:
-        refinement: Of a task with obstacles.
-        segments: Of a path, at least.
-        count: Of the routes, at most.
+        refinement: The refinement of a task with obstacles.
+        segments: Number of segments of a path, at least.
+        count: Number of routes, at most.
     """
     for batch, stretch in zip(guesses(refinement.task, count), cycle(QUICK_STRETCHES)):
         quick = sorted(_quickly_refined(refinement, segments, batch, stretch), key=lambda each: each.duration)
@@ -66,8 +66,8 @@ def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -
 def _quickly_refined(
     refinement: Refinement, segments: int, batch: Sequence[Guess], stretch: float
 ) -> Iterator[_Rough]:
-    """Yield the paths of guesses after one round, without those that are lost."""
-    known: dict[float, Refinement] = {}  # by what is kept clear, compiled once each
+    """Yield the paths of guesses after one round, without those that further rounds cannot repair."""
+    known: dict[float, Refinement] = {}  # by clearance, so that each is compiled once
     for guess in batch:
         own = known.setdefault(guess.task.clearance, replace(refinement, task=guess.task))
         count = _segments(guess.path, segments)
@@ -90,7 +90,7 @@ def _quick(refinement: Refinement, guess: WarmStart, segments: int, stretch: flo
 
 
 def _refined_roughly(quick: Sequence[_Rough], segments: int) -> Iterator[_Rough]:
-    """Yield the rough paths near quick ones, without those that are lost or far behind one before."""
+    """Yield the rough paths near quick ones, without those that cannot be repaired or are far slower."""
     shortest = inf
     for each in quick:
         count = max(segments, each.path.path.trajectory.segments)
@@ -103,7 +103,7 @@ def _refined_roughly(quick: Sequence[_Rough], segments: int) -> Iterator[_Rough]
 
 
 def _begun(refinement: Refinement, guess: Guess, segments: int, stretch: float) -> WarmStart:
-    """The path of a guess, refined to pass walls on its side where it has to."""
+    """Return the path of a guess, first refined with the body on its side where walls require that."""
     if guess.turned is None:
         return guess.path
     begun = replace(guess.path, stages=guess.turned.stages.stages)

@@ -1,4 +1,4 @@
-"""Paths around obstacles that begin refinements: closed forms along routes through a task's stages."""
+"""Starts of refinements around obstacles: closed forms along routes through a task's stages."""
 
 from __future__ import annotations
 
@@ -21,39 +21,40 @@ from aerobat.problem.condition import Attitude, Quantity, fixed
 from aerobat.problem.gate import Gate
 from aerobat.problem.stage import Stage
 
-ROUTES = 4  # of which refinement takes the fastest
-BEFORE = 0.3  # [m] beyond the body's reach, from which on a gate in a wall is flown along its normal
-CLOSEST = 0.5  # [m] from one corner of a route to the next
-# how near straight lines cut corners, of a cell, and times the duration of a closed form, in turn: slits are
-# reached from slow ones, windows by those that cut no corner
+ROUTES = 4  # number of routes; the refinement takes the fastest
+BEFORE = 0.3  # distance [m] beyond the body's reach at which the flight along a wall gate's normal begins
+CLOSEST = 0.5  # least distance [m] between the corners of a route
+# (slack of straight lines in cells, factor on the closed form's duration), tried in turn: slow starts lead
+# through slits, starts without slack through windows
 STARTS = ((0.1, 1.4), (0.0, 1.4), (0.1, 1.8), (0.0, 1.0))
-SIDEWAYS = (0.1, 2.6)  # the first of a body on its side: from slower ones narrow slits are reached soonest
-HURRIED = 0.5  # of the vehicle's thrust that accelerates it, by which the duration is foreseen
-LATE = (1.0, 1.4, 0.7)  # times that duration, at which routes pass what moves: behind it, or in front
-BOTH_WAYS = 0.5  # of an upright's height, below which the body may turn either way
-TOLERANCE = 0.1  # [rad] of a body on its side, at first
-ROOMS = 101  # from none to as much as will do, of which the most is found that holes in walls leave
-LEAST_THRUST = 0.4  # of gravity, of a body on its side
-EFFORT = 4  # snap: of the derivatives of position whose squares are minimized
+SIDEWAYS = (0.1, 2.6)  # the first start of a body on its side: slow ones lead through narrow slits soonest
+HURRIED = 0.5  # fraction of the thrust that accelerates the vehicle in the expected duration
+LATE = (1.0, 1.4, 0.7)  # factors on the expected duration: routes pass behind moving obstacles, or in front
+BOTH_WAYS = 0.5  # z component of a gate's `up` axis below which both ways to turn the body are tried
+TOLERANCE = 0.1  # attitude tolerance of a body on its side in the first refinement [rad]
+ROOMS = 101  # number of clearances, from zero on, among which the largest that wall gates leave is found
+LEAST_THRUST = 0.4  # least specific thrust of a body on its side, relative to gravity
+EFFORT = 4  # the derivative of position whose square the closed form minimizes: snap
 
 
 class Guess(NamedTuple):
-    """A path around obstacles, and the task along it: with no more kept clear than there is room for."""
+    """A path around obstacles, and its task, whose clearance is reduced to the room along the path."""
 
     path: WarmStart
     task: Task
-    turned: Task | None  # refined first: without walls that are passed on its side, but turned so
+    turned: Task | None  # refined first: the body on its side, without the walls that it passes like that
 
 
 def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
-    """Yield paths through a task's stages around obstacles, those on different sides of them together.
+    """Yield batches of paths through a task's stages around obstacles, one batch for each way to start.
 
-    First come those that lead on most often, then others: at other paces, turned the other way in slits.
-    Nothing is yielded where some stage does not say where it is, or there is no way.
+    The paths of a batch pass on different sides of obstacles. The batches that succeed most often come first.
+    Others have another pace, or the body turned the other way in slits. Nothing is yielded where a stage has
+    no position, or where there is no route.
 
     Args:
-        task: With a vehicle and obstacles.
-        count: Of the routes, at most.
+        task: A task with a vehicle and obstacles.
+        count: Number of routes, at most.
     """
     places = _places(task)
     if places is None or not task.problem.ends:
@@ -80,7 +81,7 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
 
 
 def _room_in_holes(task: Task) -> float:
-    """The distance [m] that the body can keep from the edges of all holes in walls, or as much as will do."""
+    """Return the distance [m] that the body can keep from all wall gates' edges, up to the needed one."""
     holes = [gate.opening for gate in (_in_wall(task, stage) for stage in task.stages.stages) if gate]
     small, large = sorted(task.vehicle.bounding_ellipsoid.revolved[:2])
     rooms: list[float] = np.linspace(0.0, task.clearance / SHARE, ROOMS).tolist()
@@ -92,7 +93,7 @@ def _room_in_holes(task: Task) -> float:
 
 
 def _hurried(task: Task, corners: Array) -> float:
-    """The duration [s] from rest to rest along corners (k, 3) at much of the thrust, or at greatest speed."""
+    """Return the expected duration [s] along corners (k, 3): rest to rest by thrust, or at the speed limit."""
     _, greatest = task.problem.path_limits.of(1)
     way = np.diff(corners, axis=0)
     length = float(np.linalg.norm(way, axis=1).sum())
@@ -101,7 +102,7 @@ def _hurried(task: Task, corners: Array) -> float:
 
 
 def _different(found: Iterable[tuple[Cells, Way]], slack: float) -> Iterator[tuple[list[Array], float]]:
-    """Yield the corners of ways and their clearances [m], but of ways whose corners one before has."""
+    """Yield each route's corners and clearance [m], without routes whose corners an earlier route has."""
     known: list[Array] = []
     for grid, way in found:
         legs = [straightened(grid, leg, slack) for leg in way.legs]
@@ -112,7 +113,10 @@ def _different(found: Iterable[tuple[Cells, Way]], slack: float) -> Iterator[tup
 
 
 def _places(task: Task) -> list[Leg] | None:
-    """Where the start, each stage and the goal are entered and left [m]; None where one does not say."""
+    """Return the positions [m] at which start, stages and goal are entered and left, or None.
+
+    None is returned where a stage has no position.
+    """
     found = [(task.problem.start.position, task.problem.start.position)]
     for stage in task.stages.stages:
         place = stage.position(task.problem.gates)
@@ -126,7 +130,7 @@ def _places(task: Task) -> list[Leg] | None:
 
 
 def _along(task: Task, route: Sequence[Array]) -> WarmStart:
-    """The closed form along a route, with a corner of it as a stage of its own each."""
+    """Return the closed form along a route, with each corner as an additional stage."""
     stages: list[Stage] = []
     own: list[int] = []
     for k, leg in enumerate(route):
@@ -139,7 +143,7 @@ def _along(task: Task, route: Sequence[Array]) -> WarmStart:
 
 
 def _inner(leg: Array) -> list[Array]:
-    """The corners between the ends of a leg, none next to another or to an end."""
+    """Return the inner corners of a leg, without those closer than CLOSEST to another or to an end."""
     kept = [leg[0]]
     for point in leg[1:-1]:
         if min(np.linalg.norm(point - kept[-1]), np.linalg.norm(point - leg[-1])) > CLOSEST:
@@ -148,9 +152,10 @@ def _inner(leg: Array) -> list[Array]:
 
 
 def _turned(task: Task) -> tuple[Task | None, ...]:
-    """The task without the walls that the body passes on its side, but turned so, one way and the other.
+    """Return the task with the body on its side in narrow wall gates, without these walls.
 
-    None alone where it fits level.
+    The body is turned one way, and also the other way if a gate's `up` axis is far from vertical. None alone
+    is returned where the body fits level through all gates.
     """
     gates = {gate.name: gate for gate in task.problem.gates if gate.wall and not _fits_level(task, gate)}
     if not gates:
@@ -171,7 +176,7 @@ def _turned(task: Task) -> tuple[Task | None, ...]:
 
 
 def _on_its_side(task: Task, stage: Stage, up: Array) -> Stage:
-    """The stage with its thrust along a direction, where it asks no attitude."""
+    """Return the stage with an attitude with its thrust along `up`; stages with an attitude are unchanged."""
     if stage.attitude is not None:
         return stage
     attitude = Attitude(up, LEAST_THRUST * task.environment.gravity, TOLERANCE)
@@ -179,7 +184,7 @@ def _on_its_side(task: Task, stage: Stage, up: Array) -> Stage:
 
 
 def _fits_level(task: Task, gate: Gate) -> bool:
-    """True if the body passes a gate's opening as it hovers."""
+    """Return whether the body fits through a gate's opening in its hover attitude."""
     revolved = task.vehicle.bounding_ellipsoid.revolved
     _, shape = revolved.turned(np.array([0.0, 0.0, 1.0]))
     across = gate.plane_axes @ shape
@@ -187,6 +192,6 @@ def _fits_level(task: Task, gate: Gate) -> bool:
 
 
 def _in_wall(task: Task, stage: Stage) -> Gate | None:
-    """The gate of a stage that is a hole in a wall."""
+    """Return a stage's gate if it is an opening in a wall, else None."""
     gate = None if stage.gate is None else task.problem.gate(stage.gate)
     return None if gate is None or gate.wall is None else gate

@@ -1,8 +1,9 @@
-"""Routes through places: the cheapest ways on a grid, then others on different sides of what stands between.
+"""Topologically distinct routes on a grid: the cheapest one, then others on different sides of obstacles.
 
-Where a route passes between things, a curtain is drawn from wall to wall across it, and what lies in it costs
-more: the next cheapest route takes another passage, if that is not much longer. Two routes that can be moved
-into one another with nothing in between are one (Zhou et al., RAPTOR, 2021: uniform visibility deformation).
+Where a route passes a gap between obstacles, the cells across the gap, its "curtain", get a higher cost. So
+the next cheapest route takes another gap, if that is not much longer. Two routes count as one if one can be
+deformed into the other without crossing an obstacle (Zhou et al., RAPTOR, 2021: uniform visibility
+deformation).
 """
 
 from __future__ import annotations
@@ -15,29 +16,29 @@ import numpy as np
 from aerobat.arrays import Array, Indices
 from aerobat.planning.around.cells import LOOKED_WITHIN, Cells
 
-BETWEEN = LOOKED_WITHIN  # [m] from a route to what it passes, at most, that a curtain hangs on
-WIDE = 4.0  # [m] from a route, that a curtain reaches at most
-DETOUR = 1.5  # [m] that it costs to pass a curtain
-LOOKED_AT = 24  # places of a straight line, at which it is looked whether it is free
-COMPARED = 20  # places of two routes
+BETWEEN = LOOKED_WITHIN  # largest distance [m] of a route from obstacles at which a curtain is drawn
+WIDE = 4.0  # largest distance [m] of a curtain's cells from the route
+DETOUR = 1.5  # cost of passing a curtain, as a length [m]
+LOOKED_AT = 24  # samples of a straight line that is tested for collision
+COMPARED = 20  # samples of two routes that are compared
 
 Leg = tuple[Array, Array]  # its two ends [m]
 
 
 class Way(NamedTuple):
-    """A way through places."""
+    """A route through positions."""
 
-    legs: tuple[Array, ...]  # the points of each [m], a cell a step, (k, 3), its ends included
-    clearance: float  # [m] the least distance of a point on it to a piece
+    legs: tuple[Array, ...]  # the points of each leg [m], cell by cell, both ends included, (k, 3)
+    clearance: float  # [m] the least distance of the route's cells to a piece
 
 
 def routes(grid: Cells, legs: Sequence[Leg], count: int) -> Iterator[Way]:
-    """Yield up to so many routes; none where there is no way.
+    """Yield distinct routes, the cheapest first; none where a leg has no route.
 
     Args:
-        grid: Around the places.
-        legs: In the order in which they are flown.
-        count: Of the routes.
+        grid: The grid around the legs.
+        legs: The ends of the legs, in the order of flight.
+        count: Number of searches, at most one route each.
     """
     ends = [(grid.nearest(begin), grid.nearest(end)) for begin, end in legs]
     factor = np.ones(len(grid.centres))
@@ -60,13 +61,13 @@ def routes(grid: Cells, legs: Sequence[Leg], count: int) -> Iterator[Way]:
 
 
 def straightened(grid: Cells, points: Array, slack: float) -> Array:
-    """Return the corners that a way needs: from each the farthest that is reached straight.
+    """Return the corners of a route after shortcuts along straight lines that are clear of obstacles.
 
     Args:
-        grid: That the way goes through.
-        points: Of the way [m], (k, 3).
-        slack: Of a cell, by which a straight line may come nearer to pieces than the way, where the body has
-            no room.
+        grid: The grid of the route.
+        points: Points of the route [m], (k, 3).
+        slack: By how much a straight line may come closer to pieces than the route where the body has no
+            room, in cells.
     """
     kept, at = [0], 0
     while at < len(points) - 1:
@@ -79,7 +80,7 @@ def straightened(grid: Cells, points: Array, slack: float) -> Array:
 
 
 def _is_straight(grid: Cells, points: Array, slack: float) -> bool:
-    """True if the straight line between the ends is everywhere as clear as the way beside it, or has room."""
+    """Return whether the straight line between the ends has everywhere room, or the route's own clearance."""
     along = grid.distances(_spaced(points), grid.room)
     beside = np.minimum(along, np.minimum(np.roll(along, 1), np.roll(along, -1)))
     line = grid.distances(_spaced(points[[0, -1]]), grid.room)
@@ -87,7 +88,7 @@ def _is_straight(grid: Cells, points: Array, slack: float) -> bool:
 
 
 def _with_curtains(grid: Cells, way: Indices, factor: Array) -> Array:
-    """The factors, more in curtains across a way where it passes between things."""
+    """Return the cost factors, raised in curtains across a route where it passes between obstacles."""
     clearance, points = grid.clearance[way], grid.centres[way]
     factor = factor.copy()
     for k in range(1, len(way) - 1):
@@ -105,18 +106,18 @@ def _with_curtains(grid: Cells, way: Indices, factor: Array) -> Array:
 
 
 def _is_alike(grid: Cells, route: Array, other: Array) -> bool:
-    """True if straight lines between points of two routes, in their order, are free."""
+    """Return whether the straight lines between corresponding points of two routes are all free."""
     lines = _line(_spaced(route), _spaced(other))
     return bool(grid.free[grid.cell(lines)].all())
 
 
 def _spaced(points: Array) -> Array:
-    """Points evenly along a route, (COMPARED, 3)."""
+    """Return points evenly spaced along a route, (COMPARED, 3)."""
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     at = np.linspace(0.0, length[-1], COMPARED)
     return np.column_stack([np.interp(at, length, points[:, axis]) for axis in range(3)])
 
 
 def _line(begin: Array, end: Array) -> Array:
-    """Points along straight lines, (LOOKED_AT, ..., 3)."""
+    """Return points along straight lines, (LOOKED_AT, ..., 3)."""
     return np.linspace(np.broadcast_to(begin, end.shape), end, LOOKED_AT)

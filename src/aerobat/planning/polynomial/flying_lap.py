@@ -1,4 +1,4 @@
-"""A lap of a closed course by the closed form: what a refinement of it begins at."""
+"""A lap of a closed course by the closed form, as the start of a refinement."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from aerobat.problem.maneuvers.line import Line
 from aerobat.problem.stage import Stage
 from aerobat.trajectory import Trajectory
 
-UNROLLED = 3  # laps in a row, of which the middle one is a flying lap
+UNROLLED = 3  # laps in a row; the middle one is a flying lap
 
 
 def flying_lap(task: Task, order: int) -> WarmStart:
-    """A lap of the closed form through a closed sequence as a start: of three in a row the middle one.
+    """Return a flying lap of the closed form through a closed sequence: the middle one of three in a row.
 
-    From a rest at its last place to one at its first, laps begin and end half-way in time between those two.
+    The three laps begin at rest at the last position and end at rest at the first. The seam between laps
+    lies half-way in time between those two positions.
 
     Args:
-        task: With a closed course.
+        task: A task with a closed course.
         order: The derivative of position whose square is minimized.
     """
     problem, sequence = task.problem, task.stages

@@ -1,7 +1,7 @@
 """Polynomials whose knots are free: nearly time-optimal, certified, from closed forms or the paper's MIQP.
 
-Degree 9 as in Section V-B, but derivatives at the knots and durations are chosen by the rotors' limits, not
-by a cost that knows nothing of them: that is where the closed form loses most of its time.
+The degree is 9 as in Section V-B. Derivatives at the knots and durations are optimized within the rotors'
+limits. The closed form chooses them by a cost that ignores rotors, and loses most of its time by that.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from aerobat.planning.warm_start import flown_task
 from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
-# eight, and twice as many segments, gain 0.3 % at the median of 300 random problems, for twice the time
+# eight starts with twice as many segments gain 0.3 % at the median of 300 random problems, in twice the time
 STARTS = 3
-FINALISTS = 1  # three gain 0.1 % on average of 91 random problems, for a third more time
+FINALISTS = 1  # three finalists gain 0.1 % on average of 91 random problems, in a third more time
 
 
 @planner("free-knots")
 class FreeKnots(Planner):
-    """Such polynomials at the rotors' limits, derivatives and times at knots free.
+    """Polynomials at the rotors' limits, with free derivatives and times at the knots.
 
-    They begin from `start`, a plan of the same problem, certified or not; without one from the closed
-    form through waypoints, the MIQP's plan, and the same without rotors, of which the fastest is kept. A
-    course of many stages begins at the closed form through them, stretched where that leads nowhere. A knot
-    is at every stage. Rotors that lag are held to their limits by their commands, their thrusts continuous.
-    At the ends the body does not turn, but its thrust may be changing, so that there is jerk along it,
-    unless `still_ends` asks for none. A `reserve`, a fraction of the range of rotors and body rate, is
-    kept from either end for the controller, proven of rotors. Around obstacles they begin from routes on
-    several sides, and keep a `clearance` from them. A closed course ends in the state in which it begins,
-    of position, velocity, attitude, body rates and thrusts, all of which are chosen.
+    The refinement starts from `start`, a plan of the same problem, certified or not. Without `start` it uses
+    the closed form through waypoints and the MIQP's plans with and without a vehicle, and the fastest result
+    is kept. Long courses start from the closed form through their stages, at a slower pace where that fails.
+    Every stage has a knot. For rotors with lag the limits hold for commands, and thrusts are continuous.
+    At the ends the body rate is zero, but the thrust may change: there is jerk along the thrust, unless
+    `still_ends` forbids it. A `reserve`, a fraction of the range of rotors and body rate, is kept from either
+    end for the controller; for rotors it is proven. Around obstacles the starts are routes on several sides,
+    and paths keep a `clearance` from them. A closed course ends in the state of its start (position,
+    velocity, attitude, body rates and thrusts), which the planner chooses.
     """
 
     PLANS_CLOSED_COURSES: ClassVar[bool] = True
@@ -62,10 +62,9 @@ class FreeKnots(Planner):
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
     ) -> Plan:
-        """The fastest certified plan found; where none is faster, the plan that it began from.
+        """Return the fastest certified plan found, which may be the plan from which the search started.
 
-        Raises SpecError without a vehicle and for input that makes no sense, Infeasible when nothing is
-        certified.
+        Raises SpecError without a vehicle and for invalid input, Infeasible when nothing is certified.
         """
         task = flown_task("free-knots", problem, vehicle, self.reserve, self.clearance)
         return MultiStart(

@@ -21,30 +21,30 @@ from aerobat.problem.stage import Stage
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
 
-LEG_THRUST_FRACTION = 0.3  # of the specific thrust, that accelerates along a leg when times are guessed
-SHORTEST_LEG = 0.2  # [s] that a leg is given at first
-EXCEEDED = 0.3  # of the rotors' range, by which a stretched path may exceed it
-PACE = 1.05  # times the duration, in one step of stretching
-PACES = 80  # steps at most: 50 times the duration,
-FIGURE_PACES = 12  # or of figures, whose attitudes slow motions pass in free fall, 1.8 times
-PACE_STRIDE = 4  # steps at a time, to the nearest to the limits where none of these will do
-MIN_GATE_SPEED = 3.0  # [m/s] of starts through gates
-STAGE_TOLERANCE = 1e-6  # in SI units: by how much a condition may be missed through rounding
+LEG_THRUST_FRACTION = 0.3  # fraction of the specific thrust that accelerates a leg when times are guessed
+SHORTEST_LEG = 0.2  # least guessed duration of a leg [s]
+EXCEEDED = 0.3  # by how much a stretched path may exceed rotor limits, as a fraction of the rotors' range
+PACE = 1.05  # factor on the duration in one step of stretching
+PACES = 80  # largest number of steps: 50 times the duration
+FIGURE_PACES = 12  # the same for figures, 1.8 times: slow motions reach their attitudes only in free fall
+PACE_STRIDE = 4  # steps at a time where no pace is close enough and the one closest to the limits is taken
+MIN_GATE_SPEED = 3.0  # least speed of starts through gates [m/s]
+STAGE_TOLERANCE = 1e-6  # violation of a condition that is rounding, in SI units
 
 
 def fixed_at_knots(task: Task, order: int, velocities: Array) -> Array:
-    """Position and its derivatives below `order` at start, stages and goal, (K, order, 3); NaN: free.
+    """Return position and its derivatives below `order` at start, stages and goal, (K, order, 3); NaN: free.
 
-    The closed form takes each axis alone and equalities only. So conditions in oblique directions fix, by
-    least norm, every component that they touch. Balls, gates and ranges of places are met at their centres.
-    An attitude fixes the thrust to exactly its direction, and a lower bound on thrust to itself or to the
-    hover's if that is more, one on speed to itself or to the velocity given; other inequalities are left
-    free, to be checked afterwards.
+    The closed form treats each axis alone and takes equalities only. So conditions in oblique directions fix
+    every component that they contain, by least norm. Balls, gates and ranges of positions are met at their
+    centres. An attitude fixes the direction of thrust exactly. A lower bound on thrust fixes the thrust at
+    the larger of the bound and hover thrust. A lower bound on speed fixes the speed at the larger of the
+    bound and the given velocity. Other inequalities are left free, to be checked afterwards.
 
     Args:
-        task: Its ends and its stages' equalities are fixed.
-        order: How many derivatives there are.
-        velocities: At the stages [m/s], of which the drag is taken, (K - 2, 3).
+        task: The task whose ends and stages are fixed.
+        order: Number of derivatives, position included.
+        velocities: Velocities at the stages for the drag [m/s], (K - 2, 3).
     """
     problem, stages = task.problem, task.stages.stages
     fixed = np.full((len(stages) + 2, order, 3), np.nan)
@@ -60,7 +60,7 @@ def fixed_at_knots(task: Task, order: int, velocities: Array) -> Array:
 
 
 def first_times(problem: Problem, fixed: Array, max_specific_thrust: float) -> Array:
-    """Durations between knots to begin with [s], (K - 1,): the problem's own, or a guess from distances."""
+    """Return initial durations between knots [s], (K - 1,): the problem's own, or a guess from distances."""
     if problem.maneuver.first_times is not None:
         return np.diff([0.0, *problem.maneuver.first_times])
     placed = np.flatnonzero(~np.isnan(fixed[:, 0]).any(axis=1))
@@ -73,7 +73,7 @@ def first_times(problem: Problem, fixed: Array, max_specific_thrust: float) -> A
 
 
 def unhurried(task: Task) -> Task:
-    """The same without the least speeds of stages that ask no attitude."""
+    """Return the task without lower bounds on speed at stages that ask no attitude."""
     stages = (
         stage if stage.attitude else replace(stage, conditions=tuple(filterfalse(_hurries, stage.conditions)))
         for stage in task.stages.stages
@@ -82,7 +82,7 @@ def unhurried(task: Task) -> Task:
 
 
 def _without_figures_attitudes(task: Task) -> Task:
-    """The same without the attitudes of figures' stages that say where they are."""
+    """Return the task without the attitudes of figures' stages whose position is given."""
     stages = (
         replace(stage, attitude=None, conditions=tuple(filterfalse(_is_of_thrust, stage.conditions)))
         if _is_of_figure(stage) and stage.is_placed
@@ -93,7 +93,7 @@ def _without_figures_attitudes(task: Task) -> Task:
 
 
 def _is_of_figure(stage: Stage) -> bool:
-    """True of a stage that asks an attitude in no gate."""
+    """Return whether a stage asks an attitude and has no gate, as in a figure such as a flip."""
     return stage.gate is None and stage.attitude is not None
 
 
@@ -102,15 +102,15 @@ def _is_of_thrust(condition: Condition) -> bool:
 
 
 def stretched_path(task: Task, order: int) -> Trajectory:
-    """The closed form through ordered stages, legs as long as the roots of their distances, for a warm start.
+    """Return the closed form through ordered stages as a warm start; legs last as the roots of their lengths.
 
-    So slow as a whole that rotors exceed their limits by EXCEEDED at most: a motion that is a little too fast
-    is nearer to the fastest than one that is too slow. Of figures, which no slow motion flies, it is the pace
-    that exceeds limits least, where none nearby will do.
+    The path is stretched in time until rotors exceed their limits by EXCEEDED at most: a motion that is a
+    little too fast is nearer to the optimum than one that is too slow. Slow motions cannot fly figures: where
+    no pace tried satisfies that, the pace that exceeds limits least is taken.
 
     Args:
-        task: Its ends are met, and its stages but for the attitudes of figures, which follow from their
-            places.
+        task: The task whose ends and stages are met, without the attitudes of figures, which follow from
+            their positions.
         order: The derivative of position whose square is minimized.
     """
     vehicle, still = task.vehicle, np.zeros((len(task.stages.stages), 3))
@@ -134,12 +134,12 @@ def stretched_path(task: Task, order: int) -> Trajectory:
 
 
 def path_along_normals(task: Task, order: int) -> Trajectory:
-    """The closed form through ordered stages, stretched, gates passed along their normals.
+    """Return the stretched closed form through ordered stages that passes gates along their normals.
 
-    As fast there as the closed form that leaves that open, or as MIN_GATE_SPEED says.
+    The speed in a gate is that of the closed form with free velocities, at least MIN_GATE_SPEED.
 
     Args:
-        task: Its ends are met, its gates passed.
+        task: The task whose ends are met and whose gates are passed.
         order: The derivative of position whose square is minimized.
     """
     path = stretched_path(task, order)
@@ -159,7 +159,7 @@ def start_along_normals(task: Task, order: int) -> WarmStart:
     """Return the path of `path_along_normals` as a warm start.
 
     Args:
-        task: Its ends are met, its gates passed, its stages in order.
+        task: The task whose ends are met and whose gates are passed, with its stages in order.
         order: The derivative of position whose square is minimized.
     """
     path = path_along_normals(task, order)
@@ -167,7 +167,7 @@ def start_along_normals(task: Task, order: int) -> WarmStart:
 
 
 def violated_stage(task: Task, trajectory: Trajectory) -> Reason | None:
-    """The first stage that a trajectory with a knot a stage misses, in a sentence; or None."""
+    """Return a sentence about the first stage missed by a trajectory with a knot at each stage, or None."""
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
     fractions = trajectory.knots[1:-1] / trajectory.duration
     for stage, flat, fraction in zip(task.stages.stages, np.stack(values, axis=1), fractions, strict=True):
@@ -186,17 +186,17 @@ def violated_stage(task: Task, trajectory: Trajectory) -> Reason | None:
 
 
 def _along(gate: Gate, speed: float) -> tuple[Condition, ...]:
-    """Passing a gate along its normal, so fast [m/s] or faster."""
+    """Return conditions that fix the velocity in a gate along its normal, at MIN_GATE_SPEED or more."""
     return fixed(Quantity.VELOCITY, max(speed, MIN_GATE_SPEED) * gate.normal)
 
 
 def _hurries(condition: Condition) -> bool:
-    """True of a least speed."""
+    """Return whether a condition is a lower bound on speed."""
     return condition.quantity is Quantity.VELOCITY and 0.0 < condition.lower < condition.upper
 
 
 def _fixed(stage: Stage, derivative: int, balance: ForceBalance, velocity: Array) -> Array:
-    """The components (3,) that a stage fixes of one derivative, NaN where it leaves them free."""
+    """Return the components (3,) of one derivative that a stage fixes; NaN: free."""
     rows = list(_equalities(stage, derivative, balance, velocity))
     if not rows:
         return np.full(3, np.nan)
@@ -208,7 +208,7 @@ def _fixed(stage: Stage, derivative: int, balance: ForceBalance, velocity: Array
 def _equalities(
     stage: Stage, derivative: int, balance: ForceBalance, velocity: Array
 ) -> Iterator[tuple[Array, float]]:
-    """Directions and values of what a stage fixes of one derivative at a velocity."""
+    """Yield the directions in which a stage fixes one derivative, and the values, at a velocity."""
     if stage.attitude is not None and derivative == Quantity.SPECIFIC_THRUST.derivative:
         thrust = max(stage.attitude.min_thrust, balance.gravity) * stage.attitude.up
         yield from zip(np.eye(3), thrust - balance.constant - balance.drag * velocity, strict=True)

@@ -28,17 +28,17 @@ from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort
 from aerobat.vehicle import Vehicle
 
-FIRST_GUESS_THRUST_TO_WEIGHT = 2.0  # for first times without a vehicle
+FIRST_GUESS_THRUST_TO_WEIGHT = 2.0  # assumed for the first times without a vehicle
 STEP = 0.1  # [s] of the paper's line search (Section V-D: 12 iterations from 0.5 and 2.0 to 1.6 and 3.1 s)
-SEARCH_STEPS = 100
-SLOWEST = 30.0  # times the first duration, where scaling all segments gives up
-FASTEST = 0.3  # times the first duration, where it begins
+SEARCH_STEPS = 100  # largest number of steps of that line search
+SLOWEST = 30.0  # factor on the first duration at which the search by scaling all segments gives up
+FASTEST = 0.3  # factor on the first duration at which that search begins
 
 
 class TimeScaling(StrEnum):
     """The segments that a longer duration lengthens."""
 
-    FIRST = "first"  # all knots shift by as much, as in the paper: the first segment alone lengthens
+    FIRST = "first"  # only the first segment, as in the paper: all knots shift by the same time
     ALL = "all"  # every segment by the same factor
 
 
@@ -46,11 +46,11 @@ class TimeScaling(StrEnum):
 class MinSnap(Planner):
     """Closed-form polynomials through waypoints with a line search on their times (Section V).
 
-    Degree 2s − 1 at the smallest duration searched. With s = 5, the paper's degree 9, the cost is the
-    integral of crackle squared: "minimum snap" in name only; s = 4 is minimum snap, s = 3 minimum jerk.
-    Without a `time_scaling`, waypoints that come with their times are shifted as in the paper, by 0.1 s at a
-    time; other paths are scaled as a whole. With `stop_after` the search ends at that attempt, whether the
-    vehicle can fly it or not (paper, Fig. 10).
+    The polynomials have degree 2s − 1 and the smallest duration of the search that is feasible. With s = 5,
+    the paper's degree 9, the cost is the integral of crackle squared, "minimum snap" in name only. With s = 4
+    it is minimum snap, with s = 3 minimum jerk. Without a `time_scaling`, waypoints with given times are
+    shifted as in the paper, by 0.1 s a step; other paths are scaled as a whole. With `stop_after` the search
+    ends at that attempt, whether the vehicle can fly it or not (paper, Fig. 10).
     """
 
     order: Annotated[int, Field(ge=3, le=5)] = option(  # s
@@ -68,10 +68,10 @@ class MinSnap(Planner):
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
     ) -> Plan:
-        """The path at the first duration of the search that the vehicle can fly, certified.
+        """Return the certified plan at the first duration of the search that the vehicle can fly.
 
-        Without a vehicle, the path at its first times. Raises Infeasible when no duration will do, and
-        SpecError for input that makes no sense.
+        Without a vehicle, return the path at its first times. Raises Infeasible when no duration is feasible,
+        and SpecError for invalid input.
         """
         planning = _Planning(self, problem, vehicle, Recorder(progress))
         first = float(planning.durations.sum())
@@ -97,7 +97,7 @@ class MinSnap(Planner):
 
 
 class _Planning:
-    """One run of the search: what all attempts share."""
+    """One run of the search: the data that all attempts share."""
 
     def __init__(
         self, config: MinSnap, problem: Problem, vehicle: Vehicle | None, recorder: Recorder
@@ -111,9 +111,9 @@ class _Planning:
         self.scaling = config.time_scaling or timed
 
     def attempt(self, duration: float) -> Judged[None] | None:
-        """Outcome of one duration; None unless it meets its stages and the vehicle can fly it.
+        """Return the judged path of one duration, or None if it misses a stage or the vehicle cannot fly it.
 
-        Of all but the first, None where no time is left.
+        All attempts but the first also return None where no time is left.
         """
         if self.recorder.attempts and out_of_time():
             return None
@@ -122,7 +122,7 @@ class _Planning:
         return judged if judged.feasible or stopped else None
 
     def _scaled(self, duration: float) -> Array:
-        """Durations of the segments [s] that make up one duration [s]."""
+        """Return the durations of the segments [s] for a total duration [s]."""
         durations = self.durations.copy()
         if self.scaling is TimeScaling.ALL:
             return np.asarray(durations * (duration / durations.sum()))
@@ -134,7 +134,7 @@ class _Planning:
         return durations
 
     def why_infeasible(self) -> Reason:
-        """One sentence, from the slowest attempt, and the fastest that rotors can fly, or nearly can."""
+        """Return a sentence from the slowest attempt and the one that rotors can most nearly fly."""
         attempts = self.recorder.attempts
         longest = max(attempts, key=lambda attempt: attempt.duration)
         shortest = min(attempt.duration for attempt in attempts)
@@ -153,7 +153,7 @@ class _Planning:
         return Reason(sentence, limits_of(longest.outcome))
 
     def result(self, found: Judged[None]) -> Plan:
-        """The plan of what the search settled on."""
+        """Return the plan of the path that the search found."""
         return found.plan(
             self.recorder,
             planner="min-snap",
@@ -164,9 +164,9 @@ class _Planning:
         )
 
     def _closed_form(self, duration: float) -> Solution[None]:
-        """The path of one duration; a failure where it misses a stage or samples refute it.
+        """Return the path of one duration, with a failure if it misses a stage or samples exceed limits.
 
-        Speeds at least as high as asked are left free where they come out so, and held at that elsewhere.
+        Lower bounds on speed are first left free. If a stage is missed then, speeds are fixed at the bounds.
         """
         started = perf_counter()
         task, durations, margin = self.task, self._scaled(duration), None
@@ -195,10 +195,10 @@ class _Planning:
         )
 
     def _trajectory(self, task: Task, durations: Array) -> Trajectory:
-        """The closed form through stages whose drag at the stages is that of its own velocities there.
+        """Return the closed form through stages with drag consistent with its own velocities there.
 
-        Those are an affine function of the velocities of which the drag is taken, v ↦ M v + c, found column
-        by column; what is wanted is v = M v + c.
+        Velocities at the stages are an affine function v ↦ M v + c of the velocities used for drag. M is
+        found column by column, then v = M v + c is solved.
         """
         stages, heading = len(task.stages.stages), task.problem.heading.start
 

@@ -1,4 +1,4 @@
-"""Paths to begin a refinement at: closed forms through a course, or the plans of other planners."""
+"""Starts of refinements: closed forms through a course, or the plans of other planners."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
 
-ORDERS = (4, 3)  # of closed forms that courses begin at: minimum snap, minimum jerk,
-SLOWER_PACES = (1.3, 1.7)  # times their durations, where those lead nowhere or touch a frame
+ORDERS = (4, 3)  # orders of the closed forms that start courses: minimum snap, minimum jerk
+SLOWER_PACES = (1.3, 1.7)  # factors on their durations where faster starts fail or paths touch a frame
 
 
 def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
     """Yield paths through a task's stages, the likeliest first, each with its plan if it is one.
 
     Args:
-        task: What is planned.
-        guess: The mixed-integer planner, asked for the vehicle, then for none; courses ask it last, if it
-            has as many intervals as they need.
+        task: The task that is planned.
+        guess: The mixed-integer planner, which plans for the vehicle, then for none. Courses use it last, if
+            it has more intervals than they have stages.
 
     Raises:
         Infeasible: A stage asks more thrust than the vehicle has.
@@ -44,7 +44,7 @@ def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
         try:
             plan = planner.plan(problem, task.vehicle_if_any)
         except Infeasible as infeasible:
-            if not infeasible.attempts and not out_of_time():  # at once: whatever the planner
+            if not infeasible.attempts and not out_of_time():  # refused without attempts: no planner can help
                 raise
             continue
         yield plan, WarmStart.of(plan, task.stages)
@@ -53,9 +53,10 @@ def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
 
 
 def _without_rotors(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
-    """Yield the path of a program that knows no rotors.
+    """Yield the path of a program without a vehicle.
 
-    Where few intervals lead to none, those of more come, up to the first that the vehicle can fly.
+    Where the default number of intervals gives no path, more intervals are tried, up to the first path that
+    the vehicle can fly, too.
     """
     problem = task.problem
     try:
@@ -76,7 +77,7 @@ def _without_rotors(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, Warm
 
 
 def closed_forms(task: Task, paces: Sequence[float] = (1.0,)) -> Iterator[tuple[None, WarmStart]]:
-    """Yield closed forms through a course at some paces, times their durations; no plan is one of them."""
+    """Yield closed forms through a course with their durations scaled by each of `paces`; none is a plan."""
     begun = flying_lap if task.stages.closed else start_along_normals
     for pace, order in product(paces, ORDERS):
         yield None, begun(task, order).time_scaled(pace)
