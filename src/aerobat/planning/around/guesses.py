@@ -93,7 +93,7 @@ def _room_in_holes(task: Task) -> float:
 
 
 def _hurried(task: Task, corners: Array) -> float:
-    """Return the expected duration [s] along corners (k, 3): rest to rest by thrust, or at the speed limit."""
+    """Return the expected duration [s] along corners (k, 3): rest to rest by thrust, or at the top speed."""
     _, greatest = task.problem.path_limits.of(1)
     way = np.diff(corners, axis=0)
     length = float(np.linalg.norm(way, axis=1).sum())

@@ -1,1 +1,1 @@
-"""The judgement of a plan: against what is possible, and against the room and the rates that are usual."""
+"""The assessment of a plan: against a lower bound on durations, and against usual room and rates."""

@@ -1,4 +1,4 @@
-"""A path beside what is possible: what its polynomials, its certificate and the lower bound say."""
+"""Assessment of a path, from its polynomials, its certificate and the lower bound on its duration."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from aerobat.trajectory import Trajectory
 
 
 def assessment(task: Task, trajectory: Trajectory, certificate: Certificate) -> Assessment:
-    """Assess a path by its task and its certificate."""
+    """Return the assessment of a path by its task and its certificate."""
     lowest, highest = trajectory.component_range(0)
     return Assessment(
         duration=trajectory.duration,
@@ -34,7 +34,7 @@ def assessment(task: Task, trajectory: Trajectory, certificate: Certificate) -> 
 
 
 def _asked(task: Task) -> PositionRange:
-    """The box of start, goal, gates, and of what stages ask of positions along the world's axes."""
+    """Return the bounding box of start, goal, gates and stages' positions along the world's axes."""
     problem = task.problem
     places = [end.position for end in problem.ends.values()] + [gate.position for gate in problem.gates]
     points = np.reshape(places, (-1, 3))
@@ -52,7 +52,7 @@ def _asked(task: Task) -> PositionRange:
 
 
 def _largest(certificate: Certificate, quantity: str) -> float | None:
-    """The largest value of a quantity along the path."""
+    """Return the largest value of a quantity along the path; None where the certificate has none."""
     asked = (
         f.value for f in certificate.findings if (f.quantity, f.side, f.place) == (quantity, Side.MAX, None)
     )

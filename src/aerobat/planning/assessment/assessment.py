@@ -1,15 +1,17 @@
-"""The assessment of a plan beside its proof: its duration against the shortest possible, and its room."""
+"""The assessment of a plan beside its proof: its duration against a lower bound, and its room."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import degrees, dist, inf, radians
 
-POOR = 1.4  # times a duration that is possible: a plan that takes longer is poor
-SUSPICIOUS = 2.0  # times the lower bound, which falls short of what is possible by up to so much
-DIVE = 1.0  # [m] below all that is asked for, the height at which indoor flights often start
-ASTRAY = 5.0  # [m] beyond all that is asked for, and beyond its size again: no flip needs so much room
-GYRO_RANGE = radians(2000.0)  # [rad/s] of common gyroscopes
+POOR = 1.4  # ratio to another plan's duration above which a plan is poor
+SUSPICIOUS = 2.0  # ratio to the lower bound above which a plan is suspicious: optima reach up to this ratio
+DIVE = 1.0  # depth [m] below start, goal, gates and stages that is warned of: a common start height indoors
+# distance [m] beyond the box of start, goal, gates and stages, plus the box's own size, above which a path
+# goes astray: no flip needs so much room
+ASTRAY = 5.0
+GYRO_RANGE = radians(2000.0)  # measuring range of common gyroscopes [rad/s]
 
 Point = tuple[float, float, float]
 
@@ -23,7 +25,7 @@ class PositionRange:
 
     @property
     def size(self) -> float:
-        """The length of its diagonal [m]."""
+        """The length of the box's diagonal [m]."""
         return dist(self.lower, self.upper)
 
     def excess(self, other: PositionRange) -> float:
@@ -37,16 +39,16 @@ class PositionRange:
         spans = (
             f"{axis} {round(low, 2) + 0.0:.2f} to {round(high, 2) + 0.0:.2f}" for axis, low, high in ends
         )
-        return ", ".join(spans) + " m"  # what is zero but for rounding reads as zero
+        return ", ".join(spans) + " m"  # adding 0.0 turns a rounded −0 into 0
 
 
 @dataclass(frozen=True)
 class SecondOpinion:
     """Another planner's answer to the same problem, made where a plan is suspicious."""
 
-    options: str  # of the command line, by which it is planned
-    duration: float | None  # [s] of a plan that is certified and flies; None: none was found
-    missing: str = ""  # why it could not be asked for
+    options: str  # command-line options that give the other plan
+    duration: float | None  # [s] of a shorter plan that is certified and flies; None: none was found
+    missing: str = ""  # why there is no answer; empty otherwise
 
 
 @dataclass(frozen=True)
@@ -54,17 +56,17 @@ class Assessment:
     """A plan beside what is possible, and beside the room and the rates that are usual."""
 
     duration: float  # [s] of the plan
-    least_duration: float  # [s] that no motion of the vehicle that solves the problem falls short of
-    room: PositionRange  # that the path stays in
-    asked: PositionRange  # of start, goal, gates and wherever stages ask to be
+    least_duration: float  # [s] lower bound on the duration of any motion of the vehicle
+    room: PositionRange  # bounding box of the path
+    asked: PositionRange  # bounding box of start, goal, gates and positions of stages
     max_speed: float  # [m/s]
     max_tilt: float | None  # [rad]; None where no attitude is determined
-    max_body_rate: float | None  # [rad/s]; None likewise
-    ground: float | None = None  # [m] of the environment, which the certificate is about
-    rate_limit: float = inf  # [rad/s] of the vehicle, likewise
-    obstructed: bool = False  # by obstacles, of which the lower bound knows nothing
-    extra_turns: int = 0  # upside down, beyond those that stages ask
-    opinion: SecondOpinion | None = None  # where there is one
+    max_body_rate: float | None  # [rad/s]; None where no attitude is determined
+    ground: float | None = None  # [m] height of the environment's ground
+    rate_limit: float = inf  # [rad/s] the vehicle's limit on body rate
+    obstructed: bool = False  # whether there are obstacles, which the lower bound ignores
+    extra_turns: int = 0  # number of turns upside down that no stage asks
+    opinion: SecondOpinion | None = None  # None where no other planner was asked
 
     @property
     def lowest(self) -> float:
@@ -73,7 +75,7 @@ class Assessment:
 
     @property
     def dive(self) -> float:
-        """The depth of the lowest point below all that is asked for [m]."""
+        """The depth of the lowest point below start, goal, gates and stages [m]."""
         return max(self.asked.lower[2] - self.lowest, 0.0)
 
     @property
@@ -83,23 +85,23 @@ class Assessment:
 
     @property
     def goes_astray(self) -> bool:
-        """True if the path leaves what is asked for by more than its size, and some metres."""
+        """True if the path leaves the box of start, goal, gates and stages by its size and ASTRAY more."""
         return self.room.excess(self.asked) > ASTRAY + self.asked.size
 
     @property
     def suspicious(self) -> bool:
-        """True if the duration is so much above the lower bound that only another plan tells what it is."""
+        """True if the duration is so far above the lower bound that only another plan can judge it."""
         return self.ratio > SUSPICIOUS and not self.obstructed
 
     @property
     def poor(self) -> bool:
-        """True if a second opinion is so much shorter."""
+        """True if the duration is more than POOR times that of the second opinion."""
         known = None if self.opinion is None else self.opinion.duration
         return known is not None and self.duration > POOR * known
 
     @property
     def sentence(self) -> str:
-        """The duration against the shortest possible, in a sentence without its full stop."""
+        """A sentence, without its full stop, that compares the duration with the shortest possible."""
         at_most = "how near to the shortest possible is not known"
         if self.ratio < inf:
             least = f"{self.least_duration:.3f} s or more"
@@ -120,7 +122,7 @@ class Assessment:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings to a person who is about to fly the plan, each a sentence without its full stop."""
+        """The warnings to a person who is about to fly the plan, each a sentence without its full stop."""
         found = [self.sentence] if self.poor else []
         if self.goes_astray:
             found.append(
@@ -146,5 +148,5 @@ class Assessment:
         return tuple(found)
 
     def __str__(self) -> str:
-        """All of it in one sentence without its full stop."""
+        """The assessment in one sentence without its full stop."""
         return "; ".join([*self.warnings] if self.poor else [self.sentence, *self.warnings])

@@ -1,8 +1,8 @@
-"""Contradictions that no motion resolves, proven in milliseconds: what a stage asks beside the limits.
+"""Infeasibility proofs in milliseconds: stages whose conditions and the limits exclude each other.
 
-Where a stage is and how fast is linear; so are the limits per axis, which hold there too. Of attitudes the
-tilt counts. What the vehicle's rotors give does not: without a contradiction a problem may have no plan all
-the same.
+Conditions on position, velocity and acceleration are linear, as are the limits per axis, so that a linear
+program decides. Of attitudes only the tilt is tested. Rotor limits are ignored: a problem without a
+contradiction may still have no plan.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.vehicle import Vehicle
 
-KNOWN = 3  # derivatives of position that stages speak of: itself, velocity, acceleration
-ROUNDING = 1e-9  # [rad]
+KNOWN = 3  # number of derivatives that stages constrain: position, velocity, acceleration
+ROUNDING = 1e-9  # excess of tilt that is rounding [rad]
 LINEAR = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 
 
 @dataclass(frozen=True)
 class Contradiction:
-    """A stage whose conditions and the limits exclude each other, at whatever time it holds."""
+    """A stage whose conditions and the limits exclude each other at any time."""
 
     stage: str
-    limits: tuple[str, ...]  # the fields of the problem each of which, alone, would have to give way
+    limits: tuple[str, ...]  # fields of the problem; removing any one of them resolves the contradiction
     sentence: str
 
 
 def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
-    """The first stage's whose position, velocity, acceleration or tilt no instant within the limits can have.
+    """Return the contradiction of the first stage that has one, or None, which proves nothing.
 
-    None where there is no such stage, which proves nothing. Raises SpecError for gates that do not suit the
-    maneuver.
+    A contradiction means that no instant within the limits has the position, velocity, acceleration and tilt
+    that the stage asks. Raises SpecError for gates that do not suit the maneuver.
     """
     balance = force_balance(problem.environment, vehicle)
     for stage in problem.stages(vehicle.max_specific_thrust, vehicle.body_radius).stages:
@@ -56,13 +56,13 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
 
 
 def _least_tilt(stage: Stage) -> float:
-    """The least angle between the vertical and a thrust axis as a stage asks it [rad]."""
+    """Return the least tilt that a stage's attitude allows [rad]."""
     asked = stage.attitude
     return 0.0 if asked is None else float(np.arccos(np.clip(asked.up[2], -1.0, 1.0))) - asked.tolerance
 
 
 def _linear(stage: Stage) -> list[Condition]:
-    """The conditions of a stage that speak of no thrust, and of its ball the cube about it."""
+    """Return a stage's conditions without those on thrust; its ball is replaced by the cube around it."""
     others = (c for c in stage.conditions if c.quantity is not Quantity.POSITION)
     return [c for c in (*stage.where, *others) if c.quantity in LINEAR]
 
@@ -84,7 +84,7 @@ def _contradiction(stage: Stage, asked: list[LinearBound], limits: Limits) -> Co
 
 
 def is_possible(asked: list[LinearBound], limits: Limits) -> bool:
-    """Return False where no position, velocity and acceleration within the limits are as they are asked."""
+    """Return False where no position, velocity and acceleration within the limits satisfy the bounds."""
     boxes = [limits.of(derivative) for derivative in range(KNOWN)]
     lower, upper = (np.concatenate([box[side] for box in boxes]) for side in (0, 1))
     bounded = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))

@@ -1,8 +1,9 @@
 """A lower bound on the duration of any motion that solves a problem, by physics alone, in milliseconds.
 
-The derivation is in docs/theory.md, section 13. Along each of a few directions a vehicle is a point of
-bounded thrust, damped by its drag, which comes to rest wherever it turns; and its thrust axis has to turn
-from the attitude of one stage to that of the next. Whatever else is left out could only take longer.
+The derivation is in docs/theory.md, section 13. Two relaxations give the bound. Along each of a few
+directions the vehicle is a point with bounded thrust and linear drag, which comes to rest wherever it
+reverses. And the thrust axis has to turn from each stage's attitude to the next one's. Everything that the
+relaxations leave out could only take longer.
 """
 
 from __future__ import annotations
@@ -26,21 +27,21 @@ from aerobat.problem.stage import Stage, StageSequence
 from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
 
-PARALLEL = 1e-9  # [-] how near to 1 the cosine between two directions is that are one
-AT_ONCE = 1e9  # [m/s²] by which a point stops that need not: who is passed however fast
-MANY_ROTORS = 12  # whose moments are bounded axis by axis: the vertices of all would be too many
-HALVINGS = 3  # of the interval of durations by which speeds are bounded
+PARALLEL = 1e-9  # distance from 1 of the cosine between two directions that count as one [-]
+AT_ONCE = 1e9  # deceleration [m/s²] that stands for no need to stop, at a goal with free velocity
+MANY_ROTORS = 12  # number of rotors above which moments are bounded axis by axis: vertices are too many
+HALVINGS = 3  # bisections of the interval of durations, which bound the speed
 
 
 def least_duration(problem: Problem, vehicle: Vehicle) -> float:
-    """The time [s] that no motion of the vehicle that solves the problem can fall short of.
+    """Return a lower bound on the duration [s] of any motion of the vehicle that solves the problem.
 
     Raises SpecError for gates that do not suit the maneuver.
     """
     sequence = problem.stages(vehicle.max_specific_thrust, vehicle.body_radius)
     lines = [_Line.of(problem, vehicle, sequence, n) for n in _directions(problem, sequence)]
 
-    # [1/s] times the airspeed, what drag unequal along body x and y moves thrust by from that of their mean
+    # [1/s] half the difference of drag along body x and y, over the mass; a specific thrust per airspeed
     across = abs(float(vehicle.drag_body[0] - vehicle.drag_body[1])) / 2.0 / vehicle.mass
 
     def moving(duration: float) -> float:
@@ -56,7 +57,10 @@ def least_duration(problem: Problem, vehicle: Vehicle) -> float:
 
 
 def _least_consistent(least: Callable[[float], float], longest: float) -> float:
-    """A time T [s] that no motion falls short of, where those of duration T take `least(T)`, which falls."""
+    """Return a lower bound [s] on durations, where motions of duration T take `least(T)` or more.
+
+    The function `least` decreases with T. So the bound is below the fixed point T = least(T).
+    """
     shortest = least(longest)
     for _ in range(HALVINGS):
         middle = 0.5 * (shortest + longest)
@@ -68,10 +72,10 @@ def _least_consistent(least: Callable[[float], float], longest: float) -> float:
 
 
 def _max_airspeed(problem: Problem, vehicle: Vehicle, duration: float) -> float:
-    """The largest airspeed [m/s] within a duration, which adds to |f| where drag differs by the body's axes.
+    """Return an upper bound on the airspeed [m/s] within a duration.
 
-    Drag only ever slows, so that in the duration no more airspeed is gained than thrust and weight give. Of a
-    closed lap, whose velocity is zero on average, each component is zero somewhere, as in a start at rest.
+    Drag only slows the vehicle, so thrust and weight bound the gain of airspeed. On a closed lap the mean
+    velocity is zero. So each component is zero at some time, as at a start at rest.
     """
     environment = problem.environment
     pull = vehicle.max_specific_thrust + environment.gravity
@@ -81,7 +85,7 @@ def _max_airspeed(problem: Problem, vehicle: Vehicle, duration: float) -> float:
 
 
 def _directions(problem: Problem, sequence: StageSequence) -> Iterator[Array]:
-    """The axes, those of conditions on the position, and those between points that are met."""
+    """Yield the directions: the axes, those of conditions on position, and those between points to meet."""
     found = [*np.eye(3)]
     found += [c.direction for s in sequence.stages for c in s.conditions if c.quantity is Quantity.POSITION]
     balls = (stage.ball.centre for stage in sequence.stages if stage.ball is not None)
@@ -97,13 +101,13 @@ def _directions(problem: Problem, sequence: StageSequence) -> Iterator[Array]:
 
 
 def _along(vector: Array, direction: Array) -> float:
-    """The factor by which a vector is a multiple of a unit vector; 0 where it is none."""
+    """Return the factor by which a vector is a multiple of a unit vector; 0 where they are not parallel."""
     factor = float(vector @ direction)
     return factor if abs(factor) >= (1.0 - PARALLEL) * float(np.linalg.norm(vector)) else 0.0
 
 
 class _Turn(Enum):
-    """The manner in which a line is met at a place."""
+    """The relation of a motion along a line to a position that a stage asks."""
 
     ABOVE = "at or beyond it"
     BELOW = "at or short of it"
@@ -112,36 +116,36 @@ class _Turn(Enum):
 
 @dataclass(frozen=True)
 class _Place:
-    """A place on a line that is met in its turn; what lies above or below it turns there, so is at rest."""
+    """A position on a line that is met in its order; ABOVE and BELOW are reversals at zero speed."""
 
     turn: _Turn
     position: float  # [m]
     velocity: float = 0.0  # [m/s]
-    is_passed: bool = False  # in the end, however fast
+    is_passed: bool = False  # whether the velocity there is free, as at a goal with free velocity
 
     @classmethod
     def of_end(cls, end: EndState, direction: Array) -> _Place:
-        """Return the place where a motion begins or ends."""
+        """Return the position at which a motion begins or ends."""
         position, velocity = (float(vector @ direction) for vector in (end.position, end.velocity))
         return cls(_Turn.AT, position, velocity, end.free_velocity)
 
 
 @dataclass(frozen=True)
 class _Line:
-    """A problem seen along one direction."""
+    """The relaxation of a problem along one direction."""
 
-    groups: tuple[tuple[_Place, ...], ...]  # start, what each stage asks, goal; of a lap the stages
+    groups: tuple[tuple[_Place, ...], ...]  # positions of start, each stage and goal; of a lap the stages'
     ordered: bool
     closed: bool
-    lower: float  # [m/s²] of the thrust along it that is allowed throughout
-    upper: float  # [m/s²]
-    constant: float  # [m/s²] of the thrust along it, what does not accelerate
-    damping: float  # [1/s]
-    max_speed: float  # [m/s]
+    lower: float  # [m/s²] lower bound of the specific thrust along the direction, all along the path
+    upper: float  # [m/s²] its upper bound
+    constant: float  # [m/s²] part of the specific thrust that balances weight and wind
+    damping: float  # [1/s] drag over mass
+    max_speed: float  # [m/s] along the direction, from the limits on velocity
 
     @classmethod
     def of(cls, problem: Problem, vehicle: Vehicle, sequence: StageSequence, direction: Array) -> _Line:
-        """A problem's line of a direction, (3,)."""
+        """Return a problem's line along a direction, (3,)."""
         balance = force_balance(problem.environment, vehicle)
         lower, upper = _range(Quantity.SPECIFIC_THRUST, sequence.path_constraints, direction)
         crossed = np.flatnonzero(direction)
@@ -160,11 +164,13 @@ class _Line:
         )
 
     def least_time(self, max_thrust: float, slack: float) -> float:
-        """The longest of the least times [s] by way of places that have to be met one after another.
+        """Return the largest lower bound [s] over sequences of positions that have to be met in order.
 
-        Bounds on the thrust that hold throughout give way by `slack` [m/s²].
+        Unordered stages are taken one at a time. Closed laps are taken from each position back to itself.
 
-        Of stages in no order only one at a time counts; of a closed lap every way from a place back to it.
+        Args:
+            max_thrust: The largest specific thrust [m/s²].
+            slack: By how much the bounds on specific thrust along the path are relaxed [m/s²].
         """
         forward = min(max_thrust, self.upper + slack) - self.constant
         backward = min(max_thrust, slack - self.lower) + self.constant
@@ -173,7 +179,7 @@ class _Line:
         return max((_longest(course, up, down) for course in self._courses()), default=0.0)
 
     def _courses(self) -> Iterator[Sequence[tuple[_Place, ...]]]:
-        """Groups of places that are met one after another, one of each, from the first to the last."""
+        """Yield sequences of groups; a motion meets the positions of all groups, group after group."""
         if self.closed:
             for i, group in enumerate(self.groups):
                 for place in group:
@@ -187,7 +193,10 @@ class _Line:
 
 
 def _longest(groups: Sequence[Sequence[_Place]], up: DampedPoint, down: DampedPoint) -> float:
-    """The longest time [s] from the first place to the last by way of any of those between."""
+    """Return the largest lower bound [s] from the first group to the last, by way of positions between.
+
+    Groups between may be skipped. This is the longest path through the groups, by dynamic programming.
+    """
     longest = dict.fromkeys(groups[0], 0.0)
     for group in groups[1:]:
         reached = {
@@ -199,7 +208,7 @@ def _longest(groups: Sequence[Sequence[_Place]], up: DampedPoint, down: DampedPo
 
 
 def _leg(a: _Place, b: _Place, up: DampedPoint, down: DampedPoint) -> float:
-    """The least time [s] from one place to another; -inf where the second does not ask to go on to it."""
+    """Return the least time [s] from one position to another; -inf where they do not require that motion."""
     distance = b.position - a.position
     if b.is_passed:
         up, down = replace(up, backward=AT_ONCE), replace(down, backward=AT_ONCE)
@@ -213,7 +222,7 @@ def _leg(a: _Place, b: _Place, up: DampedPoint, down: DampedPoint) -> float:
 
 
 def _places(stage: Stage, direction: Array) -> tuple[_Place, ...]:
-    """The places along a direction that a stage asks to be met, of a ball its ends."""
+    """Return the positions along a direction that a stage asks to be met; of a ball its two ends."""
     lower, upper = _range(Quantity.POSITION, stage.conditions, direction)
     slow, fast = _range(Quantity.VELOCITY, stage.conditions, direction)
     if stage.ball is not None:
@@ -226,7 +235,7 @@ def _places(stage: Stage, direction: Array) -> tuple[_Place, ...]:
 
 
 def _range(quantity: Quantity, conditions: Sequence[Condition], direction: Array) -> tuple[float, float]:
-    """The bounds that conditions put on a quantity along a direction."""
+    """Return the bounds that conditions set on a quantity along a direction."""
     lower, upper = -inf, inf
     asked = [c for c in conditions if c.quantity is quantity]
     for condition in asked:
@@ -243,7 +252,7 @@ def _range(quantity: Quantity, conditions: Sequence[Condition], direction: Array
 
 
 def _turning_time(problem: Problem, vehicle: Vehicle, sequence: StageSequence) -> float:
-    """The least time [s] in which the thrust axis passes the attitudes that stages ask, one after another."""
+    """Return the least time [s] in which the thrust axis passes the stages' attitudes one after another."""
     attitudes = [stage.attitude for stage in sequence.stages if stage.attitude is not None]
     cones = [_Cone(attitude.up, attitude.tolerance) for attitude in attitudes]
     balance = force_balance(problem.environment, vehicle)
@@ -261,7 +270,7 @@ def _turning_time(problem: Problem, vehicle: Vehicle, sequence: StageSequence) -
 
 @dataclass(frozen=True, eq=False)
 class _Cone:
-    """Directions of the thrust, and at an end of the motion the rate at which it turns there."""
+    """A cone of thrust directions; at an end of the motion, with the rate at which the thrust turns there."""
 
     axis: Array  # a unit vector, (3,)
     half_angle: float = 0.0  # [rad]
@@ -269,7 +278,7 @@ class _Cone:
 
     @classmethod
     def of(cls, end: EndState, balance: ForceBalance) -> _Cone:
-        """The direction at an end, where jerk is zero and only drag may turn the thrust."""
+        """Return the direction at an end; jerk is zero there, so only drag may turn the thrust."""
         thrust = balance.specific_thrust(end.velocity, end.acceleration)
         norm = float(np.linalg.norm(thrust))
         if norm == 0.0 or end.leaves_attitude_free:
@@ -278,13 +287,13 @@ class _Cone:
         return cls(thrust / norm, rate=rate)
 
     def angle(self, other: _Cone) -> float:
-        """The least angle [rad] from a direction in one to a direction in the other."""
+        """Return the least angle [rad] between directions in the two cones."""
         apart = float(np.arccos(np.clip(self.axis @ other.axis, -1.0, 1.0)))
         return max(apart - self.half_angle - other.half_angle, 0.0)
 
 
 def _turn(vehicle: Vehicle, end: _Cone, cone: _Cone) -> float:
-    """The least time [s] from an end of the motion to an attitude, or back, whatever the rate there."""
+    """Return the least time [s] from an end of the motion to an attitude, or back; the rate there is free."""
     angle, acceleration, limit = end.angle(cone), max_angular_acceleration(vehicle), vehicle.max_body_rate
     if acceleration == inf or end.rate >= limit:
         return angle / limit
@@ -295,9 +304,9 @@ def _turn(vehicle: Vehicle, end: _Cone, cone: _Cone) -> float:
 
 
 def max_angular_acceleration(vehicle: Vehicle) -> float:
-    """A bound [rad/s²] on the angular acceleration about axes across the thrust, of a body without spin.
+    """Return an upper bound [rad/s²] on the angular acceleration about axes across the thrust, without spin.
 
-    Infinite where products of inertia with the thrust axis tie it to the rate.
+    The bound is infinite where products of inertia with the thrust axis couple it to the body rate.
     """
     inertia = vehicle.inertia
     if inertia[2, :2].any():

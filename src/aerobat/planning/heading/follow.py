@@ -1,8 +1,8 @@
-"""The yaw that follows a heading as closely as the rotors allow, beside a path that stays as it is.
+"""The yaw that follows a heading as closely as the rotors allow, along a path that stays unchanged.
 
-The yaw is a spline. It minimizes the squared distance from what is asked, weighed by how much that is asked,
-beside a little of its third derivative, within all limits along the path. The programs are quadratic, one
-after another, each about the last yaw; one of the yaws that they begin at keeps all limits: no turn at all.
+The yaw is a spline. It minimizes the weighted squared error from the required heading, plus a small weight on
+the squared third derivative, within all limits along the path. The method is sequential quadratic programming
+from several starts. One of the starts, no turn at all, satisfies all limits.
 """
 
 from __future__ import annotations
@@ -24,34 +24,35 @@ from aerobat.planning.task import Task
 from aerobat.problem.heading import Heading, HeadingMode
 from aerobat.states import FlatState
 
-SHARE = 0.5  # of the reserve that the path keeps for the controller, which turning leaves to it
-# of each part, where limits are looked at: off its knots, and closer beside them, where limits are steep
+SHARE = 0.5  # fraction of the path's reserve that stays for the controller; turning may use the rest
+# fractions of each part at which limits are evaluated: not at its knots, and denser near them, where limits
+# change fast
 PLACES = 0.5 - 0.5 * np.cos(np.pi * np.array([0.006, *np.arange(1, 8) / 8, 0.994]))
-SPANS = np.diff(0.5 * (PLACES[1:] + PLACES[:-1]), prepend=0.0, append=1.0)  # of it, which these stand for
-SMOOTH = 1e-6  # [s⁶] of the third derivative's square: what is asked faster than some 10 rad/s is rounded
-ASKED = 0.3  # [-] of full weight from which on what is asked counts
-AT_ITS_END = 0.5  # of its size, how near to its end a limit may be to matter to a step
-SLACK = 1e-3  # of its size, by which a sampled limit may be exceeded
-REACH, LEAST_REACH = 0.6, 2e-3  # [rad] of a step at first, and of the last
-ROUNDS = 60
-SMOOTHER = (1.0, 30.0, 1000.0)  # times as smooth as need be, where a search begins
-PART = 0.4  # of the smoother ones of these turns, where it begins too: whole ones may be too far off limits
-RESTORED = 0.5  # of what is exceeded, that a step takes away
-ENOUGH = 1e-4  # of the cost, that a step has to gain
-# what is kept more of limits' sizes, and how much of the turn is left, where a certificate refutes samples
+SPANS = np.diff(0.5 * (PLACES[1:] + PLACES[:-1]), prepend=0.0, append=1.0)  # quadrature weights of PLACES
+SMOOTH = 1e-6  # weight [s⁶] of the squared third derivative: smooths required turns above about 10 rad/s
+ASKED = 0.3  # weight of the required heading below which it is ignored; the full weight is 1
+AT_ITS_END = 0.5  # distance from a limit, relative to its size, within which a step takes it into account
+SLACK = 1e-3  # constraint violation at samples that counts as none, relative to the limit's size
+REACH, LEAST_REACH = 0.6, 2e-3  # largest yaw change of the first step, and the one at which steps end [rad]
+ROUNDS = 60  # largest number of steps
+SMOOTHER = (1.0, 30.0, 1000.0)  # factors on SMOOTH of the unconstrained optima at which searches start
+PART = 0.4  # scale of the smoother optima, which are starts too: the whole turns may violate limits by far
+RESTORED = 0.5  # fraction of a constraint violation that one step removes
+ENOUGH = 1e-4  # relative decrease of the cost below which steps end
+# (additional reserve as a fraction of limits' sizes, factor on the turn), tried in turn until certified
 WHOLE = tuple((more, 1.0) for more in (0.0, 0.005, 0.01, 0.02, 0.04, 0.08))
 TRIES = (*WHOLE, (0.08, 0.6), (0.08, 0.3), (0.08, 0.0))
 
 
 def with_heading(plan: Plan, reserve: float) -> Plan:
-    """Return a plan whose body follows its problem's heading; itself where that is free.
+    """Return a plan whose body follows its problem's heading; plans with a free heading are unchanged.
 
-    The first turn is taken that leaves the rotors SHARE of the reserve, else the first that is certified.
+    The first of TRIES that leaves the rotors SHARE of the reserve is taken, else the first that is certified.
     Raises Infeasible where the heading's tolerance is not kept.
 
     Args:
-        plan: Of a path alone.
-        reserve: That the path keeps of its limits.
+        plan: A plan without yaw.
+        reserve: The reserve that the plan keeps, as a fraction of its limits.
     """
     heading = plan.problem.heading
     if heading.mode is HeadingMode.FREE or plan.vehicle is None:
@@ -84,15 +85,15 @@ def with_heading(plan: Plan, reserve: float) -> Plan:
 
 @dataclass(frozen=True)
 class HeadingError:
-    """The distance of a plan's heading from what is asked, where that is asked."""
+    """The error of a plan's heading, over the times at which a heading is required."""
 
     largest: float  # [rad]
-    time: float  # [s] of that
+    time: float  # [s] of the largest error
     median: float  # [rad]
 
 
 def heading_error(plan: Plan) -> HeadingError | None:
-    """The distance of a plan's heading from what its problem asks; None where that is free or never asked."""
+    """Return the error of a plan's heading; None where the heading is free or never determined."""
     heading = plan.problem.heading
     if heading.mode is HeadingMode.FREE or plan.vehicle is None:
         return None
@@ -107,7 +108,7 @@ def heading_error(plan: Plan) -> HeadingError | None:
 
 
 def _turned(plan: Plan, spline: YawSpline, variables: Array) -> Plan:
-    """The plan with a yaw, whose knots are the path's too."""
+    """Return the plan with a yaw; the path gets the yaw's knots, too."""
     parts, is_cut = spline.last_parts, len(spline.seconds) > plan.trajectory.segments
     stages = tuple(replace(stage, interval=int(parts[stage.interval])) for stage in plan.stages)
     dt = None if is_cut else plan.dt
@@ -115,7 +116,7 @@ def _turned(plan: Plan, spline: YawSpline, variables: Array) -> Plan:
 
 
 def _asked(heading: Heading, limits: YawLimits) -> tuple[Array, Array]:
-    """The angle [rad] from the body's x axis to what is asked, about the thrust, and its weight, (m,)."""
+    """Return the angle [rad] about the thrust from body x to the required heading and its weight, (m,)."""
     setpoint, duration = limits.carried, limits.path.duration
     axes = so3.axes(setpoint.q_world_body)
     flat: FlatState = setpoint.flat
@@ -126,26 +127,26 @@ def _asked(heading: Heading, limits: YawLimits) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class _YawProgram:
-    """The quadratic programs that find a yaw, in the variables that the ends of the path leave free."""
+    """Sequential quadratic programming for the yaw, in the variables that the ends of the path leave free."""
 
     task: Task
     heading: Heading
     spline: YawSpline
 
     def best(self, left: float) -> Array:
-        """All variables of the best yaw that is found, of whose turns a part is left."""
+        """Return all variables of the best yaw that is found, with its free variables scaled by `left`."""
         free, added = self._ends
         found = [self._improved(start) for start in self._starts()]
         return np.asarray(free @ min(found, key=self._rank) * left + added)
 
     @cached_property
     def _limits(self) -> YawLimits:
-        """Limits at the places of the spline."""
+        """The limits at the places of all parts."""
         return YawLimits(self.task, self.spline.cut_path, self.spline.times(PLACES))
 
     @cached_property
     def _target(self) -> tuple[Array, Array]:
-        """The yaw that is asked [rad], without jumps, and how much it is, (m,) each."""
+        """The required yaw [rad], without jumps of 2π, and its weight, (m,) each."""
         angle, weight = _asked(self.heading, self._limits)
         known = np.flatnonzero(weight >= ASKED)
         if not len(known):
@@ -156,10 +157,10 @@ class _YawProgram:
 
     @cached_property
     def _ends(self) -> tuple[Array, Array]:
-        """From the free variables (v,) to all of them: a matrix (n, v), and what is added, (n,)."""
+        """The affine map from the free variables (v,) to all variables: matrix (n, v) and offset (n,)."""
         count = PER_KNOT * (len(self.spline.seconds) + 1)
         every, added = np.eye(count), np.zeros(count)
-        if not self.task.stages.closed:  # it begins as the heading starts, and ends still
+        if not self.task.stages.closed:  # fixed: yaw and rates zero at the start, rates zero at the end
             return every[:, PER_KNOT : count - PER_KNOT + 1], added
         path = self.spline.cut_path
         first, last = YawLimits(self.task, path, np.array([0.0, path.duration])).carried.q_world_body
@@ -172,30 +173,30 @@ class _YawProgram:
 
     @cached_property
     def _rows(self) -> list[Array]:
-        """The yaw and its derivatives at the places by the free variables, (m, v) each."""
+        """The matrices from the free variables to the yaw and its derivatives at the places, (m, v) each."""
         return [self.spline.rows(PLACES, k) @ self._ends[0] for k in range(ORDERS)]
 
     @cached_property
     def _fixed(self) -> Array:
-        """The part of them that is fixed, (4, m)."""
+        """The offsets of the yaw and its derivatives at the places, (4, m)."""
         return np.array([self.spline.rows(PLACES, k) @ self._ends[1] for k in range(ORDERS)])
 
     @cached_property
     def _pull(self) -> Array:
-        """The weights of squared distances from what is asked [s], (m,)."""
+        """The weights of the squared heading errors [s], (m,)."""
         return np.asarray(self._target[1] ** 2 * self._seconds)
 
     @cached_property
     def _seconds(self) -> Array:
-        """The time that each place stands for [s], (m,)."""
+        """The quadrature weight of each place [s], (m,)."""
         return np.outer(self.spline.seconds, SPANS).ravel()
 
     def _yaw(self, x: Array) -> Array:
-        """The yaw and its derivatives, (4, m)."""
+        """Return the yaw and its derivatives at the places, (4, m)."""
         return np.array([each @ x for each in self._rows]) + self._fixed
 
     def _slopes(self, yaw: Array, smooth: float = SMOOTH) -> tuple[Array, Array]:
-        """The cost's gradient (v,) and Hessian (v, v)."""
+        """Return the cost's gradient (v,) and Hessian (v, v)."""
         bend, (value, *_, third) = smooth * self._seconds, self._rows
         hessian = (value.T * self._pull) @ value + (third.T * bend) @ third
         hessian += 1e-9 * np.trace(hessian) / len(hessian) * np.eye(len(hessian))
@@ -203,21 +204,21 @@ class _YawProgram:
         return value.T @ off + third.T @ (bend * yaw[3]), hessian
 
     def _starts(self) -> list[Array]:
-        """No turn; what would be followed without limits, the smoother the less; parts of the smoother."""
+        """Return the starts: no turn, the unconstrained optima for each smoothness, scaled smoother ones."""
         still = np.zeros(self._ends[0].shape[1])
         slopes = [self._slopes(self._yaw(still), SMOOTH * more) for more in SMOOTHER]
         whole = [np.asarray(-np.linalg.solve(hessian, gradient)) for gradient, hessian in slopes]
         return [still, *whole, *(PART * turn for turn in whole[1:])]
 
     def _rank(self, x: Array) -> tuple[float, float]:
-        """By how much limits are exceeded, slack aside, and the cost."""
+        """Return the constraint violation (SLACK at least) and the cost, which are compared in this order."""
         yaw = self._yaw(x)
         off = self._pull @ (yaw[0] - self._target[0]) ** 2
         exceeded = float(self._limits.excess(yaw).max())
         return max(exceeded, SLACK), float(off + SMOOTH * self._seconds @ yaw[3] ** 2)
 
     def _improved(self, x: Array) -> Array:
-        """A better yaw near another: first within the limits, then cheaper."""
+        """Return an improved yaw: steps reduce first the constraint violation, then the cost."""
         (free, _), limits, reach = self._ends, self._limits, REACH
         is_yaw = np.tile(np.arange(PER_KNOT) == 0, len(free) // PER_KNOT) @ free > 0.0
         rank = self._rank(x)

@@ -1,4 +1,4 @@
-"""Demands of a yaw on the vehicle at instants of a path, beside the limits that it has to keep."""
+"""Constraint values of the vehicle's limits at instants of a path, as functions of the yaw."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from aerobat.planning.task import Task
 from aerobat.states import Setpoint
 from aerobat.trajectory import Trajectory
 
-DIFFERENCE = 1e-6  # to both sides, in SI units of the yaw and its derivatives
-ORDERS = 4  # the yaw and its three derivatives, that a rotor's command knows
+DIFFERENCE = 1e-6  # step of central differences, in SI units of the yaw and its derivatives
+ORDERS = 4  # the yaw and its first three derivatives, on which rotor commands depend
 
 
 @dataclass(frozen=True, eq=False)
 class YawLimits:
-    """Limits on measures along a path without yaw, whose drag is the mean of that along body x and y."""
+    """Limits on measures along a path with a yaw; drag along body x and y is replaced by its mean."""
 
     task: Task
     path: Trajectory
@@ -32,20 +32,20 @@ class YawLimits:
 
     @cached_property
     def carried(self) -> Setpoint:
-        """The motion without yaw."""
+        """The setpoints without yaw: the body never rotates about its thrust axis."""
         task = self.task
         found = reference(self.path, task.vehicle, self.times, environment=task.environment)
         return found.setpoint
 
     def excess(self, yaw: Array) -> Array:
-        """By how much limits are exceeded, as fractions of their size, where the yaw is (4, m), (m, c).
+        """Return the constraint violations (m, c), as fractions of limits' sizes, for a yaw (4, m).
 
-        A limit that the path itself uses up beyond the reserve is the path's own value there.
+        Where the path without yaw exceeds a limit less its reserve, the path's value replaces the limit.
         """
         return np.asarray(self._values(yaw) - self._ends)
 
     def slopes(self, yaw: Array) -> Array:
-        """Derivatives of `excess` by the yaw and its derivatives, (4, m, c)."""
+        """Return the slopes of `excess` by the yaw and its derivatives, (4, m, c)."""
         found = []
         for step in DIFFERENCE * np.eye(ORDERS)[..., None]:
             found.append((self._values(yaw + step) - self._values(yaw - step)) / (2 * DIFFERENCE))
@@ -57,7 +57,7 @@ class YawLimits:
 
     @cached_property
     def _weights(self) -> Array:
-        """Weights on the measures for the upper ends of all limits, then for the lower ones, (c, 11)."""
+        """The weights on the measures for the upper ends of all limits, then for the lower ones, (c, 11)."""
         rows = [limit.quantity.measured / limit.size for limit in self._limits]
         measured = np.array(rows).reshape(-1, MEASURES)
         return np.concatenate([measured, -measured])
@@ -73,7 +73,7 @@ class YawLimits:
         return np.asarray(self._measures(yaw) @ self._weights.T)
 
     def _measures(self, yaw: Array) -> Array:
-        """The measures of `limits.quantity`, (m, 11)."""
+        """Return the measures of `limits.quantity`, (m, 11)."""
         angle, rate, acceleration, jerk = yaw
         cosine, sine = np.cos(angle), np.sin(angle)
         still, first, second = ((cosine * x + sine * y, cosine * y - sine * x) for x, y, _ in self._turning)
@@ -94,7 +94,7 @@ class YawLimits:
 
     @cached_property
     def _motion(self) -> tuple[Array, Array]:
-        """Airspeed and acceleration, (m, 2, 3), and f to f''', (m, 4, 3), all in the carried frame."""
+        """Air velocity and acceleration, (m, 2, 3), and f to f''', (m, 4, 3), in body axes without yaw."""
         v, a, j, s, c = (self.path.evaluate(self.times, k) for k in range(1, 6))
         environment, drag = self.task.environment, lateral_drag(self.task.vehicle)
         air = v - environment.wind
@@ -110,7 +110,7 @@ class YawLimits:
 
     @cached_property
     def _untouched(self) -> tuple[Array, ...]:
-        """Collective thrust and its rate, |f|, and the cosine of the tilt: no yaw changes them."""
+        """Collective thrust and its rate, |f|, and the cosine of the tilt, which do not depend on the yaw."""
         vehicle, (air, thrust) = self.task.vehicle, self._motion
         norm = np.linalg.norm(thrust[:, 0], axis=-1)
         b3 = xyz(thrust[:, 0] / norm[:, None])

@@ -1,4 +1,4 @@
-"""A yaw over time as quintics between knots, linear in its value and two derivatives at these."""
+"""A yaw over time as a quintic spline, linear in the yaw and its first two derivatives at the knots."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from aerobat.arrays import Array
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 
-KNOT_STEP = 0.2  # [s] between knots, at most: yaw is slower than tilt
-MOST = 150  # knots of a long path beside its own
-PER_KNOT = 3  # variables: the yaw, its rate, and that rate's derivative
+KNOT_STEP = 0.2  # largest time between knots [s]: yaw is slower than tilt
+MOST = 150  # number of knots at which KNOT_STEP grows for long paths
+PER_KNOT = 3  # variables of a knot: the yaw and its first two derivatives
 UNITS = np.eye(2 * PER_KNOT)
 HERMITE = polynomial.hermite(UNITS[:, :PER_KNOT, None], UNITS[:, PER_KNOT:, None])[..., 0].T  # (6, 6)
 
 
 @dataclass(frozen=True, eq=False)
 class YawSpline:
-    """The knots of a yaw, among which are those of its path."""
+    """The knots of a yaw, which include the knots of its path."""
 
     path: Trajectory
-    parts: Subintervals  # of the path's segments, in their order
+    parts: Subintervals  # parts of the path's segments, in order
 
     @classmethod
     def along(cls, path: Trajectory) -> YawSpline:
-        """Cut long segments of a path."""
+        """Return a yaw spline for a path, whose long segments are divided into parts."""
         step = max(KNOT_STEP, path.duration / MOST)
         counts = [ceil(seconds / step - 1e-9) for seconds in path.durations.tolist()]
         segment = np.repeat(np.arange(path.segments), counts)
@@ -54,17 +54,17 @@ class YawSpline:
         return np.flatnonzero(np.diff(self.parts.interval, append=-1))
 
     def with_yaw(self, variables: Array) -> Trajectory:
-        """The path with the yaw of variables at all knots, (3 (n + 1),)."""
+        """Return the path with the yaw that variables (3 (n + 1),) at all knots give."""
         path = self.cut_path
         yaw = (self._blocks @ self._own(variables))[..., 0]
         return Trajectory(path.durations, path.coefficients, path.heading, yaw)
 
     def times(self, s: Array) -> Array:
-        """Times [s] of places (k,) from 0 to 1 on each part, (n k,)."""
+        """Return the times [s], (n k,), of places (k,) from 0 to 1 on each part."""
         return np.asarray((self.cut_path.knots[:-1, None] + s * self.seconds[:, None]).ravel())
 
     def rows(self, s: Array, derivative: int) -> Array:
-        """A derivative of the yaw at these times by all variables, (n k, 3 (n + 1))."""
+        """Return the matrix (n k, 3 (n + 1)) from all variables to a derivative of the yaw at these times."""
         count, width = len(self.seconds), 2 * PER_KNOT
         powers = polynomial.differentiate(np.eye(width)[:, :, None], derivative)[:, None]
         values = polynomial.evaluate(powers, s)[..., 0].T  # (k, 6) of the coefficients
@@ -76,11 +76,11 @@ class YawSpline:
 
     @cached_property
     def _blocks(self) -> Array:
-        """From a part's own variables to its coefficients, (n, 6, 6)."""
+        """The matrices from each part's variables to its coefficients, (n, 6, 6)."""
         scale = np.tile((self.seconds[:, None] / KNOT_STEP) ** np.arange(PER_KNOT), 2)
         return np.asarray(HERMITE * scale[:, None])
 
     def _own(self, variables: Array) -> Array:
-        """The variables of each part, (n, 6, 1)."""
+        """Return the variables of each part, (n, 6, 1)."""
         knots = variables.reshape(-1, PER_KNOT)
         return np.concatenate([knots[:-1], knots[1:]], axis=1)[..., None]
