@@ -1,7 +1,7 @@
-"""Solve, certify, tighten by what was exceeded, again: the one way in which planners come to a plan.
+"""The loop of all planners: solve, certify, tighten the limits that are violated, and solve again.
 
-A planner states a program and bounds that can be tightened; what makes an answer a plan is decided here, by
-its certificate over continuous time, which therefore is always that of the trajectory it comes with.
+A planner states a program with limits that can be tightened. Whether a solution becomes a plan is decided
+here, by the certificate of its trajectory over continuous time.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ Detail = TypeVar("Detail")
 
 @dataclass(frozen=True, eq=False)
 class Solution(Generic[Detail]):
-    """Answer of a planner's program: a trajectory, or a sentence about why there is none."""
+    """The solution of a planner's program: a trajectory, or a sentence about why there is none."""
 
-    source: Detail  # whatever the planner tightens by and reads its stages from
+    source: Detail  # the planner's own data, for tightening and for the stages
     duration: float  # [s]
     trajectory: Trajectory | None
     status: str  # of the program, as in Attempt
-    nodes: int
+    nodes: int  # QPs solved, or iterations
     solve_time: float  # [s]
     cost: float | None = None
-    dt: float | None = None  # [s]
-    failure: str | None = None  # why it cannot be a plan, found without a certificate
-    margin: float | None = None  # [N] of the rotors, where samples have shown it to be negative
-    placed: tuple[PlacedStage, ...] = ()  # those that are proven at once
+    dt: float | None = None  # [s] of the intervals, where they are equal
+    failure: str | None = None  # why the solution cannot be a plan, where that needs no certificate
+    margin: float | None = None  # [N] of the rotors, where samples have shown a negative one
+    placed: tuple[PlacedStage, ...] = ()  # the stages that the certificate includes
 
 
 class Program(Protocol[Detail]):
@@ -47,7 +47,7 @@ class Program(Protocol[Detail]):
         ...
 
     def tighten(self, solution: Solution[Detail], certificate: Certificate | None) -> bool:
-        """Tighten by what a solution exceeds; False where that leads nowhere.
+        """Tighten limits by a solution's violations; return False where that leads nowhere.
 
         There is no certificate where the solution is a failure.
         """
@@ -56,11 +56,11 @@ class Program(Protocol[Detail]):
 
 @dataclass(frozen=True, eq=False)
 class Judged(Generic[Detail]):
-    """A solution and what decides about it: its own certificate, where there is a vehicle."""
+    """A solution with its verdict: feasible if its certificate, where there is a vehicle, proves it."""
 
     task: Task
     solution: Solution[Detail]
-    evidence: Evidence | None  # for the solution's path, where there is a vehicle
+    evidence: Evidence | None  # for the solution's path; None without a vehicle
     feasible: bool
 
     @property
@@ -70,15 +70,15 @@ class Judged(Generic[Detail]):
 
     @property
     def frames(self) -> tuple[Finding, ...]:
-        """The findings about the body and the frames of gates that are passed at placed stages."""
+        """The findings about the body's clearance from the frames of gates at placed stages."""
         return () if self.certificate is None else self.certificate.frames
 
     def at(self, stages: Sequence[PlacedStage]) -> Judged[Detail]:
-        """Return the same with its stages placed."""
+        """Return the judged solution with its stages placed."""
         return replace(self, evidence=None if self.evidence is None else self.evidence.at(stages))
 
     def plan(self, recorder: Recorder, **facts: Any) -> Plan:
-        """The plan of it; `facts` are the fields of Plan that the planner alone knows."""
+        """Return the solution's plan; `facts` are the fields of Plan that only the planner knows."""
         trajectory = self.solution.trajectory
         assert trajectory is not None, "a plan is made of a solution that has a trajectory"
         plan = Plan(
@@ -96,13 +96,13 @@ class Judged(Generic[Detail]):
 def certified_solve(
     program: Program[Detail], task: Task, recorder: Recorder, rounds: int = 1
 ) -> Judged[Detail]:
-    """The first solution that is certified and keeps the reserve, or the last one that was tried.
+    """Return the first solution that is certified and keeps the reserve, or the last solution tried.
 
     Args:
-        program: What is solved and tightened.
-        task: What is certified.
-        recorder: Keeps an attempt a solve.
-        rounds: Solves, at most.
+        program: The program that is solved and tightened.
+        task: The task that solutions are certified for.
+        recorder: Records one attempt a solve.
+        rounds: Largest number of solves.
     """
     for left in reversed(range(rounds)):
         judged = judge(program.solve(), task, recorder)
@@ -112,14 +112,14 @@ def certified_solve(
 
 
 def judge(solution: Solution[Detail], task: Task, recorder: Recorder, jumps: bool = False) -> Judged[Detail]:
-    """Certify a solution, its reserve included, and keep the attempt.
+    """Certify a solution, its reserve included, and record the attempt.
 
     Args:
         solution: A path, or why there is none.
-        task: What is certified; without a vehicle every path will do.
-        recorder: Keeps the attempt.
-        jumps: Whether body rates, or thrusts of rotors with lag, may jump between segments, which no moment
-            and no rotor can do, as the certificate says.
+        task: The task that is certified; without a vehicle every path is feasible.
+        recorder: Records the attempt.
+        jumps: Whether jumps of body rates, or of thrusts of rotors with lag, are allowed between segments.
+            No vehicle can follow them; the certificate still lists them.
     """
     evidence = certificate = None
     if solution.trajectory is not None and solution.failure is None and task.vehicle_if_any is not None:

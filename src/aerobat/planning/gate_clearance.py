@@ -1,6 +1,6 @@
-"""The room that a path leaves its body in gates: from the start, and more where its frames are not clear.
+"""The room for the body in gates that a path has to leave, which grows where a frame is not clear.
 
-What room in a gate is, `limits.body_in_gate` says.
+See `limits.body_in_gate` for the definition of room.
 """
 
 from __future__ import annotations
@@ -22,20 +22,22 @@ class Framed(Protocol):
 
     @property
     def frames(self) -> tuple[Finding, ...]:
-        """The findings about its body and each gate's frame."""
+        """The findings about the body's clearance from each gate's frame."""
 
 
 Found = TypeVar("Found", bound=Framed)
 
-MAX_ATTEMPTS = 4  # at a more direct path, of one plan
-BENDING = 0.4  # of the largest specific thrust: the acceleration by which a path may bend there, at first
-BENDING_IN_MANEUVER = 0.25  # likewise beside a stage that does not say where it is, as a flip's
-MORE_BENDING = 1.6  # times that, where the body is not clear of the frame
-A_LITTLE_MORE = 1.2  # the same, where it touches the frame by no more than FRAME_CLEARANCE
+MAX_ATTEMPTS = 4  # largest number of more direct paths tried for one plan
+# lateral acceleration of a path in a gate for which room is left at first, relative to the largest specific
+# thrust
+BENDING = 0.4
+BENDING_IN_MANEUVER = 0.25  # the same beside a stage without position, such as a flip's
+MORE_BENDING = 1.6  # factor on that acceleration where the body is not clear of the frame
+A_LITTLE_MORE = 1.2  # the same where the body overlaps the frame by FRAME_CLEARANCE at most
 
 
 def bodies_in_gates(task: Task) -> tuple[BodyInGate, ...]:
-    """Return the body's room in the gates that stages cross, from the start."""
+    """Return the initial room for the body in the gates that stages cross."""
     found, stages = [], task.stages.stages
     for k in range(len(stages)):
         on_course = all(each.is_placed for each in stages[max(k - 1, 0) : k + 2])
@@ -50,10 +52,10 @@ def more_direct(
     """Return more room in the gates whose frames are not clear, and room in those that had none.
 
     Args:
-        in_gates: The room that the path has in gates that the stages cross.
-        stages: In the order of the path.
-        task: Its gates are crossed.
-        frames: A finding for each stage that names a gate.
+        in_gates: The present room in the gates that stages cross.
+        stages: The stages, in the order of the path.
+        task: The task, whose gates are crossed.
+        frames: The findings about frames, one for each stage that names a gate.
     """
     crossing = [k for k, stage in enumerate(stages) if stage.gate is not None]
     found: dict[int, BodyInGate | None] = {body.stage: body for body in in_gates}
@@ -70,11 +72,11 @@ def more_direct(
 
 
 def cleared(found: Found, again: Callable[[Found], Found | None]) -> Found:
-    """Return what was found, or the best of more direct paths where its body is not clear of gates' frames.
+    """Return a path, or the best of more direct paths where its body is not clear of gates' frames.
 
     Args:
         found: A certified path, its stages placed.
-        again: What is found with more room in gates; None where there is nothing.
+        again: A function that returns the path with more room in gates, or None where there is none.
     """
     best = latest = found
     for _ in range(MAX_ATTEMPTS):
@@ -87,14 +89,14 @@ def cleared(found: Found, again: Callable[[Found], Found | None]) -> Found:
 
 
 def is_clear(frames: Sequence[Finding]) -> bool:
-    """True where a body is proven clear of frames."""
+    """Return whether the body is proven clear of all frames."""
     return all(frame.verdict is Verdict.HOLDS for frame in frames)
 
 
 def _body_in_gate(k: int, stages: Sequence[Stage], task: Task, bending: float) -> BodyInGate | None:
-    """The room in the gate that stage k crosses, in its direction; None where it crosses none.
+    """Return the room in the gate that stage k crosses in the gate's direction; None without such a gate.
 
-    A gate in a wall has none: its wall is an obstacle, which the body is clear of all along.
+    None is also returned for a gate in a wall. The wall is an obstacle, from which clearance is kept anyway.
     """
     name, problem = stages[k].gate, task.problem
     if name is None or problem.gate(name).wall is not None:

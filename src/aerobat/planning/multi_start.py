@@ -1,6 +1,7 @@
-"""Multi-start: paths are refined roughly from many starts, the fastest with more segments, the best is kept.
+"""Multi-start: many starts are refined roughly, the fastest with more segments, and the best is kept.
 
-Paths have many local optima. Where a start is does more for a plan's duration than how finely it is refined.
+Refinement has many local optima. The choice of the start affects a plan's duration more than the number of
+segments does.
 """
 
 from __future__ import annotations
@@ -31,49 +32,49 @@ from aerobat.planning.time_limit import best_in_time
 from aerobat.planning.turns import extra_turns, priced_duration
 from aerobat.planning.warm_start import WarmStart
 
-WORTHWHILE = 0.01  # of the duration: four times as many where twice as many gain more
-SAME = 1e-3  # of the duration: starts that come to nearly the same have come to the same path
-SLOWER = 1.5  # times the duration of a plan that knows no rotors
-PACE_SPREAD = 0.4  # standard deviation of the logarithm of a phase's pace, where paces are drawn
+WORTHWHILE = 0.01  # relative gain of duration by twice as many segments above which four times are tried
+SAME = 1e-3  # relative difference of durations below which two paths count as the same local optimum
+SLOWER = 1.5  # factor on the duration of plans without a vehicle, which are tried slower, too
+PACE_SPREAD = 0.4  # standard deviation of the logarithm of a random pace of a phase
 SEED = 0
-ASIDE = 0.1  # of a path's extent, by which it is bent out of its plane: symmetry is an optimum of its own
-FINISHED = 3  # certified paths, the best of which is kept, where the first touches frames or loses much
-# [s] of the processor, for a program of more intervals, of which one of nine stages takes four, or for what
-# is tried beside routes around obstacles
+ASIDE = 0.1  # bend of planar paths out of their plane, relative to their extent: planar ones are local optima
+FINISHED = 3  # certified paths of which the best is kept; later ones only while rough paths are faster
+# processor time [s] for one program with more intervals (with nine stages, such a program takes 4 s), or for
+# the other starts beside routes around obstacles
 MORE_TIME = 10.0
-RAISED = (0.25, 0.5, 0.75, 1.0)  # of the reserve, step by step
-RAISING_TIME = 40.0  # [s] of the processor, for all of these: of two flips in a row they take half
-ROUGH_TIME = 0.5  # of the time that is left, where there is a limit, for rough rounds
+RAISED = (0.25, 0.5, 0.75, 1.0)  # fractions of the reserve, raised step by step
+RAISING_TIME = 40.0  # processor time [s] for raising it; two flips in a row take half of that
+ROUGH_TIME = 0.5  # fraction of the remaining time for rough rounds, where there is a time limit
 
-_Start = tuple[Plan | None, WarmStart]  # a path, and the plan that it is of, if it is one's
+_Start = tuple[Plan | None, WarmStart]  # a path, with its plan if it comes from one
 
 
 def quick_guess() -> Miqp:
-    """The mixed-integer planner whose plan is a start: of few segments, not flown."""
+    """Return the mixed-integer planner for starts: few segments, no simulated flight, no fallbacks."""
     return Miqp(segments=4, flies=False, rescue=False)
 
 
 @dataclass(frozen=True, eq=False)
 class MultiStart:
-    """The search for the fastest certified path from a number of starts, for a planner."""
+    """The search for the fastest certified path from several starts, on behalf of a planner."""
 
     planner: str
     refinement: Refinement
-    starts: int  # that are tried together; on a course one after another, up to one clear of frames
-    segments: int  # of a path, at most, but one a phase between stages at least
-    leg_segments: int  # of a course's leg, at most
-    start: Plan | None  # whose path is tried alone, before these
-    guess: Miqp  # whose plan is one of the starts
-    finalists: int  # of the fastest rough paths, that are given twice as many segments; one then four times
+    starts: int  # number of starts tried together; on a course one at a time, until one is clear of frames
+    segments: int  # largest number of a path's segments, but at least one a phase between stages
+    leg_segments: int  # largest number of segments of a course's leg
+    start: Plan | None  # a plan whose path is tried alone, before the other starts
+    guess: Miqp  # the planner whose plan is one of the starts
+    finalists: int  # number of fastest rough paths that get twice as many segments; one then gets four times
 
     def plan(self, time_limit: float | None) -> Plan:
-        """The fastest certified plan found; where none is faster, one that it began from.
+        """Return the fastest certified plan found, which may be a plan from which the search started.
 
         Args:
-            time_limit: For planning [s]; None for as long as it takes.
+            time_limit: Limit of the planning time [s]; None for no limit.
 
         Raises:
-            Infeasible: Nothing is certified.
+            Infeasible: No path is certified.
         """
         task, recorder = self._task, self.refinement.recorder
         found = best_in_time(task.problem, time_limit, recorder, self._fastest)
@@ -100,14 +101,14 @@ class MultiStart:
 
     @property
     def _most_segments(self) -> int:
-        """The number of segments that the fastest paths may have."""
+        """The largest number of segments, for the fastest paths."""
         stages, most = self._task.stages, self.segments
         if is_course(stages):
             most = max(most, self.leg_segments * (len(stages.stages) + 1))
         return min(max(most, self._least_segments), MAX_SEGMENTS)
 
     def _fastest(self) -> Plan | None:
-        """The fastest plan of all starts, or one that a start was, if that is faster."""
+        """Return the fastest plan from all starts, which may be the plan of a start."""
         best, known = self._around(), list[Plan]()
         for refinement, begun in self._batches() if best is None else ():
             known += [plan for plan, _ in begun if plan is not None]
@@ -121,12 +122,12 @@ class MultiStart:
 
     @property
     def _lacks_places(self) -> bool:
-        """True of a course of attitudes alone, which say nothing to the closed forms that it begins at."""
+        """True of a course of attitudes without positions, for which closed forms are poor starts."""
         stages = self._task.stages
         return is_course(stages) and not any(stage.is_placed for stage in stages.stages)
 
     def _faster(self, best: _Found) -> _Found:
-        """A path, or where it is slow the first faster one of programs without a reserve."""
+        """Return the best path, or where it is slow the first faster one from programs without a reserve."""
         task, guess = self._task, replace(self.guess, reserve=0.0)
         if best.path.duration < SUSPICIOUS * least_duration(task.problem, task.vehicle):
             return best
@@ -143,7 +144,10 @@ class MultiStart:
         return best
 
     def _at_reserve(self, begun: WarmStart) -> list[RefinedPath]:
-        """The rough path near one without a reserve, which is raised in steps; none if one loses its way."""
+        """Return the rough path from a start without reserve, after steps with rising reserve (continuation).
+
+        Return no path if its constraint violations are too large after the last step.
+        """
         for share in RAISED:
             task = replace(self._task, reserve=share * self._task.reserve)
             refinement = replace(self.refinement, task=task)
@@ -152,7 +156,7 @@ class MultiStart:
         return [rough] if refinement.is_promising(rough) else []
 
     def _or_begun_from(self, found: Plan | None, begun: Sequence[Plan]) -> Plan | None:
-        """What was found, or a better one of the plans that it began from, certified and with the reserve."""
+        """Return the plan found, or a better certified plan among the starts that keeps the reserve."""
         task = self._task
         plans = (plan if plan.vehicle == task.vehicle else plan.for_vehicle(task.vehicle) for plan in begun)
         kept = [plan for plan in plans if plan.certified and plan.keeps(task.reserve)]
@@ -166,7 +170,7 @@ class MultiStart:
         return replace(known, planner=self.planner, attempts=attempts, rescue=said)
 
     def _around(self) -> _Found | None:
-        """The fastest path around obstacles; None where there are none, or no route leads to one."""
+        """Return the fastest path around obstacles; None without obstacles, or if no route leads to one."""
         if self.start is not None or not len(self._task.environment.pieces):
             return None
         around = fastest_around(self.refinement, self._least_segments)
@@ -174,7 +178,7 @@ class MultiStart:
             return None
         refinement, found = around.refinement, _Found(around.through_gates())
         best = self._finished(refinement, [around.judged.solution.source], found)
-        # routes are starts too, but know no attitudes: where those are asked, others may be nearer
+        # routes count as starts but ignore attitudes: where stages ask attitudes, all other starts are tried
         count = self.starts if self._task.stages.asks_thrust else max(self.starts - ROUTES, 0)
         if best is None or is_course(self._task.stages) or not count:
             return best
@@ -185,9 +189,10 @@ class MultiStart:
         return best
 
     def _batches(self) -> Iterator[tuple[Refinement, list[_Start]]]:
-        """Yield starts that are tried together, the next where these lead to no path clear of frames.
+        """Yield batches of starts, each with its refinement; later batches are tried if earlier ones fail.
 
-        Each comes with the refinement that it is given: a course's closed forms are tried in haste first.
+        A batch fails if it leads to no certified path that is clear of gates' frames. The closed forms of a
+        course are tried with a hasty refinement first.
         """
         task = self._task
         if self.start is not None:
@@ -211,7 +216,7 @@ class MultiStart:
         return priced_duration(self._task, path.trajectory)
 
     def _of_more(self, guess: Miqp) -> Iterator[_Start]:
-        """Yield the plans of mixed-integer programs of more intervals, of an open course."""
+        """Yield starts from mixed-integer plans with more intervals; none for closed courses."""
         task = self._task
         ways = () if task.stages.closed else with_more_intervals(guess, task.problem, task.vehicle)
         for planner, _ in ways:
@@ -223,7 +228,7 @@ class MultiStart:
             yield plan, WarmStart.of(plan, task.stages)
 
     def _with_or_without_rooms(self, whole: Refinement, paths: Sequence[WarmStart]) -> _Found | None:
-        """The fastest path near some, without rooms in gates where there is none with them."""
+        """Return the best path from some starts; room in gates is not required where no path has it."""
         for refinement in whole.with_and_without_rooms:
             found = self._finished(refinement, self._rough(refinement, paths))
             if found is not None or out_of_time():
@@ -233,7 +238,7 @@ class MultiStart:
     def _finished(
         self, refinement: Refinement, rough: Sequence[RefinedPath], best: _Found | None = None
     ) -> _Found | None:
-        """The best of the certified paths near rough ones, the fastest of them first, and of a known one."""
+        """Return the best of a known path and of the certified paths from rough ones, fastest rough first."""
         starts, certified = tuple(map(_duration, rough)), [] if best is None else [best]
         with within_share(ROUGH_TIME):
             paths = self._with_more_segments(refinement, rough)
@@ -247,7 +252,7 @@ class MultiStart:
         return best
 
     def _rough(self, refinement: Refinement, begun: Sequence[WarmStart]) -> list[RefinedPath]:
-        """The rough paths near starts, without those that lose their way, the fastest first."""
+        """Return the rough paths from starts, fastest first, without those that rounds cannot repair."""
         found: list[RefinedPath] = []
         for path in begun:
             known = min(map(_duration, found), default=inf)
@@ -261,7 +266,10 @@ class MultiStart:
     def _with_more_segments(
         self, refinement: Refinement, paths: Sequence[RefinedPath]
     ) -> Sequence[RefinedPath]:
-        """Sorted paths, the fastest with twice as many segments, and fewer of them again while that gains."""
+        """Return sorted paths, the fastest with twice as many segments, then one with four times as many.
+
+        The second doubling is tried only if the first one is worthwhile.
+        """
         for doubling, count in enumerate((self.finalists, 1), 1):
             segments = min(2**doubling * self._least_segments, self._most_segments)
             paths, known = _distinct(paths), inf
@@ -279,7 +287,7 @@ class MultiStart:
         return paths
 
     def _plan(self, found: _Found) -> Plan:
-        """The plan of what was found, with more reserve if its flight wants it."""
+        """Return the plan of a path, with a larger reserve if its simulated flight needs that."""
         flown = found.path.with_reserves() if self._task.reserve > 0.0 else found.path
         return flown.judged.plan(
             self.refinement.recorder,
@@ -294,17 +302,17 @@ class MultiStart:
 
 @dataclass(frozen=True)
 class _Found:
-    """A certified path, and what all starts that were tried with it came to."""
+    """A certified path, and the durations that all starts tried with it came to."""
 
     path: FlownPath
-    starts: tuple[float, ...] = ()  # [s] roughly, rising
+    starts: tuple[float, ...] = ()  # durations of the rough paths [s], ascending
 
     def rank(self) -> tuple[bool, float]:
-        """The key that sorts by what is best: clear of frames first, the shortest foremost, turns priced."""
+        """Return the sort key, smallest is best: paths clear of frames first, then by priced duration."""
         return not self.path.is_clear, self._priced(self.path.judged.solution.source)
 
     def is_ahead_of(self, rough: RefinedPath) -> bool:
-        """True if a rough path is not worth finishing."""
+        """Return whether this path is clear of frames and not slower than a rough path."""
         return self.path.is_clear and self.rank()[1] <= self._priced(rough)
 
     def _priced(self, refined: RefinedPath) -> float:
@@ -312,15 +320,15 @@ class _Found:
 
 
 def _likeliest(begun: _Start) -> tuple[bool, bool, float]:
-    """The key that sorts starts: certified plans, other plans, paths of no plan; the shortest foremost."""
+    """Return the sort key of starts: certified plans, other plans, paths without plan; each shortest first."""
     plan, path = begun
     return plan is None, plan is None or not plan.certified, path.trajectory.duration
 
 
 def _varied(begun: Sequence[_Start]) -> Iterator[_Start]:
-    """Yield starts, those that know no rotors also slower, then all at paces that are drawn, without end.
+    """Yield starts without end: the given ones, slower ones where rotors were ignored, then random paces.
 
-    After each that nearly lies in a vertical plane comes the same bent out of it.
+    Each start that nearly lies in a vertical plane is followed by a copy that is bent out of the plane.
     """
     sources: list[_Start] = []
     for plan, path in begun:
@@ -341,7 +349,7 @@ def _varied(begun: Sequence[_Start]) -> Iterator[_Start]:
 
 
 def _distinct(paths: Sequence[RefinedPath]) -> list[RefinedPath]:
-    """Sorted paths without those that take nearly as long as the one before."""
+    """Return sorted paths without those that take nearly as long as the path before."""
     before = [0.0, *map(_duration, paths)]
     return [each for each, last in zip(paths, before, strict=False) if _duration(each) > (1.0 + SAME) * last]
 

@@ -1,4 +1,4 @@
-"""A planning task: everything that is asked of a path, said once, for every planner and for the judge."""
+"""A planning task: all requirements on a path, in one place for every planner and for the certificate."""
 
 from __future__ import annotations
 
@@ -22,40 +22,41 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage, StageSequence
 from aerobat.vehicle import Vehicle
 
-# without a vehicle, stages that ask a fraction of its thrust assume what a hexarotor in the paper's class has
+# thrust-to-weight ratio assumed without a vehicle, where stages ask a fraction of its thrust: that of a
+# hexarotor of the paper's class
 ASSUMED_THRUST_TO_WEIGHT = 5.0
-SHARE = 0.5  # of the room that a narrow passage leaves to the body, which is kept clear
-KEPT_INSIDE = 0.1  # of a ball's radius, at most, from its surface: flights under lab stray by half of that
+SHARE = 0.5  # fraction of the room in a narrow passage that is kept as clearance
+KEPT_INSIDE = 0.1  # largest reduction of a ball's radius, relative: lab flights have errors of half of that
 RATES = {Quantity.POSITION: Quantity.VELOCITY, Quantity.VELOCITY: Quantity.ACCELERATION}
-ROUNDING = 1e-9  # of a limit, or of a direction: what is nearer is the same
-LEAST_CLEARANCE = 0.001  # [m] that is kept clear in the narrowest: what lies between places is within it
+ROUNDING = 1e-9  # relative difference of limits or directions below which they are equal
+LEAST_CLEARANCE = 0.001  # least clearance [m]; covers violations between the places of a program
 
 
 @dataclass(frozen=True)
 class Task:
-    """Ends, stages in order, and limits that hold throughout, for one vehicle in one environment.
+    """Ends, stages in order, and limits along the path, for one vehicle in one environment.
 
-    Ends, limits per axis and the environment are the problem's. The stages are what the problem asks of the
-    vehicle, or what a planner makes of that where it asks less for a start.
+    Ends, limits per axis and the environment are the problem's. The stages are those of the problem for the
+    vehicle. Planners may relax the stages, to find a start.
     """
 
     problem: Problem
     vehicle_if_any: Vehicle | None
     stages: StageSequence
-    reserve: float = 0.0  # of the vehicle's limits' ranges, kept from either end; proven of rotors
+    reserve: float = 0.0  # fraction of the vehicle's limits' ranges kept from either end; proven for rotors
     clearance: float = 0.0  # [m] kept from obstacles, and inside balls
 
     @classmethod
     def of(
         cls, problem: Problem, vehicle: Vehicle | None = None, reserve: float = 0.0, clearance: float = 0.0
     ) -> Task:
-        """Return what a problem asks of a vehicle, or of none, with no more clearance than ends leave.
+        """Return the task of a problem, with or without a vehicle; the ends may reduce its clearance.
 
         Args:
-            problem: Its stages are made for the vehicle's thrust and size.
-            vehicle: What shall fly.
-            reserve: Kept for the controller.
-            clearance: Kept from obstacles for it [m].
+            problem: The problem, whose stages depend on the vehicle's thrust and size.
+            vehicle: The vehicle, if any.
+            reserve: Fraction of the limits' ranges kept for the controller.
+            clearance: Distance kept from obstacles for the controller [m].
         """
         body_radius = 0.0 if vehicle is None else vehicle.body_radius
         stages = problem.stages(max_specific_thrust(problem, vehicle), body_radius)
@@ -68,11 +69,11 @@ class Task:
         return asked if left > clearance else asked.with_room(left)
 
     def with_room(self, room: float) -> Task:
-        """Return the same, with no more clearance than is left where there is little room [m]."""
+        """Return the task with its clearance reduced to a share of `room` [m], where that is less."""
         return replace(self, clearance=min(self.clearance, max(SHARE * room, LEAST_CLEARANCE)))
 
     def with_stages(self, stages: Iterable[Stage]) -> Task:
-        """Return the same with other stages, in order or not as before."""
+        """Return the task with other stages, which are ordered if the present ones are."""
         return replace(self, stages=replace(self.stages, stages=tuple(stages)))
 
     @property
@@ -88,7 +89,7 @@ class Task:
 
     @cached_property
     def as_proven(self) -> Task:
-        """The task that a plan's evidence is about: every limit used in full, nothing more kept clear."""
+        """The task that a plan's evidence is about: without reserve and without clearance."""
         return Task.of(self.problem, self.vehicle_if_any)
 
     @cached_property
@@ -98,17 +99,17 @@ class Task:
 
     @cached_property
     def limits(self) -> tuple[Limit, ...]:
-        """Everything that must hold all along a path."""
+        """All limits along the path."""
         limits, conditions = self.problem.path_limits, self.stages.path_constraints
         return limits_along(self.vehicle_if_any, self.environment, limits, conditions)
 
     @cached_property
     def held(self) -> tuple[Limit, ...]:
-        """The limits that imply all others along a whole path: those that an optimizer holds."""
+        """The limits along the path without those that others imply, for optimizers."""
         return tuple(limit for limit in self.limits if not limit.is_implied)
 
     def envelope(self, placed: Sequence[PlacedStage] = ()) -> Envelope:
-        """Return what a certificate is about, gates and balls at placed stages among it."""
+        """Return the conditions that a certificate proves, including gates and balls at placed stages."""
         return Envelope(
             limits=self.problem.path_limits,
             conditions=self.stages.path_constraints,
@@ -121,7 +122,7 @@ class Task:
 
 
 def _well_inside(stage: Stage, clearance: float) -> Stage:
-    """The stage with a smaller ball, if it has one."""
+    """Return the stage with a smaller ball, if it has one."""
     if stage.ball is None or not clearance:
         return stage
     kept = min(clearance, KEPT_INSIDE * stage.ball.radius)
@@ -129,9 +130,10 @@ def _well_inside(stage: Stage, clearance: float) -> Stage:
 
 
 def _at_limits(stage: Stage, limits: Limits) -> Stage:
-    """The stage with all that follows where it asks the very limit: what is at its most stands still there.
+    """Return the stage with equality conditions where it asks a value at the very limit.
 
-    No path is within the limit and beyond it beside; who knows only inequalities finds none that is near.
+    A quantity at its limit has an extremum there, so that its derivative is zero. Solvers that see only the
+    inequalities find no path near such a stage.
     """
     conditions = list(stage.conditions)
     for place, asked in enumerate(stage.conditions):
@@ -152,19 +154,19 @@ def _at_limits(stage: Stage, limits: Limits) -> Stage:
 
 
 def _same(bound: float, end: float) -> bool:
-    """True of a bound at a limit's finite end."""
+    """Return whether a bound lies at a limit's finite end."""
     return bool(isfinite(end) and abs(bound - end) <= ROUNDING * max(abs(end), 1.0))
 
 
 def _fixes(condition: Condition, quantity: Quantity, direction: Array) -> bool:
-    """True of a condition that fixes a quantity along a direction."""
+    """Return whether a condition fixes a quantity along a direction."""
     across = np.linalg.norm(np.cross(condition.direction, direction))
     parallel = across <= ROUNDING * np.linalg.norm(condition.direction) * np.linalg.norm(direction)
     return bool(condition.quantity is quantity and condition.lower == condition.upper and parallel)
 
 
 def max_specific_thrust(problem: Problem, vehicle: Vehicle | None) -> float:
-    """Return the thrust over mass [m/s²] that stages may ask: a vehicle's, or what is assumed without one."""
+    """Return the largest specific thrust [m/s²] that stages may ask, an assumed one without a vehicle."""
     if vehicle is None:
         return ASSUMED_THRUST_TO_WEIGHT * problem.environment.gravity
     return vehicle.max_specific_thrust

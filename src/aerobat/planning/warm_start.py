@@ -1,4 +1,4 @@
-"""Warm starts of nonlinear programs: a plan of another planner, with its phases and its path."""
+"""Warm starts of nonlinear programs: a trajectory, often of another planner, with its stages' times."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from aerobat.problem.stage import Stage, StageSequence
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-NEAR_PLANE = 0.05  # of its extent, by which a path may leave a plane and still be bent out of it
+NEAR_PLANE = 0.05  # deviation from a plane, relative to a path's extent, up to which a path counts as planar
 
 
 @dataclass(frozen=True, eq=False)
 class WarmStart:
-    """A trajectory, and when it passes a sequence's stages."""
+    """A trajectory with the times at which it passes stages."""
 
     trajectory: Trajectory
     stages: tuple[Stage, ...]  # in the order of their times
-    times: tuple[float, ...]  # [s] of the stages, rising
+    times: tuple[float, ...]  # times of the stages [s], ascending
 
     @classmethod
     def of(cls, plan: Plan, sequence: StageSequence) -> WarmStart:
-        """A plan's trajectory, and the order of the sequence's stages in it if it leaves that open."""
+        """Return a plan's trajectory with the stages of a sequence in the order of the plan."""
         return cls.through(plan.trajectory, sequence.stages, [placed.time for placed in plan.stages])
 
     @classmethod
     def through(cls, trajectory: Trajectory, stages: Sequence[Stage], times: Sequence[float]) -> WarmStart:
-        """A trajectory through stages at times [s] in any order."""
+        """Return a trajectory with stages at times [s], given in any order."""
         order = sorted(range(len(times)), key=times.__getitem__)
         return cls(trajectory, tuple(stages[i] for i in order), tuple(times[i] for i in order))
 
     @property
     def phases(self) -> Array:
-        """From the start to the first stage, ..., from the last to the end [s], (P,)."""
+        """The durations of the phases: start to first stage, between stages, last stage to end [s], (P,)."""
         return np.diff([0.0, *self.times, self.trajectory.duration])
 
     def leg_at(self, time: float) -> str:
-        """In words between which of several stages a time [s] lies; nothing of one or none."""
+        """Return words on the stages between which a time [s] lies; empty with fewer than two stages."""
         if len(self.stages) < 2:
             return ""
         names = ["the start", *(f"'{stage.name}'" for stage in self.stages), "the goal"]
@@ -54,17 +54,17 @@ class WarmStart:
         return f", between {names[leg]} and {names[leg + 1]}"
 
     def time_scaled(self, factor: float) -> WarmStart:
-        """The same path, flown longer by a factor."""
+        """Return the same path with its duration multiplied by a factor."""
         trajectory = replace(self.trajectory, durations=factor * self.trajectory.durations)
         return replace(self, trajectory=trajectory, times=tuple(factor * t for t in self.times))
 
     @property
     def extent(self) -> float:
-        """The longest side of the box around the ends of the path's segments [m]."""
+        """The longest side of the bounding box of the path's knots [m]."""
         return float(np.ptp(self.trajectory.on_segments([0.0, 1.0]), axis=(0, 1)).max())
 
     def plane(self) -> Array | None:
-        """The unit normal of the vertical plane that the path nearly stays in, (3,); None of others."""
+        """Return the unit normal of the vertical plane in which the path nearly lies, (3,), or None."""
         points = self.trajectory.on_segments([0.0, 0.5, 1.0]).reshape(-1, 3)[:, :2]
         _, extents, directions = np.linalg.svd(points - points[0])
         if extents[1] > NEAR_PLANE * max(extents[0], self.extent):
@@ -72,7 +72,7 @@ class WarmStart:
         return np.array([*directions[1], 0.0])
 
     def bent(self, aside: Array) -> WarmStart:
-        """The same path moved aside halfway, less before and after, by a vector [m], (3,)."""
+        """Return the path with a smooth lateral displacement, `aside` [m], (3,), at half the duration."""
         trajectory = self.trajectory
         bump = Polynomial([0.0, 0.0, 16.0, -32.0, 16.0])  # 16 s² (1 − s)², one halfway
         begins = trajectory.knots[:-1] / trajectory.duration
@@ -86,7 +86,7 @@ class WarmStart:
         return replace(self, trajectory=replace(trajectory, coefficients=coefficients))
 
     def at_other_pace(self, factors: Array) -> WarmStart:
-        """The same path with each phase longer by a factor; its derivatives jump where phases meet."""
+        """Return the path with each phase's duration scaled by its factor; derivatives jump at stages."""
         trajectory = self.trajectory
         middles = (trajectory.knots[:-1] + trajectory.knots[1:]) / 2.0
         durations = trajectory.durations * factors[np.searchsorted(self.times, middles)]
@@ -97,9 +97,9 @@ class WarmStart:
 def flown_task(
     planner: str, problem: Problem, vehicle: Vehicle | None, reserve: float, clearance: float = 0.0
 ) -> Task:
-    """The task for a vehicle whose attitude is determined at both ends.
+    """Return the task of a problem with a vehicle whose attitude is determined at both ends.
 
-    Raises SpecError where there is no vehicle, and for ends in free fall, whose attitude is open.
+    Raises SpecError without a vehicle, and for ends in free fall, whose attitude is undetermined.
     """
     if vehicle is None:
         raise SpecError(f"the {planner} planner needs a vehicle: no limits, no least time; give --vehicle")
