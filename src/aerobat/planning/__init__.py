@@ -1,6 +1,6 @@
-"""Problem → plan: the planners, the search on durations, and the rotors' margin.
+"""From a problem to a plan: the planners, the search on durations, and the rotors' margin.
 
-The public names stand in `__init__.pyi`; each is imported when first used: no planner waits for another.
+The public names are in `__init__.pyi`. Each is imported when first used, so that no planner imports another.
 """
 
 import lazy_loader

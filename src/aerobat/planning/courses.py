@@ -1,4 +1,4 @@
-"""Long courses, which no mixed-integer program places in reasonable time, and closed ones, which few can."""
+"""Courses: long sequences of stages, too long for an exact mixed-integer search, and closed ones."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ import numpy as np
 
 from aerobat.problem import Stage, StageSequence
 
-COURSE_STAGES = 6  # that say where they are: from so many on a path through them is the start
-POINTS = 4  # gates and waypoints alone, likewise
-MANY_STAGES = 10  # of any kind
-MAX_EXACT_PLACES = 3  # gates and points that one mixed-integer search places with proof in seconds
+COURSE_STAGES = 6  # number of stages from which a sequence is a course, if all have positions
+POINTS = 4  # the same, if all are gates or waypoints
+MANY_STAGES = 10  # the same, for stages of any kind
+MAX_EXACT_PLACES = 3  # largest number of positions that one mixed-integer search solves exactly in seconds
 
 
 def is_course(sequence: StageSequence) -> bool:
-    """True of long sequences in order, and closed ones: a closed form is a good start, a mixed-integer
-    plan takes too long, or there is none.
+    """Return whether a sequence is closed, or ordered and long: the closed form is then the best start.
+
+    A mixed-integer plan of such a sequence takes too long, or does not exist.
     """
     if sequence.closed:
         return True
@@ -25,11 +26,11 @@ def is_course(sequence: StageSequence) -> bool:
 
 
 def _is_point(stage: Stage) -> bool:
-    """True of a gate or a waypoint."""
+    """Return whether a stage is a gate or a waypoint."""
     return stage.gate is not None or stage.ball is not None or not np.isnan(stage.place).any()
 
 
 def is_placed_in_windows(sequence: StageSequence) -> bool:
-    """True of sequences in order through more places than are searched at once."""
+    """Return whether an ordered sequence has too many positions for one search, so that windows are used."""
     places = sum(stage.is_placed for stage in sequence.stages)
     return sequence.ordered and places > MAX_EXACT_PLACES

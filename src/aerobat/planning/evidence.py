@@ -1,7 +1,7 @@
-"""Evidence for a path: its proof, its own flights, and its duration beside what is possible.
+"""Evidence for a path: its certificate, its simulated flights, and its assessment.
 
-All of it follows from the path, its vehicle, its problem and its placed stages, and is worked out when it is
-first read. So it is never that of another path, and never what a file claims.
+All evidence follows from the path, its vehicle, its problem and its placed stages, and is computed when it is
+first read. So evidence never belongs to another path, and is never taken from a file.
 """
 
 from __future__ import annotations
@@ -25,26 +25,29 @@ class Evidence:
 
     task: Task  # with a vehicle
     trajectory: Trajectory
-    stages: tuple[PlacedStage, ...] = ()  # the gates and waypoints among them are passed then
+    stages: tuple[PlacedStage, ...] = ()  # the certificate includes their gates and waypoints
 
     @cached_property
     def certificate(self) -> Certificate:
-        """The proof over continuous time that all limits hold, or what refutes it (5 to 10 ms)."""
+        """The proof over continuous time that all limits hold, or the violations (5 to 10 ms)."""
         task = self.task
         return certify(self.trajectory, task.vehicle, task.environment, task.envelope(self.stages))
 
     @cached_property
     def flyability(self) -> Flyability:
-        """The findings of the vehicle's own simulated flights (tens of milliseconds)."""
+        """The findings of the vehicle's simulated flights (tens of milliseconds)."""
         return own_flights(self.task, self.trajectory, self.stages, self.certificate)
 
     @cached_property
     def assessment(self) -> Assessment:
-        """The path beside what is possible, and beside the room and the rates that are usual."""
+        """The path against a lower bound on durations, and against usual room and rates."""
         return assessment(self.task, self.trajectory, self.certificate)
 
     def at(self, stages: Sequence[PlacedStage]) -> Evidence:
-        """Return the evidence for the same path with its stages placed; what is proven of them is kept."""
+        """Return the evidence for the same path with other placed stages.
+
+        The certificate is reused if no gate or waypoint is among them.
+        """
         if tuple(stages) == self.stages:
             return self
         placed, envelope = replace(self, stages=tuple(stages)), self.task.envelope(stages)

@@ -1,11 +1,14 @@
-"""A plan's own flight: the closed loop of its vehicle, simulated before the plan is returned.
+"""A plan's own flights: the closed loop of its vehicle, simulated before the plan is returned.
 
-A certificate proves that the rotors can follow a path; that the loop of controller and rotors does, lag
-included, only a flight shows. What is flown is the plan's trajectory by its vehicle in its environment, with
-the default controller and nothing unknown; then once more with the reserve that the certificate leaves used
-up, all rotors giving less than commanded by the same fraction δ. That loss is equivalent to dividing mass,
-inertia and drag by 1 − δ, so such a vehicle is simulated, while the controller keeps the nominal one. The
-nominal flight is judged at the gates, their frames included, and past obstacles as scores judge flights.
+A certificate proves that the rotors can follow a path. Whether the closed loop of controller and rotors
+follows it, lag included, only a simulated flight shows. The nominal flight has the plan's vehicle and
+environment, the default controller and no disturbances. It is judged at gates, frames included, and at
+obstacles in the same way as scores judge flights.
+
+In the disturbed flight all rotors give less thrust than commanded, by a fraction δ that uses up the margin
+that the certificate proves. Losing the fraction δ of every rotor's thrust is equivalent to dividing mass,
+inertia and drag by 1 − δ. So a vehicle with such values is simulated, while the controller keeps the nominal
+one.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ from aerobat.simulation.passages.passage import Passage
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-FLYABLE_ERROR = 0.05  # [m] that a plan's own flight may leave its path by, a frame's usual clearance
+FLYABLE_ERROR = 0.05  # largest tracking error of a plan's own flight [m]: the usual clearance from a frame
 
 
 @dataclass(frozen=True)
@@ -38,48 +41,48 @@ class FlownPassage:
     """A gate in a plan's own flight."""
 
     gate: str
-    attitude_error: float | None  # [rad] between the thrust axis and where it shall point; None: not crossed
-    attitude_tolerance: float | None  # [rad] that is allowed; None where no attitude is asked
-    failure: str = ""  # what went wrong, in words; empty where it was passed as asked
-    clearance: float | None = None  # [m] the least between body and frame; None: not crossed
+    attitude_error: float | None  # [rad] of the thrust axis, from the required one; None: not crossed
+    attitude_tolerance: float | None  # [rad] largest error allowed; None where no attitude is asked
+    failure: str = ""  # the failure in words; empty where the gate was passed as asked
+    clearance: float | None = None  # [m] least distance between body and frame; None: not crossed
 
     @property
     def is_missed(self) -> bool:
-        """True where the gate is not crossed, or not as far as counts, or its frame is touched."""
+        """True if the gate is not crossed, not crossed completely, or its frame is touched."""
         return bool(self.failure) and (self.clearance is None or self.clearance < 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class OwnFlight:
-    """A plan's own nominal flight: the simulated closed loop, nothing unknown."""
+    """A plan's nominal flight: the simulated closed loop without disturbances."""
 
-    error: float  # [m] the largest position error, 5 m or more where it diverges
-    passages: tuple[FlownPassage, ...] = ()  # the planned ones, in their order
+    error: float  # [m] largest tracking error of position, 5 m or more where the flight diverges
+    passages: tuple[FlownPassage, ...] = ()  # the planned passages, in order
     nearest: NearestObstacle | None = None  # None where there are no obstacles
 
     @property
     def flies(self) -> bool:
-        """True if it keeps within FLYABLE_ERROR of the path, passes gates as they ask and hits nothing."""
+        """True if the flight tracks within FLYABLE_ERROR, passes gates as asked and hits nothing."""
         return not self.defects
 
     @property
     def lingers(self) -> bool:
-        """True if it does not pass the plane of a gate, or not as far as counts, or touches the frame."""
+        """True if the flight misses a gate: not crossed completely, or with its frame touched."""
         return any(passage.is_missed for passage in self.passages)
 
     @property
     def wants_reserve(self) -> bool:
-        """True if it has a defect that more reserve for the controller may mend: any but a gate missed."""
+        """True if there is a defect other than missed gates, which a larger reserve may repair."""
         return len(self.defects) > sum(passage.is_missed for passage in self.passages)
 
     @property
     def rank(self) -> tuple[int, float]:
-        """The number of defects, and the error [m]: the better of two flights has the lesser."""
+        """The sort key of flights, smallest is best: the number of defects, then the tracking error [m]."""
         return len(self.defects), self.error
 
     @property
     def defects(self) -> tuple[str, ...]:
-        """All that it does wrong, in words."""
+        """All defects of the flight, in words."""
         failed = tuple(passage.failure for passage in self.passages if passage.failure)
         if self.nearest is not None and self.nearest.failure is not None:
             failed = (*failed, self.nearest.failure.sentence())
@@ -93,14 +96,14 @@ class OwnFlight:
 class Flyability(OwnFlight):
     """A plan's own flights: the nominal one, and one with the reserve used up.
 
-    The disturbance is the largest that the rotors' reserve buys at every instant: all rotors give less than
-    commanded by a fraction of it, of which no rotor's limit need take notice.
+    The disturbance is the margin of thrust that the certificate proves at every instant. In the disturbed
+    flight all rotors lose the corresponding fraction of their thrust, which their margins cover.
     """
 
-    disturbance: float  # [N] by which every rotor may miss its thrust; 0 where nothing is left
-    disturbed_fraction: float  # [-] the same over the largest thrust of a rotor
-    disturbed_error: float  # [m] the largest position error where all rotors give less by that fraction
-    tilted_by_drag: bool = False  # the path misses a gate's attitude, as drag differs along body x and y
+    disturbance: float  # [N] proven margin of every rotor's thrust; 0 where there is none
+    disturbed_fraction: float  # [-] the disturbance over the largest thrust of a rotor
+    disturbed_error: float  # [m] largest tracking error where all rotors lose that fraction of their thrust
+    tilted_by_drag: bool = False  # whether the path misses a gate's attitude, as drag differs along x and y
 
     @property
     def remedy(self) -> str:
@@ -134,7 +137,7 @@ class Flyability(OwnFlight):
 
 
 def own_flight(task: Task, trajectory: Trajectory, stages: Sequence[PlacedStage]) -> OwnFlight:
-    """The findings of the nominal flight of a path, its task's stages placed along it."""
+    """Return the findings of the nominal flight of a path with placed stages."""
     flight = nominal_flight(trajectory, task.vehicle, task.environment)
     states = flight.states
     rows = log_rows(flight.times, states.position, states.velocity, states.q_world_body)
@@ -166,10 +169,10 @@ def own_flights(
     """Fly a path twice: nominally, and with the rotors' reserve used up.
 
     Args:
-        task: Its vehicle flies, in its environment.
-        trajectory: What is flown.
-        stages: The task's, placed.
-        certificate: Of the path: the proven margin of its rotors is the reserve.
+        task: The task, with vehicle and environment.
+        trajectory: The path that is flown.
+        stages: The placed stages.
+        certificate: The path's certificate; its proven margin of the rotors is the disturbance.
     """
     disturbance = max(certificate.margin or 0.0, 0.0)
     fraction = disturbance / float(task.vehicle.max_thrusts.max())
@@ -185,27 +188,27 @@ def own_flights(
 
 
 def _is_tilted(certificate: Certificate) -> bool:
-    """True if the path itself, whatever its flight, misses the attitude of a gate."""
+    """Return whether the path itself, whatever its flight, misses the attitude of a gate."""
     attitudes = (finding for finding in certificate.findings if finding.name == "attitude")
     return any(finding.verdict is Verdict.VIOLATED for finding in attitudes)
 
 
 @lru_cache(maxsize=2)
 def nominal_flight(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> Flight:
-    """The flight of a plan by default settings, nothing unknown; the latest two are kept."""
+    """Return the flight of a path by default settings, without disturbances; the latest two are cached."""
     return fly(trajectory, vehicle, environment=environment)
 
 
 def disturbed_flight(
     trajectory: Trajectory, vehicle: Vehicle, environment: Environment, fraction: float
 ) -> Flight:
-    """The flight of a vehicle whose rotors all give less than commanded.
+    """Return the flight of a vehicle whose rotors all lose a fraction of their thrust.
 
     Args:
         trajectory: The path [m] over time [s], world.
-        vehicle: What flies it.
-        environment: Where.
-        fraction: Of every rotor's thrust what is missing [-], below 1.
+        vehicle: The nominal vehicle, which the controller knows.
+        environment: The environment of the flight.
+        fraction: The fraction of every rotor's thrust that is lost [-], below 1.
     """
     factor = 1.0 / (1.0 - fraction)
     weak = replace(

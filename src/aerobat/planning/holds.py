@@ -1,7 +1,7 @@
-"""Rests on the way: what lies between two of them is planned by itself, and the plans are joined.
+"""Problems with stages at which the vehicle holds still: the parts between holds are planned separately.
 
-At rest nothing is handed on but the place and the heading, so that the parts of a path know nothing of each
-other, and the planner of each part nothing of rests.
+At rest only position and heading pass from one part to the next. So the parts do not depend on each other
+otherwise, and planners need not know holds.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ P = TypeVar("P")
 
 
 def between_holds(method: PlanMethod[P]) -> PlanMethod[P]:
-    """A planner's method `plan` that plans, where a problem rests on the way, the parts between the rests."""
+    """Return a planner's method `plan`, extended to problems with holds: parts between holds are joined."""
 
     @wraps(method)
     def plan(
@@ -56,32 +56,35 @@ def between_holds(method: PlanMethod[P]) -> PlanMethod[P]:
 
 
 def _without_start(planner: P) -> P:
-    """The planner, without a plan of the whole to begin from."""
+    """Return the planner without its start, which is a plan of the whole problem."""
     changed: Any = planner
     return replace(changed, start=None) if getattr(changed, "start", None) is not None else planner
 
 
 @declared
 class Part(Maneuver):
-    """Some of the stages of a maneuver."""
+    """A maneuver of some consecutive stages of another maneuver."""
 
     whole: Annotated[Maneuver, AS_IT_IS]
     first: int  # stage, counted from 0
     end: int  # behind the last
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
-        """Return those stages, and what holds throughout."""
+        """Return these stages, with the conditions along the path."""
         sequence = self.whole.stage_sequence(gates, max_specific_thrust)
         return replace(sequence, stages=sequence.stages[self.first : self.end])
 
     @property
     def through_points(self) -> bool:
-        """As the whole."""
+        """True if the whole maneuver goes through points."""
         return self.whole.through_points
 
 
 def _parts(problem: Problem) -> Iterator[Problem | Stage]:
-    """The problems between rests, and the stages of the rests; no problem where there is nothing to move."""
+    """Yield the problems between holds, and the stages of the holds, in order.
+
+    No problem is yielded between equal positions without stages between.
+    """
     sequence = problem.stages(1.0)
     if not sequence.ordered:
         raise SpecError("maneuver.ordered: stages in any order cannot hold; order them")
@@ -99,7 +102,7 @@ def _parts(problem: Problem) -> Iterator[Problem | Stage]:
 
 
 def _heading_at_end(plan: Plan, vehicle: Vehicle) -> float:
-    """The heading [rad] about the thrust axis with which a plan comes to rest, carried along without spin."""
+    """Return the heading [rad] at a plan's end, of a body that never rotates about its thrust axis."""
     end = reference(plan.trajectory, vehicle, [plan.duration], environment=plan.problem.environment)
     q_world_body = end.setpoint.q_world_body[-1]
     tilt = so3.smallest_rotation(so3.UP, so3.thrust_axis(q_world_body))
@@ -107,7 +110,7 @@ def _heading_at_end(plan: Plan, vehicle: Vehicle) -> float:
 
 
 def _joined(problem: Problem, found: Sequence[Plan | Stage]) -> Plan:
-    """The plans one after another, with the rests between them."""
+    """Return the plan that joins the plans, with the holds between them."""
     plans = [each for each in found if isinstance(each, Plan)]
     if not plans:
         raise SpecError("maneuver: nothing moves between the rests; move the goal, or plan something else")
@@ -142,5 +145,5 @@ def _joined(problem: Problem, found: Sequence[Plan | Stage]) -> Plan:
 
 
 def _padded(coefficients: Array, degree: int) -> Array:
-    """Coefficients (S, any, 3) as those of polynomials of a degree."""
+    """Return coefficients (S, any, 3) padded with zeros to a degree."""
     return np.pad(coefficients, ((0, 0), (0, degree + 1 - coefficients.shape[1]), (0, 0)))

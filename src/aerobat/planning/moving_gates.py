@@ -1,8 +1,8 @@
-"""Gates that move: where one is depends on when it is passed, and that on where it is.
+"""Gates that move: the position of a gate depends on the time of passage, and the time on the position.
 
-A planner plans through the gates as if they stood still where they are when they are passed, again and again
-until that is nearly where they are. Its path then crosses the planes of the gates as they move, a little
-later or sooner, and its certificate says whether it passes them.
+This is solved by fixed-point iteration. Each round plans through gates at rest, at their positions when the
+last round's plan passes them, until these positions converge. The final path crosses the moving planes
+slightly earlier or later, and its certificate says whether it passes the gates.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 P = TypeVar("P")
-ROUNDS = 12  # at most: a gate at a fifth of the vehicle's speed takes three
-SETTLED = 5e-3  # [m] from where a gate is planned to where it is passed: planners' durations vary by as much
-STEPS = 6  # of Newton's method
+ROUNDS = 12  # largest number of rounds; a gate with a fifth of the vehicle's speed takes three
+SETTLED = 5e-3  # change of gates' positions at which rounds end [m]: planners' durations vary by as much
+STEPS = 6  # steps of Newton's method for the time of crossing
 
 
 def through_moving_gates(method: PlanMethod[P]) -> PlanMethod[P]:
-    """A planner's method `plan` that plans, where gates move, through where they are when they are passed."""
+    """Return a planner's method `plan`, extended to moving gates by fixed-point iteration."""
 
     @wraps(method)
     def plan(
@@ -61,7 +61,7 @@ def through_moving_gates(method: PlanMethod[P]) -> PlanMethod[P]:
 
 
 def _require_once(problem: Problem, moving: dict[str, Gate]) -> None:
-    """Refuse gates that move and are not passed once: at which time they are meant is not known."""
+    """Raise SpecError for moving gates that are not passed exactly once: their time would be ambiguous."""
     passed = [stage.gate for stage in problem.stages(1.0).stages]
     for name in moving:
         if passed.count(name) != 1 or not problem.ends:
@@ -69,12 +69,12 @@ def _require_once(problem: Problem, moving: dict[str, Gate]) -> None:
 
 
 def _farthest(gates: Sequence[Gate], others: Sequence[Gate]) -> float:
-    """The largest distance [m] between gates of both that are the same."""
+    """Return the largest distance [m] between corresponding gates."""
     return max(float(np.linalg.norm(a.position - b.position)) for a, b in zip(gates, others, strict=True))
 
 
 def _crossing(found: Plan, problem: Problem, moving: dict[str, Gate]) -> Plan:
-    """The plan with its stages where its path crosses the gates as they move."""
+    """Return the plan with its stages at the times at which its path crosses the moving gates."""
     stages = tuple(
         replace(place, time=_crossed(found.trajectory, moving[place.gate], place.time))
         if place.gate in moving
@@ -85,7 +85,7 @@ def _crossing(found: Plan, problem: Problem, moving: dict[str, Gate]) -> Plan:
 
 
 def _crossed(path: Trajectory, gate: Gate, time: float) -> float:
-    """The time [s] near one at which a path crosses a gate's plane."""
+    """Return the time [s], near a given one, at which a path crosses a moving gate's plane."""
     assert gate.motion is not None, "gates that stand still are crossed where they are planned"
     for _ in range(STEPS):
         ahead = float((path.evaluate(time) - gate.places(np.array(time))) @ gate.normal)

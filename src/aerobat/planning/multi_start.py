@@ -320,7 +320,7 @@ class _Found:
 
 
 def _likeliest(begun: _Start) -> tuple[bool, bool, float]:
-    """Return the sort key of starts: certified plans, other plans, paths without plan; each shortest first."""
+    """Return the sort key of starts: certified plans, other plans, other paths; each kind shortest first."""
     plan, path = begun
     return plan is None, plan is None or not plan.certified, path.trajectory.duration
 

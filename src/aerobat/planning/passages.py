@@ -1,6 +1,6 @@
-"""Passages that a plan intends, through gates and balls: its placed stages, with what the problem's ask.
+"""Planned passages through gates and balls: placed stages with the requirements of the problem's stages.
 
-And, before anything is searched, the openings of gates beside the vehicle that shall pass them.
+The module also checks, before any search, that the vehicle fits through the gates and is clear at the ends.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ class PlacedStage:
     """A stage with the interval and the time at which a plan places it."""
 
     name: str
-    interval: int  # counted from 0; the stage holds at its end
+    interval: int  # counted from 0; the stage holds at the interval's end
     time: float  # [s]
-    gate: str | None = None  # the name of the gate that is passed there
+    gate: str | None = None  # name of the stage's gate, if any
 
 
 def place_stages(
     stages: Iterable[Stage], intervals: Iterable[int], times: Iterable[float]
 ) -> tuple[PlacedStage, ...]:
-    """Stages at the ends of intervals and at times [s]."""
+    """Return stages placed at the ends of intervals and at times [s]."""
     placed = zip(stages, intervals, times, strict=True)
     return tuple(PlacedStage(stage.name, interval, time, stage.gate) for stage, interval, time in placed)
 
 
 def timed_stages(places: Sequence[PlacedStage], problem: Problem) -> tuple[tuple[Stage, float], ...]:
-    """The problem's own stages that are placed, each with its time [s], in the order of the places.
+    """Return the problem's stages that are placed, each with its time [s], in the order of `places`.
 
-    A place belongs to the first stage of its gate or, without one, of its name, to which none before belongs.
-    A gate that no stage names is passed all the same; another place that no stage names is left out.
+    A place is matched to the first unmatched stage with the same gate or, without a gate, the same name. A
+    place without such a stage becomes a stage of its gate alone, or is left out if it has no gate.
     """
-    waiting = list(problem.stages(1.0).stages)  # the attitudes are the same, whatever thrust there is
+    waiting = list(problem.stages(1.0).stages)  # attitudes do not depend on the thrust, here 1.0
     found = []
     for place in places:
         key = (place.gate, None if place.gate else place.name)
@@ -58,28 +58,28 @@ def timed_stages(places: Sequence[PlacedStage], problem: Problem) -> tuple[tuple
 
 
 def as_passed(gates: Sequence[Gate], stages: Sequence[PlacedStage]) -> tuple[Gate, ...]:
-    """Gates where they are when placed stages pass them; those that none passes, where they are at first."""
+    """Return gates at their positions when placed stages pass them; others at their initial positions."""
     times = {place.gate: place.time for place in stages}
     return tuple(gate.at(times.get(gate.name, 0.0)) for gate in gates)
 
 
 def planned_passages(stages: Sequence[PlacedStage], problem: Problem) -> tuple[PlannedPassage, ...]:
-    """The gates that are passed at placed stages, as the problem's own stages ask, in their order."""
+    """Return the passages of gates at placed stages, in order, with the problem's requirements."""
     asked = timed_stages(stages, problem)
     return tuple(PlannedPassage.of(s, problem.gate(s.gate), t) for s, t in asked if s.gate is not None)
 
 
 def planned_waypoints(stages: Sequence[PlacedStage], problem: Problem) -> tuple[PlannedWaypoint, ...]:
-    """The balls that are met at placed stages, in their order."""
+    """Return the balls that placed stages meet, in order."""
     asked = timed_stages(stages, problem)
     return tuple(PlannedWaypoint(s.name, s.ball, t, s.lap) for s, t in asked if s.ball is not None)
 
 
 def require_openings(problem: Problem, vehicle: Vehicle) -> None:
-    """Refuse a vehicle whose body fits through the opening of a gate in no way that is asked.
+    """Raise SpecError if the body does not fit through the opening of a gate as the problem asks.
 
-    Where the thrust's direction is asked, the body turned about it as it fits best, and flying as it does;
-    else in any attitude. Raises SpecError, which names the gate and the least opening.
+    With a required thrust direction, any rotation about the thrust is allowed, otherwise any attitude. The
+    error names the gate and the least opening.
     """
     for stage in problem.stages(vehicle.max_specific_thrust).stages:
         if stage.gate is not None:
@@ -87,9 +87,9 @@ def require_openings(problem: Problem, vehicle: Vehicle) -> None:
 
 
 def require_clear_ends(problem: Problem, vehicle: Vehicle | None) -> None:
-    """Refuse ends where the body is in an obstacle, and obstacles where no vehicle says how large it is.
+    """Raise SpecError for ends at which the body is in an obstacle, and for obstacles without a vehicle.
 
-    Raises SpecError, which names the end and by how much it reaches in.
+    The error names the end and how far the body reaches into the obstacle.
     """
     environment = problem.surroundings
     if not environment.obstacles:
@@ -107,7 +107,7 @@ def require_clear_ends(problem: Problem, vehicle: Vehicle | None) -> None:
 
 
 def gaps_at_ends(problem: Problem, vehicle: Vehicle) -> tuple[list[float], list[str]]:
-    """Return the body's distance from what stands still at each end [m], and the name of the nearest."""
+    """Return the body's distance from static obstacles at each end [m], and the nearest obstacle's name."""
     environment, ends = problem.surroundings, problem.ends.values()
     positions = np.array([state.position for state in ends]).reshape(-1, 3)
     balance = force_balance(environment, vehicle)
@@ -138,10 +138,11 @@ def _require(gate: Gate, stage: Stage, vehicle: Vehicle) -> None:
 
 
 def _least_section(gate: Gate, thrust_axis: Array, semi_axes: Array) -> Array:
-    """The least section of a body in the gate, its centre there: of all √S u left and up, S (2, 2) [m²].
+    """Return the least section S (2, 2) [m²] of the body in the gate's plane, by left and up.
 
-    The section of an ellipsoid grows with it: the one about the thrust axis with the lesser of both other
-    semi-axes lies within it, however it is turned about that.
+    The section is the ellipse of all points √S u, |u| ≤ 1, with the body's centre in the plane. The section
+    is that of the ellipsoid of revolution about the thrust axis with the smaller of the two other semi-axes.
+    This ellipsoid lies within the body at any rotation about the thrust axis.
     """
     lesser = min(semi_axes[:2]) ** 2
     shape = lesser * np.eye(3) + (semi_axes[2] ** 2 - lesser) * np.outer(thrust_axis, thrust_axis)

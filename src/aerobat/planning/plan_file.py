@@ -1,15 +1,16 @@
-"""Plans as files: everything that a plan is, in one file that whatever follows can read.
+"""Plan files: a complete plan in one file that other programs can read.
 
 A .plan file is a NumPy .npz archive without pickles. Its arrays `durations` (S,), `coefficients`
-(S, degree + 1, 3), `heading` and, where it has one, `yaw` are the trajectory's, bit for bit. The rest is in
-`document`, as UTF-8 JSON: the problem and the vehicle as the tables of their files, the environment in full,
-and how the plan was made; its stages, attempts, certificate, flyability, recoveries, assessment and tube;
-frames, and the version of Aerobat that wrote the file. `digest` is the SHA-256 of all of that.
+(S, degree + 1, 3), `heading` and, if there is one, `yaw` are the trajectory's, bit for bit. The array
+`document` is UTF-8 JSON: problem and vehicle as in their own files, the environment in full, and how the plan
+was made; stages, attempts, certificate, flyability, recoveries, assessment and tube; frames, and the version
+of Aerobat that wrote the file. `digest` is the SHA-256 of all other content.
 
-A file proves nothing: a plan that is read has its certificate, flyability and assessment worked out anew.
-Results that take seconds are taken from the file only where the digest says that nothing was changed.
+A file proves nothing: certificate, flyability and assessment of a plan that is read are computed anew.
+Results that take seconds are taken from the file only if the digest shows that the file is unchanged.
 
-Schema and version rules are in docs/flight-package.md. `examples/flight_package.py` reads it by NumPy alone.
+Schema and version rules are in docs/flight-package.md. `examples/flight_package.py` reads such a file with
+NumPy alone.
 """
 
 from __future__ import annotations
@@ -38,11 +39,11 @@ from aerobat.trajectory import Trajectory
 from aerobat.trajectory.files import arrays_of, trajectory_in
 from aerobat.vehicle import Vehicle
 
-FORMAT = "aerobat-plan-1"  # another number where something goes, or means something else
-REVISION = 6  # of it: one more wherever something is added
-WORKED_OUT = {"certificate", "flyability", "assessment"}  # from a plan's path whenever they are read
-ASKED_FOR = {"recoveries", "opinion", "tube"}  # results that take seconds
-MAX_EVIDENCE = 2**23  # bytes of a document: that of twenty gates has some hundred thousand
+FORMAT = "aerobat-plan-1"  # gets another number where content is removed or changes its meaning
+REVISION = 6  # of the format: increased by one where content is added
+WORKED_OUT = {"certificate", "flyability", "assessment"}  # computed from a plan's path, never read
+ASKED_FOR = {"recoveries", "opinion", "tube"}  # results that take seconds, read from files with a digest only
+MAX_EVIDENCE = 2**23  # largest document [bytes]; a plan through twenty gates has some hundred thousand
 FRAMES = {
     "world": "ENU: x east, y north, z up [m]",
     "body": "FLU: x forward, y left, z up, thrust along +z",
@@ -78,16 +79,16 @@ class PlanRecord:
 def write_plan_file(
     path: PathName, problem: Problem, trajectory: Trajectory, vehicle: Vehicle | None, facts: PlanRecord
 ) -> None:
-    """Write a plan whole or not at all.
+    """Write a plan completely or not at all.
 
     Raises SpecError when the file cannot be written, or for a maneuver that is not registered.
 
     Args:
-        path: Of the file.
-        problem: What is planned.
-        trajectory: The path.
-        vehicle: What flies it.
-        facts: Everything else.
+        path: Path of the file.
+        problem: The plan's problem.
+        trajectory: The plan's trajectory.
+        vehicle: The plan's vehicle, if any.
+        facts: All other fields of the plan.
     """
     document = {
         "revision": REVISION,
@@ -108,9 +109,9 @@ def write_plan_file(
 
 
 def read_plan_file(path: PathName) -> tuple[Problem, Trajectory, Vehicle | None, dict[str, Any]]:
-    """Read a plan's problem, trajectory, vehicle, and the facts that are not worked out anew, by their names.
+    """Return a plan's problem, trajectory, vehicle, and by name the other fields that are not computed anew.
 
-    Revisions before 4 have no digest: their recoveries and tubes are left out.
+    Revisions before 4 have no digest: their recoveries, tubes and second opinions are left out.
     Raises SpecError, one sentence, for another file, a damaged or a changed one.
     """
     content = read_arrays(path, "plan")
@@ -142,7 +143,7 @@ def read_plan_file(path: PathName) -> tuple[Problem, Trajectory, Vehicle | None,
 
 
 def _in_full(environment: Environment) -> dict[str, Any]:
-    """Its table with what is left out of problems' files, where it is as usual, and obstacles as pieces."""
+    """Return the environment's table with defaults written out, and with obstacles as convex pieces."""
     return {
         "gravity": environment.gravity,
         "wind": environment.wind.tolist(),
@@ -158,7 +159,7 @@ def _piece_in_full(piece: ConvexPiece) -> dict[str, Any]:
 
 
 def facts_adapter() -> Any:
-    """Read, write and describe what a document holds under `evidence`, a pydantic TypeAdapter."""
+    """Return the pydantic TypeAdapter that reads, writes and describes `evidence` of a document."""
     from pydantic import TypeAdapter
 
     return TypeAdapter(PlanRecord)

@@ -1,7 +1,7 @@
-"""plan(): a problem in, a plan out, whichever the planner; and the planners by name.
+"""The function `plan`, from a problem to a plan by any planner, and the registry of planners.
 
-A planner is a class with a method `plan`, declared and registered by one line, the decorator `planner`. Help,
-the command line's choices and its options follow from its fields.
+A planner is a class with a method `plan`. The decorator `planner` declares and registers the class. Choices,
+options and help of the command line follow from the fields of the registered classes.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
 
 @runtime_checkable
 class Planner(Protocol):
-    """Whatever turns a problem into a plan.
+    """A method that turns a problem into a plan.
 
-    A planner of one's own inherits from this class and is registered by `@planner("its-name")`. It is given
-    closed courses, which have neither start nor goal, if its class says `PLANS_CLOSED_COURSES = True`.
+    A custom planner inherits from this class and is registered by `@planner("its-name")`. It gets closed
+    courses, which have neither start nor goal, only if its class sets `PLANS_CLOSED_COURSES = True`.
     """
 
     @abstractmethod
@@ -57,7 +57,7 @@ class Planner(Protocol):
 
 P = TypeVar("P", bound=Planner)
 
-DEFAULT_VEHICLE = "agile-quad"  # that is planned for where none is named, from Python as on the command line
+DEFAULT_VEHICLE = "agile-quad"  # the vehicle if none is named, in Python and on the command line
 
 PLANNERS: Registry[Planner] = Registry(
     Planner,  # type: ignore[type-abstract]
@@ -79,20 +79,20 @@ def plan(
     vehicle: Vehicle | str | None = DEFAULT_VEHICLE,
     progress: Progress | None = None,
 ) -> Plan:
-    """Plan a problem; with a vehicle, for its rotors, with its certificate, its own flight, its assessment.
+    """Plan a problem; with a vehicle, within its rotors' limits, with certificate, own flight, assessment.
 
-    A plan is for the rotors that give thrust, and counts them without the dead ones. Raises Infeasible, whose
-    message names the bound that binds and whose `attempts` hold the evidence, and SpecError for input that
-    makes no sense, a gate whose opening the vehicle does not fit into among it.
+    Dead rotors of the vehicle are removed, so that the plan numbers only the others. Raises Infeasible, whose
+    message names the bound that binds and whose `attempts` hold the evidence. Raises SpecError for invalid
+    input, such as a gate whose opening is too small for the vehicle.
 
     Args:
-        problem: What is planned, or its name.
-        planner: How to plan, say `Miqp(order=5)`, or a registered name, whose defaults are taken; left out,
-            the one that `suited_planner` names, as on the command line: where it keeps a reserve for the
-            controller, 15 % for most vehicles.
-        vehicle: What shall fly it, or its name, within its rotors' limits; by default agile-quad, as on the
-            command line. With None the plan knows no limits but the problem's.
-        progress: Called with every attempt as it ends.
+        problem: The problem, or its name.
+        planner: The planner, for example `Miqp(order=5)`, or a registered name, which stands for the
+            planner's defaults. If left out, the planner that `suited_planner` names is taken, with the
+            settings of the command line: it keeps a reserve for the controller, 15 % for most vehicles.
+        vehicle: The vehicle, or its name; agile-quad by default, as on the command line. With None the plan
+            knows no limits but the problem's.
+        progress: A function that is called with every attempt as it ends.
     """
     problem = as_problem(problem)
     vehicle = None if vehicle is None else as_vehicle(vehicle)
@@ -115,7 +115,7 @@ def plan(
 
 
 def _option_of(name: str) -> str:
-    """The hint about an argument that plan() has not and planners may have."""
+    """Return a hint for an argument that `plan` does not have, if it is an option of planners."""
     classes: Mapping[str, Any] = registered_planners()
     takers = [kind for kind, cls in classes.items() if name in {f.name for f in fields(cls)}]
     if not takers:
@@ -128,7 +128,7 @@ suggest_for(plan, _option_of)
 
 
 def _require_consistency(problem: Problem, vehicle: Vehicle) -> None:
-    """Refuse what is proven to have no plan, in milliseconds and whichever the planner."""
+    """Raise Infeasible for a problem that is proven in milliseconds to have no plan by any planner."""
     found = contradiction(problem, vehicle)
     if found is not None:
         sentence = f"'{problem.name}' is proven to have no plan: {found.sentence}"
@@ -136,11 +136,10 @@ def _require_consistency(problem: Problem, vehicle: Vehicle) -> None:
 
 
 def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
-    """The name of the planner to take where nobody names one.
+    """Return the name of the planner that is used if none is named.
 
-    It is miqp, whose search is exact, but for long courses, which it cannot search in reasonable time: for a
-    vehicle those are free-knots', as are closed ones and ways around obstacles through stages that say where
-    they are.
+    This is miqp, whose search is exact. Exceptions go to free-knots: closed courses, and with a vehicle long
+    courses, which miqp cannot search in reasonable time, and obstacles if all stages have positions.
     """
     if not problem.ends:
         return "free-knots"
@@ -152,23 +151,23 @@ def suited_planner(problem: Problem, vehicle: Vehicle | None) -> str:
 
 
 def planner_for(problem: Problem, vehicle: Vehicle | None) -> Planner:
-    """The planner that suits a problem, as the command line makes it without options: to be flown."""
+    """Return the planner that suits a problem, with the command line's defaults, whose plans can be flown."""
     cls = planner_class(suited_planner(problem, vehicle))
     return cls(**command_settings(cls))
 
 
 def command_settings(cls: type[Planner]) -> dict[str, Any]:
-    """Return the fields that a planner has otherwise on the command line, whose plans are to be flown."""
+    """Return the fields of a planner whose default on the command line differs: plans there can be flown."""
     return {o.name: o.command_default for o in planner_options(cls) if o.command_default is not None}
 
 
 def planner_with_reserve(name: str, reserve: float, **others: Any) -> Planner:
-    """Return a planner that is asked to keep a reserve, if it can.
+    """Return a planner, with a reserve if it has such a field.
 
     Args:
-        name: Its registered name.
-        reserve: Of each limit's range; with 0 that of plans that are flown.
-        **others: Of its fields.
+        name: The planner's registered name.
+        reserve: The reserve, as a fraction of each limit's range; 0 stands for FLYING_RESERVE.
+        **others: Values of other fields.
     """
     cls: Any = planner_class(name)
     if "reserve" in (f.name for f in fields(cls)):
@@ -177,9 +176,9 @@ def planner_with_reserve(name: str, reserve: float, **others: Any) -> Planner:
 
 
 def as_planner(planner: Planner | str) -> Planner:
-    """The planner, of itself or of its registered name, with its defaults.
+    """Return a planner: the argument itself, or the one registered by that name with its defaults.
 
-    Raises SpecError for a name that no planner has, and for what only looks like a planner.
+    Raises SpecError for an unknown name, and for classes and modules in place of a planner.
     """
     if isinstance(planner, str):
         if planner in vehicle_names():
@@ -192,25 +191,25 @@ def as_planner(planner: Planner | str) -> Planner:
 
 @validated
 def option(default: Any, help: str, off: str | None = None, command_default: Any = None) -> Any:
-    """A dataclass field with its help, which the command line offers as an option.
+    """Return a dataclass field with a help text, which the command line offers as an option.
 
     Args:
-        default: Its value, where nothing else is said.
-        help: A sentence, its unit included.
-        off: Of a field that is true by default, the name of the flag that makes it false.
-        command_default: Its value on the command line, whose plans are to be flown, where it is another one.
+        default: The field's default.
+        help: A sentence that includes the unit.
+        off: For a field that is true by default, the name of the flag that makes it false.
+        command_default: The default on the command line, whose plans can be flown, if it differs.
     """
     metadata = {"help": help, "off": off, "command_default": command_default}
     return field(default=default, metadata=metadata)
 
 
-# of a limit's range, kept from either of its ends for the controller
+# fraction of a limit's range that is kept from either of its ends for the controller
 Reserve = Annotated[float, Field(ge=0, lt=0.5)]
 KeptClearance = Annotated[float, Field(ge=0)]  # [m] kept from obstacles for the controller
 
 
 def clearance_option() -> Any:
-    """The option of planners that keep a clearance, a field `clearance` [m]."""
+    """Return the field `clearance` [m] of planners that keep a clearance from obstacles."""
     return option(
         0.0,
         "The distance in metres that the body keeps from obstacles for the controller, less where a passage "
@@ -222,7 +221,7 @@ def clearance_option() -> Any:
 @validated
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
 def planner(name: Label) -> Callable[[type[P]], type[P]]:
-    """Declare the class that follows and register it: by `name`, `plan` and the command line know it."""
+    """Return a decorator that declares a planner's class and registers it under `name`."""
 
     def register(cls: type[P]) -> type[P]:
         if "plan" in vars(cls):
@@ -234,9 +233,10 @@ def planner(name: Label) -> Callable[[type[P]], type[P]]:
 
 
 def _for_all_problems(name: str, cls: type[P]) -> PlanMethod[P]:
-    """The method `plan` of a planner's class, of problems with rests and moving gates too.
+    """Return the method `plan` of a planner's class, extended to problems with rests and moving gates.
 
-    Closed courses are left to planners that know them. Matrices are small: one thread does linear algebra.
+    The method refuses closed courses if the planner does not know them. Linear algebra runs on one thread, as
+    the matrices are small.
     """
     planned = through_moving_gates(between_holds(cls.plan))
     knows_closed_courses = getattr(cls, "PLANS_CLOSED_COURSES", False)
@@ -259,12 +259,15 @@ def _for_all_problems(name: str, cls: type[P]) -> PlanMethod[P]:
 
 
 def registered_planners() -> Mapping[str, type[Planner]]:
-    """The planners by their names: those of this package first, then of plugins and installed packages."""
+    """Return the planners by name: first those of this package, then those of plugins and other packages."""
     return MappingProxyType({name: PLANNERS[name] for name in PLANNERS})
 
 
 def planner_class(name: str) -> type[Planner]:
-    """The planner's class of that name; no other of the package's is imported. Raises SpecError for none."""
+    """Return the class of a planner by its name; other planners of the package are not imported.
+
+    Raises SpecError for an unknown name.
+    """
     return PLANNERS[name]
 
 
@@ -276,12 +279,12 @@ class PlannerOption:
     type: Any
     default: Any
     help: str
-    flag: str  # --time-limit; of a field that is true by default what makes it false
-    command_default: Any = None  # the command line's default, where it is another one
+    flag: str  # such as --time-limit; for a field that is true by default, the flag that makes it false
+    command_default: Any = None  # the command line's default if it differs
 
 
 def planner_options(cls: type[Any]) -> tuple[PlannerOption, ...]:
-    """The options that the command line offers of a planner: its fields that have a help."""
+    """Return the options of a planner on the command line: its fields that have a help text."""
     hints = get_type_hints(cls)
     return tuple(_option(f, hints[f.name]) for f in fields(cls) if "help" in f.metadata)
 

@@ -1,4 +1,4 @@
-"""The record of planning: every attempt, kept in order and passed on as it ends."""
+"""The record of planning: every attempt in order, reported as it ends."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ class Attempt:
     feasible: bool
     status: str  # of the program: optimal, time_limit (the best found by then), infeasible, unknown
     outcome: str  # a sentence
-    cost: float | None  # what the planner minimizes, as in Plan
+    cost: float | None  # the minimized cost, as in Plan; None: no solution, or not nearly feasible
     nodes: int  # QPs solved, or iterations
-    solve_time: float = field(compare=False)  # [s] of the clock
+    solve_time: float = field(compare=False)  # wall-clock time [s]
     dt: float | None = None  # [s] of the intervals, where they are equal
-    margin: float | None = None  # [N] of the rotors, negative: beyond their limits; None: not looked at
+    margin: float | None = None  # [N] of the rotors, negative: beyond their limits; None: not computed
 
 
 Progress = Callable[[Attempt], None]
@@ -26,18 +26,18 @@ Progress = Callable[[Attempt], None]
 
 @dataclass
 class Recorder:
-    """Keeps attempts and calls `progress` with each as it ends."""
+    """A list of attempts that also calls `progress` with each attempt as it ends."""
 
     progress: Progress | None = None
     attempts: list[Attempt] = field(default_factory=list)
 
     @property
     def last_outcome(self) -> str:
-        """The sentence on the last attempt, or that there was none."""
+        """The outcome of the last attempt, or a sentence that there was none."""
         return self.attempts[-1].outcome if self.attempts else "no path to begin from was found"
 
     def record(self, attempt: Attempt) -> None:
-        """Keep an attempt and pass it on."""
+        """Record an attempt and report it."""
         self.attempts.append(attempt)
         if self.progress is not None:
             self.progress(attempt)

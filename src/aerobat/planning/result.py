@@ -23,10 +23,10 @@ from aerobat.simulation.autopilot import Recoveries
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-# of every limit's range, kept from either end for the controller by planners that use all of it, where a
-# plan shall be flown: rotors without lag leave it nothing otherwise
+# reserve of plans that are to be flown, as a fraction of every limit's range, by planners that otherwise use
+# the whole range: with rotors without lag they would leave the controller nothing
 FLYING_RESERVE = 0.15
-FLYING_CLEARANCE = 0.1  # [m] from obstacles, of plans that are flown: what errors take under lab
+FLYING_CLEARANCE = 0.1  # clearance from obstacles of plans to be flown [m]: covers tracking errors under lab
 
 
 @validated
@@ -37,29 +37,29 @@ class Plan:
 
     problem: Problem
     trajectory: Trajectory
-    planner: str  # its registered name
-    order: int | None = None  # of the derivative of position that is the input, or the closed form's cost
-    cost: float | None = None  # what the planner minimizes: Σ|u|², ∫|p⁽ˢ⁾|² dt, or the duration [s]
+    planner: str  # the planner's registered name
+    order: int | None = None  # the derivative of position that is the input, or is in the closed form's cost
+    cost: float | None = None  # the minimized cost: Σ|u|², ∫|p⁽ˢ⁾|² dt, or the duration [s]
     status: str = "feasible"  # or optimal, time_limit (the best found by then), locally optimal, stopped
-    backend: str = ""  # what solved it
+    backend: str = ""  # the solver
     stages: tuple[PlacedStage, ...] = ()
     attempts: tuple[Attempt, ...] = ()
     dt: float | None = None  # [s] of the intervals, where they are equal
-    bound: float | None = None  # the cost of any solution at this dt is at least this, proven
+    bound: float | None = None  # a proven lower bound on the cost of any solution at this dt
     gap: float | None = None  # (cost − bound) / cost
-    vehicle: Vehicle | None = None  # what it was planned or certified for
-    recoveries: Recoveries | None = None  # to a hover, from instants all along it; None where none is known
-    opinion: SecondOpinion | None = None  # of another planner, where one was asked
-    rescue: str = ""  # what found it, where what was asked for found nothing
-    starts: tuple[float, ...] = ()  # [s] that first, coarse solves from several starts came to, rising
-    tube: Tube | None = None  # of its flights, where it was tightened until they pass
-    evidence: Evidence | None = None  # for its own path, vehicle and stages; None without a vehicle
+    vehicle: Vehicle | None = None  # the vehicle of the plan and its certificate
+    recoveries: Recoveries | None = None  # to a hover, from instants along the path; None where not computed
+    opinion: SecondOpinion | None = None  # another planner's answer; None where not asked
+    rescue: str = ""  # how the plan was found, where the requested settings found none
+    starts: tuple[float, ...] = ()  # [s] durations of the rough paths from several starts, ascending
+    tube: Tube | None = None  # of simulated flights, where the plan was tightened until they pass
+    evidence: Evidence | None = None  # for the plan's own path, vehicle and stages; None without a vehicle
 
     def __post_init__(self) -> None:
         own = None
         if self.vehicle is not None:
             own = Evidence(Task.of(self.problem, self.vehicle), self.trajectory, self.stages)
-        if self.evidence != own:  # that of another path, before `replace`
+        if self.evidence != own:  # left over from another path by `replace`
             object.__setattr__(self, "evidence", own)
 
     @property
@@ -69,18 +69,18 @@ class Plan:
 
     @property
     def flyability(self) -> Flyability | None:
-        """The findings of the vehicle's own flights, simulated; None without a vehicle."""
+        """The findings of the plan's simulated flights; None without a vehicle."""
         return None if self.evidence is None else self.evidence.flyability
 
     @property
     def assessment(self) -> Assessment | None:
-        """The plan beside what is possible and usual for the vehicle; None without one."""
+        """The assessment of the plan against what is possible and usual; None without a vehicle."""
         if self.evidence is None:
             return None
         return replace(self.evidence.assessment, opinion=self.opinion)
 
     def for_vehicle(self, vehicle: Vehicle) -> Plan:
-        """Return the plan as one for another vehicle, without what was found out for its own.
+        """Return the plan for another vehicle, without the results that were computed for the present one.
 
         Raises SpecError for a vehicle that its dead rotors leave without control.
         """
@@ -94,16 +94,16 @@ class Plan:
 
     @property
     def certified(self) -> bool:
-        """True if it is proven that its vehicle can fly it within all limits."""
+        """True if it is proven that the plan's vehicle can fly the trajectory within all limits."""
         return self.certificate is not None and self.certificate.certified
 
     @property
     def flies(self) -> bool:
-        """True if its vehicle, simulated, keeps to it within FLYABLE_ERROR and passes its gates as asked."""
+        """True if the vehicle, simulated, tracks the path within FLYABLE_ERROR and passes gates as asked."""
         return self.flyability is not None and self.flyability.flies
 
     def keeps(self, reserve: float) -> bool:
-        """Return True for a certified plan whose rotors keep a fraction `reserve` of their ranges."""
+        """Return whether the plan is certified and its rotors keep a fraction `reserve` of their ranges."""
         certificate = self.certificate
         return certificate is not None and self.certified and not reserve_shortfalls(certificate, reserve)
 
@@ -114,21 +114,25 @@ class Plan:
 
     @property
     def wants_second_opinion(self) -> bool:
-        """True if it is suspicious and no other planner was asked yet; one that a limit ended has no time."""
+        """True if the plan is suspicious and no other planner was asked.
+
+        False for plans of time-optimal, and where a time limit ended the planning.
+        """
         found = self.assessment
         is_open = self.planner != "time-optimal" and self.status != "time_limit"
         return found is not None and found.suspicious and self.opinion is None and is_open
 
     @property
     def spread(self) -> float | None:
-        """By how much more the slowest start came to than the fastest [-]; None of fewer than two."""
+        """The slowest start's duration relative to the fastest's, minus one [-]; None below two starts."""
         return self.starts[-1] / self.starts[0] - 1.0 if len(self.starts) > 1 else None
 
     @property
     def laps(self) -> tuple[float, ...]:
-        """The times [s] at which laps end, of a closed course or one of several.
+        """The times [s] at which laps end, of a closed course or of several laps; empty for other plans.
 
-        They end with their last stages, those of a closed course as long after that as it is to the seam.
+        A lap ends at its last stage. On a closed course each lap ends later, by the time from the last stage
+        to the seam.
         """
         if len(self.problem.stages(1.0).stages) != len(self.stages):
             return ()
@@ -141,7 +145,7 @@ class Plan:
 
     @property
     def lap_times(self) -> tuple[float, ...]:
-        """The durations [s] of laps, the first since the start."""
+        """The durations [s] of laps; the first lap begins at the start."""
         return tuple(np.diff([0.0, *self.laps]).tolist())
 
     @property
@@ -151,23 +155,23 @@ class Plan:
 
     @property
     def pieces(self) -> str:
-        """The trajectory's segments in words: those of one length are intervals."""
+        """The number of the trajectory's segments in words; segments of equal duration are intervals."""
         one = "segment" if self.dt is None else "interval"
         return f"1 {one}" if self.intervals == 1 else f"{self.intervals} {one}s"
 
     @property
     def nodes(self) -> int:
-        """QPs solved, or iterations, over all attempts."""
+        """The number of QPs solved, or of iterations, over all attempts."""
         return sum(attempt.nodes for attempt in self.attempts)
 
     @property
     def solve_time(self) -> float:
-        """Time in the solver over all attempts [s]."""
+        """The time in the solver over all attempts [s]."""
         return sum(attempt.solve_time for attempt in self.attempts)
 
     @validated
     def save(self, path: PathName) -> None:
-        """Write the whole plan as one file, whole or not at all; `load_plan` reads it back.
+        """Write the plan as one file, completely or not at all; `load_plan` reads it back.
 
         Raises SpecError when the file cannot be written.
         """
@@ -177,7 +181,7 @@ class Plan:
         write_plan_file(path, self.problem, self.trajectory, self.vehicle, facts)
 
     def __str__(self) -> str:
-        """One line for people."""
+        """The plan's main results in one line."""
         stages = ", ".join(f"{s.name} at {s.time:.2f} s" for s in self.stages) or "no stages"
         margin = "" if self.margin is None else f"; rotors {self.margin}"
         proof = "" if self.certificate is None else f"; {self.certificate}"
@@ -195,12 +199,12 @@ class Plan:
 
 
 P = TypeVar("P")
-PlanMethod = Callable[[P, Problem, Vehicle | None, Progress | None], Plan]  # `plan` of a planner P
+PlanMethod = Callable[[P, Problem, Vehicle | None, Progress | None], Plan]  # the method `plan` of a planner P
 
 
 @validated
 def load_plan(path: PathName) -> Plan:
-    """Read what `Plan.save` wrote, exactly; its proof and its own flights are worked out anew.
+    """Return the plan that `Plan.save` wrote, exactly; its certificate and its flights are computed anew.
 
     Raises SpecError, one sentence, for any other file, a damaged or a changed one.
     """

@@ -1,4 +1,4 @@
-"""The rotors' margin and reserve, read from a certificate; samples, which can refute but not prove."""
+"""The rotors' margin and reserve, from a certificate, or from samples, which can refute but not prove."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ from aerobat.simulation.outcome import digits
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-SAMPLES_PER_DEGREE = 2  # of each segment, per degree of its polynomial: a cubic's extremes stand out
+SAMPLES_PER_DEGREE = 2  # samples of a segment per degree of its polynomial, enough to show a cubic's extrema
 
 
 @dataclass(frozen=True)
 class RotorMargin:
     """The distance of the rotors from their limits along a trajectory, by flatness.
 
-    `min_thrust` is the least thrust of the rotor that comes closest to its lower limit, `max_thrust` the
-    largest of the one that comes closest to its upper limit: with equal rotors, of all of them. Of a rotor
-    with lag the thrust that is commanded counts as well, wherever a certificate says so.
+    `min_thrust` is the least thrust of the rotor that comes closest to its lower limit. `max_thrust` is the
+    largest thrust of the rotor that comes closest to its upper limit. With equal rotors they are the extrema
+    of all rotors. From a certificate, the commands of rotors with lag count as well.
     """
 
     min_thrust: float  # [N]
-    min_time: float  # [s]
+    min_time: float  # [s] of the least thrust
     min_rotor: int
     max_thrust: float  # [N]
-    max_time: float  # [s]
+    max_time: float  # [s] of the largest thrust
     max_rotor: int
     low_margin: float  # [N] from the lower limit, negative: below it
     high_margin: float  # [N] from the upper limit, negative: above it
 
     @classmethod
     def of(cls, certificate: Certificate) -> RotorMargin | None:
-        """A certificate's findings about rotors, in short; None if no attitude is ever determined."""
+        """Return the margin that a certificate proves; None if no attitude is ever determined."""
         if certificate.worst is None:
             return None
         sides = (rotor_findings(certificate, side) for side in (Side.MIN, Side.MAX))
@@ -59,16 +59,16 @@ class RotorMargin:
 
     @property
     def margin(self) -> float:
-        """The distance to the nearest limit [N], negative: beyond it by so much."""
+        """The distance to the nearest limit [N]; negative beyond the limit."""
         return min(self.low_margin, self.high_margin)
 
     @property
     def reason(self) -> Reason:
-        """The outcome in a few words, with the nearest limit."""
+        """The margin in words, with the field of the nearest limit."""
         return Reason(str(self), ("min_thrust" if self.low_margin < self.high_margin else "max_thrust",))
 
     def __str__(self) -> str:
-        """The outcome in a few words."""
+        """The margin in words."""
         words = f"{digits(self.min_thrust)} to {digits(self.max_thrust)} N, "
         off = f"{digits(abs(self.margin))} N"
         if self.margin >= 0:
@@ -79,10 +79,11 @@ class RotorMargin:
 
 
 def sampled_margin(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> RotorMargin:
-    """The margin of thrusts at samples only, never smaller than the true one: negative, it needs no proof.
+    """Return the margin of thrusts at samples, an upper bound of the true margin.
 
-    What rotors with lag are commanded could only make it smaller, and is left to the certificate.
-    Costs a seventh of a certificate, and most attempts of a search on durations are far beyond their limits.
+    A negative margin at samples refutes a path without a certificate, in a seventh of the time. Most attempts
+    of a search on durations are refuted like that. The commands of rotors with lag are not sampled; they
+    could only reduce the margin.
     """
     s = np.linspace(0.0, 1.0, SAMPLES_PER_DEGREE * max(trajectory.degree, 1), endpoint=False)
     times = (trajectory.knots[:-1, None] + s * trajectory.durations[:, None]).ravel()
@@ -103,11 +104,11 @@ def sampled_margin(trajectory: Trajectory, vehicle: Vehicle, environment: Enviro
 
 @dataclass(frozen=True)
 class ReserveShortfall:
-    """A rotor's thrust or command that is not proven to keep as much from its limit as was asked."""
+    """A rotor's thrust or command that is not proven to keep the required reserve from its limit."""
 
     finding: Finding
-    reserve: float  # of the rotor's range, asked
-    kept: float  # of it, proven
+    reserve: float  # required fraction of the rotor's range
+    kept: float  # proven fraction of the rotor's range
 
     @property
     def size(self) -> float:
@@ -115,7 +116,7 @@ class ReserveShortfall:
         return self.reserve - self.kept
 
     def __str__(self) -> str:
-        """One sentence without its full stop."""
+        """The shortfall in one sentence without its full stop."""
         return (
             f"the {self.finding.name} keeps {100.0 * self.kept:.3g} % of its range at "
             f"{self.finding.time:.3f} s, {100.0 * self.reserve:.3g} % are asked in reserve"
@@ -123,15 +124,15 @@ class ReserveShortfall:
 
     @property
     def reason(self) -> Reason:
-        """The sentence with the limit that the reserve is kept from."""
+        """The sentence, with the field of the limit."""
         return Reason(str(self), (self.finding.field, "reserve"))
 
 
 def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[ReserveShortfall]:
-    """Return the findings where rotors are not proven to keep a reserve, the worst first.
+    """Return the findings where rotors are not proven to keep a reserve, those that keep least first.
 
-    The reserve is a fraction of a rotor's range, at its lower end a part of what a hover takes. The list is
-    empty without a reserve: then the rotors' limits are all that counts.
+    The reserve is a fraction of a rotor's range. At the lower end it is reduced to a part of the distance
+    from the limit to hover thrust, where that is small. The list is empty for zero reserve.
     """
     if reserve <= 0.0:
         return []
@@ -143,7 +144,7 @@ def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[Reserve
 
 
 def rotor_findings(certificate: Certificate, side: Side | None = None) -> list[Finding]:
-    """Findings of a certificate about each rotor's thrust, and its command if it lags, on one side or all."""
+    """Return the findings about rotors' thrusts and the commands of rotors with lag, of one side or both."""
     return [f for f in certificate.findings if f.rotor is not None and side in (None, f.side)]
 
 

@@ -1,7 +1,6 @@
-"""The smallest feasible duration, whatever feasible means: one search, shared by the planners.
+"""Searches for the smallest feasible time scale, shared by the planners.
 
-An attempt is a function of one number, the scale of time [s] (the MIQP's dt, say); it returns what it
-found there, or None where nothing feasible exists.
+An attempt is a function of the time scale [s], such as the MIQP's dt. It returns a feasible result, or None.
 """
 
 from __future__ import annotations
@@ -20,16 +19,16 @@ Attempting = Callable[[float], Found | None]
 
 @runtime_checkable
 class Search(Protocol):
-    """A way to look for the smallest feasible scale of time."""
+    """A method to find the smallest feasible time scale."""
 
     def smallest(self, attempt: Attempting[Found]) -> Found | None:
-        """The find of the attempt at the smallest scale that the search reaches, or None."""
+        """Return the result at the smallest feasible scale that the search finds, or None."""
         ...
 
 
 @declared
 class GridSearch:
-    """The first feasible of `count` equal steps from `first` to `last` [s] (paper, Section II)."""
+    """The first feasible of `count` equally spaced scales from `first` to `last` [s] (paper, Section II)."""
 
     first: Positive = 0.1
     last: Positive = 4.0
@@ -39,7 +38,7 @@ class GridSearch:
         _require_order(self.first, self.last)
 
     def smallest(self, attempt: Attempting[Found]) -> Found | None:
-        """Try each in turn and stop at the first that is feasible."""
+        """Return the result at the first feasible scale, in rising order, or None."""
         for scale in np.linspace(self.first, self.last, self.count).tolist():
             if (found := attempt(scale)) is not None:
                 return found
@@ -48,10 +47,10 @@ class GridSearch:
 
 @declared
 class BisectionSearch:
-    """Climb from `first` by `growth` until feasible, then halve the last step down to `tolerance`.
+    """Raise the scale from `first` by factors `growth` until feasible, then bisect down to `tolerance`.
 
-    Feasibility need not be monotone; the result is feasible, and the scale below it by the tolerance is
-    not (a slow flip is infeasible again, so climbing from below finds the fast one).
+    The result is feasible, and the scale below it by the tolerance is not. Feasibility need not be monotone:
+    a slow flip is infeasible again, so the search rises from below to find the fast one.
     """
 
     first: Positive = 0.02  # [s]
@@ -63,7 +62,7 @@ class BisectionSearch:
         _require_order(self.first, self.last)
 
     def smallest(self, attempt: Attempting[Found]) -> Found | None:
-        """Climb, then bisect between the last infeasible and the first feasible."""
+        """Return the result at the smallest feasible scale found by rising and bisection, or None."""
         below, scale = None, self.first
         while (found := attempt(scale)) is None:
             if scale >= self.last:

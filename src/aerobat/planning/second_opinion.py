@@ -1,4 +1,4 @@
-"""Evidence on a plan that takes seconds, on request: another planner's answer, and the plan's recoveries."""
+"""Evidence that takes seconds and is computed on request: another planner's answer, and recoveries."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from aerobat.planning.recorder import Progress
 from aerobat.planning.result import Plan
 from aerobat.simulation.autopilot import UndeterminedAttitude, recoveries
 
-OPINION = "free-knots"
-OPINION_RESERVE = 0.03  # of every limit's range, that a shorter plan keeps: it flies, if little disturbs it
-OPINION_TIME = 20.0  # [s] at most: a poor plan of a long course would keep free knots busy for an hour
+OPINION = "free-knots"  # the planner that gives second opinions
+OPINION_RESERVE = 0.03  # reserve of its plan, as a fraction of limits' ranges: enough for small disturbances
+OPINION_TIME = 20.0  # time limit [s]: from a poor plan of a long course, free-knots would take an hour
 
 
 @validated
 def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
-    """The plan; where its assessment finds it suspicious, with what free knots make of the same problem.
+    """Return the plan, with the answer of free-knots to the same problem if the plan is suspicious.
 
-    They begin from the plan. That takes seconds, OPINION_TIME at most, and no more than is left of a limit
-    (`optimization.deadline.within_time`); what they found by then counts. Time-optimal plans need none, and
-    a plan that a limit ended gets none.
+    The planner free-knots starts from the plan. It takes seconds, OPINION_TIME at most, and no more than is
+    left of a time limit (`optimization.deadline.within_time`); the best plan by then counts. Plans of
+    time-optimal, and plans that a time limit ended, get no second opinion.
     Raises SpecError without a vehicle.
 
     Args:
-        plan: For a vehicle.
-        progress: Called with every attempt as it ends.
+        plan: A plan for a vehicle.
+        progress: A function that is called with every attempt as it ends.
     """
     _require_vehicle(plan)
     if not plan.wants_second_opinion:
@@ -40,7 +40,7 @@ def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
 
 
 def with_recoveries(plan: Plan) -> Plan:
-    """The plan for a vehicle with its recoveries to a hover; without where its attitude is undetermined.
+    """Return the plan with its recoveries to a hover; unchanged if its attitude is undetermined.
 
     Raises SpecError without a vehicle.
     """
@@ -54,19 +54,19 @@ def with_recoveries(plan: Plan) -> Plan:
 
 
 def with_explanation(plan: Plan, progress: Progress | None = None) -> Plan:
-    """The plan with what takes seconds to know: a second opinion, where it wants one, and its recoveries.
+    """Return the plan with a second opinion, where it is suspicious, and with its recoveries.
 
     Raises SpecError without a vehicle.
 
     Args:
-        plan: For a vehicle.
-        progress: Called with every attempt of the second opinion as it ends.
+        plan: A plan for a vehicle.
+        progress: A function that is called with every attempt of the second opinion as it ends.
     """
     return with_recoveries(with_second_opinion(plan, progress))
 
 
 def _second_opinion(plan: Plan, progress: Progress | None) -> SecondOpinion:
-    """A shorter plan by free knots that is certified and flies, if there is one."""
+    """Return the second opinion, with the duration of a shorter plan that is certified and flies, if any."""
     free_knots: Any = planner_class(OPINION)
     planner, shorter = free_knots(start=plan, reserve=OPINION_RESERVE), None
     try:

@@ -1,4 +1,4 @@
-"""A limit on the time of planning: what all planners say of it."""
+"""A limit on the time of planning: the texts and the handling that all planners share."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ TIME_LIMIT = "Seconds for planning; the best plan found by then is taken, and sa
 
 
 def stopped(plan: Plan) -> Plan:
-    """The plan; where no time is left, as the best that was found by then."""
+    """Return the plan, with the status `time_limit` if no time is left."""
     return replace(plan, status="time_limit") if out_of_time() else plan
 
 
 def best_in_time(
     problem: Problem, limit: float | None, recorder: Recorder, search: Callable[[], Plan | None]
 ) -> Plan | None:
-    """The plan that a search finds within a limit, the best by then; None where there is none at all.
+    """Return the plan that a search finds within a time limit; None where it ends in time without a plan.
 
     Args:
-        problem: What is planned.
-        limit: The planner's own [s]; None adds none.
-        recorder: Keeps the search's attempts.
-        search: Finds a plan.
+        problem: The problem that is planned.
+        limit: The planner's own limit [s]; None adds no limit.
+        recorder: Records the search's attempts.
+        search: A function that returns a plan or None.
 
     Raises:
-        Infeasible: The time was over before anything was found.
+        Infeasible: The time was over before a plan was found.
     """
     with within_time(limit):
         found = search()
         if found is not None:
             return stopped(found)
         if out_of_time():
-            # closed courses are no problem of miqp's
+            # miqp does not plan closed courses
             remedy = "take the planner miqp, which is quick" if problem.ends else ""
             raise too_short(problem, limit, recorder.attempts, remedy)
     return None
 
 
 def best_by_limit(plan: Plan) -> str:
-    """Return words on a plan that a limit ended, with its gap where that is known; empty for other plans."""
+    """Return words on a plan that a time limit ended, with its gap if known; empty for other plans."""
     if plan.status != "time_limit":
         return ""
     if plan.assessment is None or plan.assessment.ratio == inf:
@@ -62,13 +62,13 @@ def too_short(
     attempts: Sequence[Attempt],
     remedy: str,
 ) -> Infeasible:
-    """The error of a search whose time was over before anything was found.
+    """Return the error of a search whose time was over before a plan was found.
 
     Args:
-        problem: What was planned.
-        limit: The planner's own [s]; None where another's ended it.
-        attempts: What was tried.
-        remedy: What else may help; empty where nothing does.
+        problem: The problem that was planned.
+        limit: The planner's own limit [s]; None where an outer limit ended the search.
+        attempts: The attempts that were made.
+        remedy: Another remedy than more time; may be empty.
     """
     given = "the time given" if limit is None else f"{limit:g} s"
     return Infeasible(

@@ -21,21 +21,21 @@ from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 STARTS = 8
-FINALISTS = 3  # of the fastest paths
-LEG_SEGMENTS = 4  # of a course's leg
+FINALISTS = 3  # number of fastest rough paths that get more segments
+LEG_SEGMENTS = 4  # segments of each leg of a course
 
 
 @planner("time-optimal")
 class TimeOptimal(Planner):
     """The fastest certified path that is found from many starts; a yardstick for the other planners.
 
-    Starts are the plans of other planners, with and without rotors, and the same at other paces; on a course
-    the closed forms through its stages, around obstacles the fastest way past them. All of them are refined
-    roughly; `Plan.starts` has their durations. The fastest get more polynomials as long as that gains, up to
-    `segments`, a course four a leg, and the fastest that is certified is returned. A `start`, a plan of
-    whichever planner, is refined alone, and others where it leads nowhere. Each limit is used in full, which
-    leaves nothing for a controller: `reserve`, a fraction of the range of rotors and body rate, is kept from
-    either end for it.
+    Starts are the plans of other planners, with and without a vehicle, and their paths at other paces. On a
+    course they are the closed forms through its stages, around obstacles the fastest route. All starts are
+    refined roughly; `Plan.starts` has the durations. The fastest paths get more segments as long as that
+    gains, up to `segments`, or four a leg on a course. The fastest certified path is returned. A `start`, a
+    plan of any planner, is refined alone; other starts follow only if it fails. All limits are used in full,
+    which leaves no margin for a controller, unless a `reserve` is kept: a fraction of the range of rotors and
+    body rate, from either end.
     """
 
     PLANS_CLOSED_COURSES: ClassVar[bool] = True
@@ -61,10 +61,9 @@ class TimeOptimal(Planner):
     def plan(
         self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
     ) -> Plan:
-        """The fastest certified plan found; where none is faster, a plan that it began from.
+        """Return the fastest certified plan found, which may be a plan from which the search started.
 
-        Raises SpecError without a vehicle and for input that makes no sense, Infeasible when nothing is
-        certified.
+        Raises SpecError without a vehicle and for invalid input, Infeasible when nothing is certified.
         """
         task = flown_task("time-optimal", problem, vehicle, self.reserve, self.clearance)
         refinement = Refinement.of(task, Recorder(progress))

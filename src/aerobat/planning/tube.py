@@ -1,4 +1,4 @@
-"""The tube of a plan that was tightened: how far its flights stray, how many pass, and what that costs."""
+"""The tube of a tightened plan: the spread of its flights, how many of them pass, and the added duration."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from aerobat.simulation.outcome import length
 class Tube:
     """The spread of a plan's flights along time, and the proof that they pass.
 
-    At each of `times` a fraction `level` of the sampled flights keeps within the errors, and to the margin or
-    more: the least part of a rotor's range between its command and either limit, negative where clipped
-    thrust would be needed beyond it.
+    The errors and the margin are quantiles. At each of `times` a fraction `level` of the sampled flights has
+    errors no larger, and a margin no smaller. The margin is the least distance of a rotor's command from
+    either limit, as a fraction of the rotor's range. It is negative where a command is saturated.
     """
 
-    conditions: str  # their name
+    conditions: str  # name of the flights' conditions
     seed: int
     level: float  # [-] of the quantiles
     times: tuple[float, ...]  # [s], (T,)
     position_error: tuple[float, ...]  # [m], (T,)
     attitude_error: tuple[float, ...]  # [rad], (T,)
     rotor_margin: tuple[float, ...]  # [-] of a rotor's range, (T,)
-    reserve: float  # [-] of every limit's range, that the plan keeps
+    reserve: float  # [-] fraction of every limit's range that the plan keeps
     plain_duration: float  # [s] of the plan without tightening
-    probability: float  # [-] with which a flight was asked to pass
-    passed: int  # of `flights`
-    flights: int  # fresh ones: none of them told how to tighten
+    probability: float  # [-] required probability that a flight passes
+    passed: int  # number of `flights` that passed
+    flights: int  # number of test flights, none of which was used for the tightening
     lower_bound: float  # [-] of the probability of passing, at 95 % confidence
 
     def __post_init__(self) -> None:
-        """Check that there is one of each for every time."""
+        """Check that all series have one value for each time."""
         series = self.position_error, self.attitude_error, self.rotor_margin
         if not self.times or any(len(values) != len(self.times) for values in series):
             raise SpecError(
@@ -41,25 +41,25 @@ class Tube:
 
     @property
     def max_position_error(self) -> float:
-        """The tube's widest [m]."""
+        """The largest position error of the tube [m]."""
         return max(self.position_error)
 
     @property
     def max_attitude_error(self) -> float:
-        """The tube's widest [rad]."""
+        """The largest attitude error of the tube [rad]."""
         return max(self.attitude_error)
 
     @property
     def min_rotor_margin(self) -> float:
-        """The least margin that the tube leaves, as a fraction of a rotor's range [-]."""
+        """The least rotor margin of the tube, as a fraction of a rotor's range [-]."""
         return min(self.rotor_margin)
 
     def price(self, duration: float) -> float:
-        """By how much longer a plan of that duration [s] is than the plain one [s]."""
+        """Return how much longer a plan of a duration [s] is than the plan without tightening [s]."""
         return duration - self.plain_duration
 
     def __str__(self) -> str:
-        """The proof in a sentence without its full stop."""
+        """The result in a sentence without its full stop."""
         return (
             f"{self.passed} of {self.flights} fresh flights under {self.conditions} pass, with a probability "
             f"of {100 * self.lower_bound:.2f} % at least; {100 * self.level:g} % keep within "

@@ -1,4 +1,4 @@
-"""How often a path turns the vehicle over, beside how often its stages ask for that."""
+"""The number of turns of a path to upside down, beyond those that its stages ask."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from aerobat.problem.condition import Quantity
 from aerobat.problem.stage import Stage
 from aerobat.trajectory import Trajectory
 
-# of the duration, that a turn beyond those asked counts like: a way without one is worth that
-TURN_PRICE = 0.2
-UPSIDE_DOWN = -0.5  # of the thrust's direction along the vertical: tilted by 120° or more
-PLACES = np.linspace(0.0, 1.0, 64, endpoint=False)  # of a segment, where the thrust is looked at
+TURN_PRICE = 0.2  # fraction of the duration that each extra turn adds when paths are compared
+UPSIDE_DOWN = -0.5  # vertical thrust direction below which a body is upside down: a tilt of 120° or more
+PLACES = np.linspace(0.0, 1.0, 64, endpoint=False)  # fractions of a segment at which the thrust is sampled
 
 
 def priced_duration(task: Task, trajectory: Trajectory) -> float:
-    """Return a path's duration [s], longer by TURN_PRICE for each turn beyond those asked."""
+    """Return a path's duration [s], increased by the fraction TURN_PRICE for each extra turn."""
     return trajectory.duration * (1.0 + TURN_PRICE * extra_turns(task, trajectory))
 
 
 def extra_turns(task: Task, trajectory: Trajectory) -> int:
     """Return how many times a path turns the vehicle upside down beyond what its stages ask.
 
-    Stages that never ask for it leave it free, as do courses with places, where it shortens the way.
+    The number is zero where no stage asks for a turn, and on courses with positions, where turns can save
+    time.
     """
     stages = task.stages
     asked = [False, *map(_asks_upside_down, stages.stages)]
@@ -36,12 +36,12 @@ def extra_turns(task: Task, trajectory: Trajectory) -> int:
     velocity, acceleration = (trajectory.on_segments(PLACES, derivative) for derivative in (1, 2))
     thrust = task.balance.specific_thrust(velocity, acceleration).reshape(-1, 3)
     upward = thrust[:, 2] / np.linalg.norm(thrust, axis=1)
-    sides = upward[(upward < UPSIDE_DOWN) | (upward > 0.0)] < 0.0  # in between it has not turned back yet
+    sides = upward[(upward < UPSIDE_DOWN) | (upward > 0.0)] < 0.0  # hysteresis: samples between are ignored
     return max(int((sides[1:] & ~sides[:-1]).sum()) - turns, 0)
 
 
 def _asks_upside_down(stage: Stage) -> bool:
-    """True of a stage that asks for thrust downward."""
+    """Return whether a stage asks for downward thrust."""
     return any(
         asked.quantity is Quantity.SPECIFIC_THRUST
         and asked.lower > 0.0

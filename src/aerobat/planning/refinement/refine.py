@@ -158,7 +158,7 @@ class Refinement:
 
     @property
     def with_and_without_rooms(self) -> tuple[Refinement, ...]:
-        """This refinement, then one that asks no room for the body in gates: some gates leave too little."""
+        """The refinement, then one that asks no room for the body in gates: some gates leave too little."""
         return (self, replace(self, in_gates=())) if self.in_gates else (self,)
 
     def stage_values(self, stages: tuple[Stage, ...]) -> StageValues:
