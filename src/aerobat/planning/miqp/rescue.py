@@ -30,8 +30,8 @@ RESCUE_TIME = 4.0  # processor time [s] of all fallbacks, so that refusals take 
 # processor time [s] where a plan most likely exists, as a path with small constraint violations was found
 PROMISING_TIME = 15.0
 ONE_WAY = 0.75  # fraction of the remaining time for one fallback, so that the next has some
-# factor on the duration of a nearly feasible path above which a plan is poor: of 300 random problems, such
-# plans are those far from the best
+# factor on the duration of a nearly feasible path above which a plan is poor: of the plans of 300 random
+# problems, it selects those far from the best
 POOR = 1.1
 FREE_KNOTS = "free-knots"  # a quick planner that starts from other paths too
 MOTION = "time-optimal"  # the planner that starts from the most paths

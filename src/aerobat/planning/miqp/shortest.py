@@ -30,8 +30,8 @@ MAX_STARTS = 4  # largest number of starts that are refined roughly
 SCAN_NODES = 500  # node limit of a program's branch and bound: slots for a start need not be optimal
 SCAN_PLACES = 5  # samples of an interval at which limits are evaluated along a scan
 UNSOLVED = 3  # programs in a row without an answer, after solved ones, that end a scan: longer ones fail too
-SLOW = 1.2  # ratio to the lower bound on the duration, above which a path is improved from more programs,
-SHORTER = (0.8, 0.9, 0.97)  # whose durations are these fractions of the path's duration
+SLOW = 1.2  # ratio to the lower bound on the duration above which shorter programs are tried as starts
+SHORTER = (0.8, 0.9, 0.97)  # durations of these programs, relative to the path's duration
 
 _Slots = tuple[int, ...] | None
 

@@ -505,7 +505,7 @@ def _between(places: Array, peak: float) -> float:
 
 
 def _with_times(peaks: Array, trajectory: Trajectory, times: Sequence[float]) -> Array:
-    """Return peaks (S,), those of segments with one of the times [s] moved there."""
+    """Return peaks (S,), moved to the times [s] in segments that contain one, as fractions of segments."""
     found = peaks.copy()
     for time in times:
         segment = int(np.searchsorted(trajectory.knots[1:-1], time))
