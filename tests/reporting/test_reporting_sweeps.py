@@ -8,9 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 
 import aerobat as ab
 from aerobat.reporting.notebooks import html, png
+from aerobat.reporting.panels.crossings import Crossings, draw_opening
 from aerobat.reporting.plain_data import plain
 from aerobat.reporting.style import RED
 from aerobat.reporting.sweeps.figure import crossings
@@ -83,6 +85,17 @@ def test_red_crossings_are_those_that_did_not_pass() -> None:
     crossed = np.isfinite(rough().table["gate_miss_m"])
     assert drawn[RED] + beyond == (crossed & (rough().table["gate_outcome"] != "passed")).sum()
     assert sum(drawn.values()) + beyond == crossed.sum()
+
+
+def test_every_crossing_within_the_picture_is_drawn_also_where_it_is_wider_than_the_gate_needs() -> None:
+    (gate,) = ab.load_problem("flip-roll").gates
+    right, up = gate.opening.size[0] * np.array([0.0, 1.5, 9.0]), np.zeros(3)
+    axes = Figure(figsize=(24.0, 3.0)).add_axes((0.0, 0.0, 1.0, 1.0))
+    draw_opening(axes, Crossings(gate, right, up, np.zeros(3, dtype=bool), None))
+    within = np.abs(right) <= axes.get_xlim()[1]
+    assert within.tolist() == [True, True, False]
+    assert sum(len(dots.get_offsets()) for dots in axes.collections) == 2
+    assert [text.get_text() for text in axes.texts] == ["1 beyond"]
 
 
 def test_flights_that_do_not_come_to_a_gate_are_worse_than_any_that_miss_it() -> None:

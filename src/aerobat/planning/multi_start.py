@@ -239,7 +239,7 @@ class MultiStart:
         self, refinement: Refinement, rough: Sequence[RefinedPath], best: _Found | None = None
     ) -> _Found | None:
         """Return the best of a known path and of the certified paths from rough ones, fastest rough first."""
-        starts, certified = tuple(map(_duration, rough)), [] if best is None else [best]
+        starts, certified = tuple(sorted(map(_duration, rough))), [] if best is None else [best]
         with within_share(ROUGH_TIME):
             paths = self._with_more_segments(refinement, rough)
         for path in paths:

@@ -90,10 +90,11 @@ def _draw_crossings(axes: Axes, crossings: Crossings, half: Array, scale: float)
     Args:
         axes: Where to draw.
         crossings: What to draw.
-        half: Width and height of the picture, half of them, in its unit, (2,).
+        half: Width and height of the picture at least, half of them, in its unit, (2,).
         scale: Of its unit to the metre.
     """
     set_scale(axes, np.zeros(2), 2.0 * float((half / size_of(axes)).max()))
+    half = np.array([axes.get_xlim()[1], axes.get_ylim()[1]])
     points = scale * np.column_stack([crossings.right, crossings.up])
     inside = crossings.crossed & (np.abs(np.nan_to_num(points)) <= half).all(axis=1)
     opacity = max(0.18, min(1.0, np.sqrt(64 / max(inside.sum(), 1))))  # of up to 64 dots full
