@@ -258,6 +258,18 @@ def test_a_hop_straight_up_is_planned_without_a_word_of_arithmetic() -> None:
     assert Miqp(order=4).plan(hop, load_vehicle("agile-quad")).certified
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("height", "longest"), [(10.0, 3.2), (20.0, 3.3), (-20.0, 3.3)])
+def test_a_path_straight_up_or_down_is_refined_from_the_first_program_that_can_be_flown(
+    height: float, longest: float, quad: Vehicle
+) -> None:
+    """Those of smaller dt push downward on the way, and no path near them has rotors that only pull up."""
+    problem = Problem("shaft", at_rest((0.0, 0.0, 0.0)), at_rest((0.0, 0.0, height)))
+    found = plan(problem, Miqp(reserve=FLYING_RESERVE, rescue=False), quad)
+    assert found.certified
+    assert found.duration < longest
+
+
 def test_pieces_of_one_length_are_intervals_and_others_segments() -> None:
     refined, gridded = shared_plan("line"), shared_plan("line", None, Miqp(intervals=7))
     assert (refined.dt, refined.pieces) == (None, f"{refined.intervals} segments")

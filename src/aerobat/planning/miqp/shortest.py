@@ -53,7 +53,8 @@ def shortest(
         least: A lower bound on the duration of any motion [s]; programs far below it are skipped.
     """
     scan, rough = _Scan(attempts, refinement, scanned, least), list[RefinedPath]()
-    for begun, (slots, guess) in enumerate(scan.starts(), 1):
+    starts = scan.starts()
+    for begun, (slots, guess) in enumerate(starts, 1):
         path = refinement.rough(guess, segments, min(map(_duration, rough), default=inf))
         if refinement.is_promising(path):
             scan.known.append(slots)
@@ -66,7 +67,19 @@ def shortest(
         if judged.feasible:
             found = _shortened(judged, scan, segments)
             break
+    found = found or _from_flown(scan, starts, segments)
     return _from_closed_form(found, scan, segments) or scan.certified()
+
+
+def _from_flown(
+    scan: _Scan, starts: Iterator[tuple[_Slots, WarmStart]], segments: int
+) -> Judged[RefinedPath] | None:
+    """The path near the scan's first answer that the vehicle can fly as it is, or None."""
+    for _ in starts:
+        pass
+    if scan.flown is None or out_of_time():
+        return None
+    return _shorter(scan, scan.attempts.path(scan.flown), segments, None)
 
 
 def _from_closed_form(
@@ -107,10 +120,9 @@ def _shorter(
     """Return the certified path refined from a start if it is shorter than a known one, else None."""
     refinement, longest = scan.refinement, inf if known is None else known.solution.duration
     path = refinement.rough(start, segments, longest)
-    if not refinement.is_promising(path) or _duration(path) >= longest:
-        return None
-    found = refinement.finished(path)
-    return found if found.feasible and found.solution.duration < longest else None
+    goes_on = refinement.is_promising(path) and _duration(path) < longest
+    found = refinement.finished(path) if goes_on else path.certified
+    return found if found and found.feasible and found.solution.duration < longest else None
 
 
 def _duration(path: RefinedPath) -> float:
