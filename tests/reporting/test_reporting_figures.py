@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver, QuiverKey
@@ -18,11 +19,12 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.planning import PlacedStage
 from aerobat.reporting.figures import draw, report_figure
-from aerobat.reporting.page import png
+from aerobat.reporting.page import DPI, png
 from aerobat.reporting.panels import path as path_panel
 from aerobat.reporting.panels.keyframes import maneuver_plane, plan_keyframes
+from aerobat.reporting.panels.poses import plan_reference, reference_poses
 from aerobat.reporting.panels.stages import draw_stages
-from aerobat.reporting.scene.glyphs import gate_bars
+from aerobat.reporting.scene.glyphs import gate_bars, span
 from aerobat.reporting.style import BLUE, RED, SKY, YELLOW
 from reporting_cases import (
     PROBLEMS,
@@ -246,6 +248,16 @@ def test_vehicles_along_the_path_stand_as_the_flight_stood(monkeypatch):
     assert min(np.linalg.norm(foot - gate.position) for foot, _ in axes) < 0.05  # one of them in the gate
 
 
+def test_vehicles_in_gates_do_not_cover_each_other(monkeypatch):
+    plan, quad, scales = shared_plan("line"), ab.load_vehicle("agile-quad"), []
+    monkeypatch.setattr(
+        path_panel, "vehicle_shapes", lambda vehicle, position, q, scale, face: scales.append(scale) or []
+    )
+    gates = [ab.tilted_gate((x, 0.0, 0.0), name=f"{x:g}") for x in np.arange(1.0, 9.0, 0.8)]
+    path_panel.draw_path(Figure().add_subplot(), reference_poses(plan_reference(plan, quad)), [], quad, gates)
+    assert max(scales) * span(quad) < 0.8
+
+
 def test_a_batch_of_flights_is_drawn_whole():
     batch = batch_of("flip-roll", 7)
     figure = draw(batch, shared_plan("flip-roll"))
@@ -316,6 +328,22 @@ def test_stages_are_numbered_where_their_names_have_no_room(monkeypatch):
     assert {str(k) for k in range(1, 9)} <= shown
     assert not {stage.name for stage in plan.stages} & shown
     require_legible(figure, monkeypatch)
+
+
+@pytest.mark.parametrize("width", [5.0, 11.0])
+@pytest.mark.parametrize("count", [3, 12])
+def test_long_names_of_stages_stay_on_the_page_and_apart(width, count, monkeypatch):
+    """In tall panels and in wide ones."""
+    plan = shared_plan("line")
+    times = np.linspace(0.0, plan.duration, count + 2)[1:-1].tolist()
+    names = (f"{k} beyond the door of the hall on the left" for k in range(count))
+    stages = tuple(
+        PlacedStage(name, k, time) for k, (name, time) in enumerate(zip(names, times, strict=True))
+    )
+    figure = Figure(figsize=(width, 8.0), dpi=DPI)
+    FigureCanvasAgg(figure)
+    draw_stages(figure.add_subplot(), replace(plan, stages=stages), ab.load_vehicle("agile-quad"))
+    require_legible(figure, monkeypatch, fewest=count)
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from aerobat import so3
 from aerobat.problem import tilted_gate
 from aerobat.reporting.page import spread_out
-from aerobat.reporting.scene.axes_box import box_around, draw_axes_box
+from aerobat.reporting.scene.axes_box import box_around, draw_axes_box, draw_box_around
 from aerobat.reporting.scene.camera import Camera, best_view
 from aerobat.reporting.scene.glyphs import (
     direction_marks,
@@ -23,6 +23,7 @@ from aerobat.reporting.scene.glyphs import (
 )
 from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted
 from aerobat.vehicle import load_vehicle, vehicle_names
+from reporting_cases import require_legible
 from suites import examples
 
 angles = st.floats(-np.pi, np.pi)
@@ -193,3 +194,10 @@ def test_spread_labels_stay_within_their_bounds(wanted):
     places = spread_out(wanted, 1.0, 0.0, 10.0)
     assert places.min() >= -1e-9
     assert places.max() <= 10.0 + 1e-9
+
+
+def test_numbers_of_many_digits_leave_room_for_the_name_of_their_axis(monkeypatch):
+    path = np.array([[5000.0, -3000.0, 1200.0], [5006.0, -3000.0, 1201.0]])
+    axes = blank_axes(11.0, 4.0)
+    draw_box_around(axes, path, 0.3, path, [])
+    require_legible(axes.figure, monkeypatch, fewest=3)

@@ -53,10 +53,10 @@ def drawn_gates(axes: Axes) -> list[Array]:
     return [np.concatenate([path.vertices for path in frame.get_paths()]) for frame in frames]
 
 
-def require_legible(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> None:
+def require_legible(figure: Figure, monkeypatch: pytest.MonkeyPatch, fewest: int = 20) -> None:
     """No text of a page lies over another one or beyond the page."""
     texts = texts_of(figure, monkeypatch)
-    assert len(texts) > 20
+    assert len(texts) >= fewest
     for name, box in texts:
         assert box.min.min() >= 0, name
         assert (box.max <= figure.bbox.max).all(), name

@@ -87,6 +87,12 @@ class Keyframes:
         instants = tuple(replace(each, name=f"{k} {each.name}") for k, each in enumerate(self.instants, 1))
         return replace(self, instants=instants)
 
+    def shortened(self, letters: int) -> Keyframes:
+        """The same, names of more letters cut off."""
+        names = [k.name if len(k.name) <= letters else f"{k.name[: letters - 1]}…" for k in self.instants]
+        instants = tuple(replace(k, name=name) for k, name in zip(self.instants, names, strict=True))
+        return replace(self, instants=instants)
+
     def storyboard(self, plane: ManeuverPlane, downward: bool, pitch: float) -> tuple[Keyframes, Array]:
         """Lay the keyframes out in a row, each turned about the vertical until its thrust lies in the plane.
 

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 POSES = 20  # time steps at which the vehicle is drawn, fewer where it would cover itself
 SIZE = 0.085  # of the vehicle as drawn, relative to the path's extent
+CLEAR = 0.5  # of the distance between two gates, in each of which a vehicle is drawn: at most so large
 GHOSTS = 6  # one of so many drawn vehicles has all that moves beside it, where it is then
 MARKED = 3  # of so many gaps between drawn vehicles one has an arrowhead
 DIRECTION = 0.03  # of an arrowhead, likewise
@@ -72,9 +73,9 @@ def draw_path(
     Returns:
         A note on how the vehicle is drawn.
     """
-    scale = enlargement(vehicle, size * reference.extent)
-    reach = scale * span(vehicle)
     gates, poses = as_passed(gates, stages), actual[0] if actual else reference
+    scale = enlargement(vehicle, min(size * reference.extent, CLEAR * _least_distance(gates)))
+    reach = scale * span(vehicle)
     rows, step = pose_samples(poses, reach, gates)
     paths = [each.path for each in (reference, *actual)]
     surfaces, points = surfaces_beside(pieces, [*paths, gate_corners(gates)], poses.times[rows[::GHOSTS]])
@@ -99,6 +100,13 @@ def draw_path(
     mark_ends(axes, camera.project(reference.position[[0, -1]]))
     enlarged = "" if scale == 1.0 else f", {scale:g} times its size"
     return f"vehicle every {step:.2f} s{enlarged}; blue seen from above, white from below"
+
+
+def _least_distance(gates: Sequence[Gate]) -> float:
+    """The least distance between the centres of two gates [m], of those that are not the same place."""
+    centres = np.array([gate.position for gate in gates]).reshape(-1, 3)
+    apart = np.linalg.norm(centres[:, None] - centres, axis=-1)
+    return float(apart[apart > 0.0].min(initial=np.inf))
 
 
 def pose_samples(poses: PoseHistory, size: float, gates: Sequence[Gate]) -> tuple[list[int], float]:

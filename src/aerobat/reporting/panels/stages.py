@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 VEHICLE = 0.6  # [in] a vehicle, about
 MOST_STAGES = 11  # that follow one another legibly
 STAGE_ROW = 0.5  # [in] kept free for names at the foot of a wide panel
+STAGE_WIDTH = 1.1  # [in] of a stage with what is told of it, side by side with others
+LETTER, LEAST_NAME = 0.082, 0.62  # [in] that a stage's name takes by the letter, and at least
 # [pt] from a hair line's end to the text, for each alignment of it
 GAPS = {"right": (-2.88, 0.0), "left": (2.88, 0.0), "center": (0.0, -2.88)}
 COMPONENTS = np.eye(2)  # lateral, vertical
@@ -45,12 +47,15 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     Stages that would cover each other in that plane follow one another along the panel's longer side, each in
     the vertical plane of its own thrust. Maneuvers that stay in place or leave the plane have such stages.
     """
-    shots = plan_keyframes(plan, vehicle)
+    width, height = size_of(axes)
+    most = MOST_STAGES if height >= width else min(MOST_STAGES, int(width / STAGE_WIDTH))
+    whole = plan_keyframes(plan, vehicle)
+    letters = int(width / (3 if height >= width else min(len(whole.instants), most)) / LETTER)
+    shots = whole.shortened(letters)
     plane = maneuver_plane(plan, shots.thrust)
     camera = plane.camera
     gates = as_passed(plan.problem.gates, plan.stages)
-    longest_name = max(len(keyframe.name) for keyframe in shots.instants)
-    column = max(0.62, 0.082 * longest_name)  # [in] kept free for names on either side of a tall panel
+    column = _column(shots)
     frame = camera.project(np.concatenate([shots.position, *(gate.outline for gate in gates)]))
     inches = _fit(axes, frame, VEHICLE, span(vehicle), (column, column))  # per metre
     reach = enlargement(vehicle, VEHICLE / inches) * span(vehicle)  # [m]
@@ -63,18 +68,21 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
         end = "segment" if plan.dt is None else "interval"
         note = f"a stage holds at the end of {end} n" if plan.stages else "equal steps of time"
     else:
-        stages = shots.stages
-        width, height = size_of(axes)
-        most = MOST_STAGES if height >= width else min(MOST_STAGES, int(width / 1.1))  # [in] side by side
+        stages = whole.stages
         shown = sorted({round(k) for k in np.linspace(0, len(stages) - 1, most)})
-        numbered = shots.only(stages).numbered().only(shown)
+        numbered = whole.only(stages).numbered().only(shown).shortened(letters)
         shots, gates = _storyboard(axes, numbered, gates, plane)
-        beside = max(column, 1.0)  # [in] for what is told of each
+        beside = max(_column(shots), 1.0)  # [in] for what is told of each
         scale = _draw(axes, shots, gates, plane, vehicle, (0.0, beside), shrink=0.6)
         left_out = len(stages) - len(shown)
         some = f" but for {left_out} of {len(stages)}" if left_out else ""
         note = f"in order{some}, each seen across its thrust"
     return note if scale == 1.0 else f"{note}; vehicle {scale:g} times its size"
+
+
+def _column(shots: Keyframes) -> float:
+    """The width [in] that names take, on either side of a tall panel and side by side below a wide one."""
+    return max(LEAST_NAME, LETTER * max(len(keyframe.name) for keyframe in shots.instants))
 
 
 def _is_crowded(shots: Keyframes, camera: Camera, distance: float) -> bool:
@@ -239,8 +247,9 @@ def _write_name(axes: Axes, keyframe: Keyframe, anchor: Array, side: str) -> Non
         return
     axes.annotate(keyframe.name, size=NORMAL, weight="bold", va="top" if below else "bottom", **place)
     shown = f"n = {keyframe.interval}" if keyframe.along is None else f"h along {keyframe.along:g}°"
+    place["xytext"] = (GAPS[side][0], GAPS[side][1] - 1.35 * SMALL * below)
     facts = f"{keyframe.time:.2f} s\n{shown}"
-    axes.annotate("\n" * below + facts, size=SMALL, color=MUTED, linespacing=1.15, va="top", **place)
+    axes.annotate(facts, size=SMALL, color=MUTED, linespacing=1.15, va="top", **place)
 
 
 def names_beside(places: Array, thrust: Array, size: Array, columns: tuple[float, float]) -> Array:
@@ -261,5 +270,5 @@ def names_beside(places: Array, thrust: Array, size: Array, columns: tuple[float
 def names_below(places: Array, thrust: Array, size: Array, columns: tuple[float, float]) -> Array:
     """Return the places of names in a row at the foot of a picture, in inches, as in `names_beside`."""
     width = max(columns)
-    across = spread_out(places[:, 0], width, 0.3, size[0] - 0.3)
+    across = spread_out(places[:, 0], width, 0.5 * width, size[0] - 0.5 * width)
     return np.stack([across, np.full_like(across, STAGE_ROW)], axis=1)

@@ -23,6 +23,7 @@ ROUND = np.array([1.0, 2.0, 5.0])
 # [in] for the scales: left of a box and below it, right of it and above
 BOX_MARGINS = np.array([[0.5, 0.5], [0.3, 0.2]])
 NUMBERS = 0.15  # [in] from an edge to the numbers along it
+DIGIT = 0.07  # [in] the width of one
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,14 +148,16 @@ def _scale(axes: Axes, box: AxesBox, camera: Camera, axis: int, per_metre: float
         pitch = max(float(np.linalg.norm(places[1] - places[0])) * per_metre, 1e-6)  # an axis seen end-on
         keep = slice(None, None, max(1, int(np.ceil(0.26 / pitch))))  # [in] between numbers
         places, ticks = places[keep], ticks[keep]
-    for place, tick in zip(places + NUMBERS * outward / per_metre, ticks, strict=True):
-        axes.text(place[0], place[1], f"{tick:g}".replace("-", "−"), size=SMALL, ha="center", va="center")
+    numbers = [f"{tick:g}".replace("-", "−") for tick in ticks]
+    for place, number in zip(places + NUMBERS * outward / per_metre, numbers, strict=True):
+        axes.text(place[0], place[1], number, size=SMALL, ha="center", va="center")
     if axis == 2:
         edge[axis] = box.upper[axis]
         place = camera.project(edge) + np.array([-NUMBERS, NUMBERS]) / per_metre
     else:
         edge[axis] = (box.lower[axis] + box.upper[axis]) / 2
-        place = camera.project(edge) + (NUMBERS + np.array([0.3, 0.2])) * outward / per_metre
+        beside = max(0.3, 0.2 + 0.5 * DIGIT * max(map(len, numbers), default=0))  # [in] from numbers' middle
+        place = camera.project(edge) + (NUMBERS + np.array([beside, 0.2])) * outward / per_metre
     axes.text(place[0], place[1], f"{'xyz'[axis]} [m]", size=NORMAL, ha="center", va="center")
 
 
