@@ -86,6 +86,36 @@ def test_help_tells_the_commands(capsys) -> None:
     assert "Plan a maneuver, fly it" in out
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        "fly",
+        "plan",
+        "compare",
+        "check",
+        "feasibility",
+        "sweep",
+        "causes",
+        "tune",
+        "inspect",
+        "view",
+        "link mavlink",
+    ],
+)
+def test_the_help_of_a_command_names_no_option_that_it_has_not(command: str, monkeypatch, capsys) -> None:
+    monkeypatch.setenv("COLUMNS", "1000")
+    out, _, _ = run(capsys, *command.split(), "--help")[1].partition("Exit codes")
+    own = set(
+        re.findall(r"(--[a-z-]+)", " ".join(re.findall(r"^│ [* ]*[A-Z]* ?((?:--[a-z-]+ )+)", out, re.M)))
+    )
+    assert own
+    assert set(re.findall(r"--[a-z][a-z-]*", out)) == own
+
+
+def test_a_sweep_writes_no_table_of_its_plan_and_takes_no_columns(capsys) -> None:
+    assert run(capsys, "sweep", "line", "--columns", "paper")[0] == 2
+
+
 def test_fly_writes_the_plan_the_flight_the_picture_and_the_report(capsys) -> None:
     code, out, err = run(capsys, "fly", "half-flip", "--conditions", "none")
     assert (code, err) == (0, "")

@@ -110,7 +110,7 @@ def test_what_a_path_assumes_is_told_of_a_folder_that_holds_it_too(
         assert code("check", name, "--json") == 0
         told.append(json.loads(capsys.readouterr().out)["assumed"])
     assert told[0] == told[1]
-    assert told[0][-2] == "without column yaw, which the file holds too"
+    assert told[0][-2] == "column yaw left out"
 
 
 @pytest.mark.parametrize(

@@ -98,7 +98,7 @@ class MavlinkOptions(MissionOptions, RunOptions):
     """The vehicle's number among MAVLink's systems. Default: the only one that is heard; of two none is
     flown."""
 
-    origin: Annotated[tuple[float, float, float] | None, Parameter(group=linking)] = None
+    origin: Annotated[tuple[float, float, float] | None, Parameter(group=linking, negative="")] = None
     """The place of the plan's origin in the vehicle's own frame, metres east, north and up. Default: above
     that frame's origin, the plan's lowest point 3 m up."""
 

@@ -75,7 +75,7 @@ class VehicleOptions(RunOptions):
 
     vehicle: Annotated[str | None, Parameter(group=planning)] = None
     """The vehicle: a name that `aerobat show` lists, or a TOML file. Default: that of a plan or a flight,
-    else agile-quad, or hexarotor with --paper."""
+    else agile-quad."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,9 +174,8 @@ def _help(offers: dict[str, PlannerOption]) -> str:
 
 def _planners_help() -> str:
     summaries = ((name, getdoc(cls) or cls.__name__) for name, cls in registered_planners().items())
-    first = (f"{name}, {doc.splitlines()[0].rstrip('.')}" for name, doc in summaries)
-    default = "Default: miqp, of long courses and closed laps free-knots."
-    return f"The planner: {'; '.join(first)}. {default}"
+    first = " ".join(f"{name}: {doc.splitlines()[0]}" for name, doc in summaries)
+    return f"The planner. {first} Default: miqp, of long courses and closed laps free-knots."
 
 
 @_with_planner_options
@@ -199,14 +198,19 @@ class PlanningOptions(PlannerOptions):
     heading: Annotated[float | None, Parameter(group=planning)] = None
     """The heading at the start of a CSV file's path in degrees. Default: that of its first attitude, or 0."""
 
-    columns: Annotated[str, Parameter(group=output)] = ",".join(ALL)
-    """The columns of plan.csv, with a header: any of time, position, velocity, acceleration, jerk, attitude,
-    rates, thrusts; or paper, the bare layout of the paper's reference code."""
-
     paper: Annotated[bool, Parameter(group=planning, show_default=False)] = False
     """Exactly the paper's formulation with its reference parameters: miqp of order 3, bounds per axis,
     unsigned and unordered stages, dt the first feasible of 50 steps from 0.1 to 4 s; no vehicle in
-    planning. Flown by --controller all the same."""
+    planning. Flown by --controller all the same, the default vehicle being hexarotor."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableOptions(PlanningOptions):
+    """Options of all commands that write a plan's table."""
+
+    columns: Annotated[str, Parameter(group=output)] = ",".join(ALL)
+    """The columns of plan.csv, with a header: any of time, position, velocity, acceleration, jerk, attitude,
+    rates, thrusts; or paper, the bare layout of the paper's reference code."""
 
 
 @Parameter(name="*")

@@ -12,6 +12,7 @@ from aerobat.cli.options import (
     PlannerOptions,
     PlanningOptions,
     ProblemOptions,
+    TableOptions,
     is_given,
     offered_options,
     option_name,
@@ -24,6 +25,7 @@ from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
 from aerobat.errors import Infeasible, SpecError
 from aerobat.interchange import column_groups
+from aerobat.interchange.columns import ALL
 from aerobat.optimization.deadline import within_time
 from aerobat.planning import (
     Attempt,
@@ -66,7 +68,8 @@ def read_run(
         command: That plans.
         flight: How the plan is flown.
     """
-    source, columns = plan_source(name), column_groups(options.columns)
+    source = plan_source(name)
+    columns = column_groups(options.columns) if isinstance(options, TableOptions) else ALL
     if source is not None:
         if flight.probability is not None:
             raise SpecError(f"--pass plans anew, and '{name}' is a plan; give a problem, or leave --pass out")

@@ -25,7 +25,7 @@ class CausesOptions(ProblemOptions, FlightsOptions):
     """Options of a measurement of causes of error."""
 
     reserve: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=0, lt=0.5))] = 0.1
-    """Of every limit's range, kept at either end by plans that know the rotors."""
+    """The fraction of every limit's range that plans which know the rotors keep at either of its ends."""
 
     workers: Annotated[str | None, Workers(group=flying)] = None
 

@@ -32,8 +32,8 @@ class CheckOptions(VehicleOptions):
     """Limits that a trajectory is checked for, beyond those of its vehicle's rotors and its problem."""
 
     heading: Annotated[float | None, Parameter(group=limiting)] = None
-    """The heading at the start in degrees, carried along the path without spin. Default: the file's own, of a
-    CSV file 0."""
+    """The heading at the start in degrees, carried along the path without spin. Default: the plan's
+    own, of a CSV file that of its first attitude, or 0."""
 
     rate: Annotated[float, Parameter(group=limiting, validator=POSITIVE)] = 100.0
     """Rows a second of a CSV file without times."""

@@ -43,7 +43,7 @@ class FeasibilityOptions(PlannerOptions):
     tolerance: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=1e-4, lte=0.5))] = (
         DEFAULT_TOLERANCE
     )
-    """Between the least and the refusal beside it, as a part of the least."""
+    """The greatest distance between the least value and the refusal beside it, as a fraction of the value."""
 
     workers: Annotated[str | None, Workers(group=planning)] = None
 

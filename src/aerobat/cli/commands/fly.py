@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from aerobat.cli.failures import ExitCode
-from aerobat.cli.options import ExplainingOptions, FlyingOptions, PlanningOptions
+from aerobat.cli.options import ExplainingOptions, FlyingOptions, TableOptions
 from aerobat.cli.runs.folder import BLACKBOX, Flown, finish
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import flight_settings, plan_of, read_run
@@ -22,7 +22,7 @@ from aerobat.simulation.plants import PLANTS
 
 def fly(
     problem: str,
-    options: PlanningOptions = PlanningOptions(),
+    options: TableOptions = TableOptions(),
     flying: FlyingOptions = FlyingOptions(),
     explaining: ExplainingOptions = ExplainingOptions(),
 ) -> ExitCode:
@@ -39,8 +39,8 @@ def fly(
     Parameters
     ----------
     problem
-        A name that `aerobat show` lists, a problem's TOML file, or a .plan file or a run's folder, whose
-        plan is flown as it is.
+        A name that `aerobat show` lists, a problem's TOML file, or a .plan file, a CSV file or a run's
+        folder, whose plan is flown as it is.
     """
     PLANTS.instance(flying.plant)
     settings = flight_settings(flying, flying.plant)

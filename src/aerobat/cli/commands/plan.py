@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from aerobat.cli.failures import ExitCode
-from aerobat.cli.options import ConditionsOptions, ExplainingOptions, PlanningOptions
+from aerobat.cli.options import ConditionsOptions, ExplainingOptions, TableOptions
 from aerobat.cli.runs.folder import finish
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import flight_settings, plan_of, read_run
@@ -12,7 +12,7 @@ from aerobat.errors import SpecError
 
 def plan(
     problem: str,
-    options: PlanningOptions = PlanningOptions(),
+    options: TableOptions = TableOptions(),
     passing: ConditionsOptions = ConditionsOptions(),
     explaining: ExplainingOptions = ExplainingOptions(),
 ) -> ExitCode:
@@ -24,7 +24,8 @@ def plan(
     Parameters
     ----------
     problem
-        A name that `aerobat show` lists, or a problem's TOML file.
+        A name that `aerobat show` lists, a problem's TOML file, or a .plan file, a CSV file or a run's
+        folder, whose plan is judged as it is.
     """
     settings = FlightSettings()
     if passing.probability is not None:

@@ -81,8 +81,8 @@ def sweep(
     Parameters
     ----------
     problem
-        A name that `aerobat show` lists, a problem's TOML file, or a .plan file or a run's folder, whose
-        plan is flown as it is.
+        A name that `aerobat show` lists, a problem's TOML file, or a .plan file, a CSV file or a run's
+        folder, whose plan is flown as it is.
     """
     named_controller(sweeping.controller)  # refused before anything is planned
     settings = FlightSettings(

@@ -69,7 +69,7 @@ def read_source(path: Path, rate: float) -> tuple[Plan | Trajectory, list[str]]:
     if path.suffix != ".csv":
         return read_plan(path, rate), []
     rows = read_rows(path, rate)
-    facts = [f"without {each}, which the file holds too" for each in rows.unused]
+    facts = [f"{each} left out" for each in rows.unused]
     error = rows.fit_error
     if error is None:
         how_far = "these are too few to tell how far it is off"
