@@ -11,6 +11,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 import aerobat as ab
+from aerobat.reporting.facts import facts
 from aerobat.reporting.notebooks import html, png
 from aerobat.reporting.panels.crossings import Crossings, draw_opening
 from aerobat.reporting.plain_data import plain
@@ -64,6 +65,28 @@ def test_a_page_is_legible_whatever_becomes_of_the_flights(make, monkeypatch) ->
     require_legible(ab.sweep_figure(make()), monkeypatch)
 
 
+def test_a_lost_flight_leaves_the_scales_to_the_others() -> None:
+    """Its error is told in words."""
+    swept = rough()
+    errors, largest = np.full_like(swept.position_error, 0.05), np.full(len(swept), 0.05)
+    errors[0], largest[0] = 30.0, 30.0
+    table = {**swept.table, "max_position_error_m": largest}
+    figure = ab.sweep_figure(replace(swept, position_error=errors, table=table))
+    errors_axes = next(axes for axes in figure.axes if axes.get_ylabel() == "position error [cm]")
+    distances = next(axes for axes in figure.axes if axes.get_ylabel() == "flights within [%]")
+    assert errors_axes.get_ylim()[1] < 100.0
+    assert "cut off: up to 3e+03" in {text.get_text() for text in errors_axes.texts}
+    assert distances.get_xlim()[1] < 100.0
+
+
+def test_an_attitude_is_told_only_of_gates_that_ask_for_one() -> None:
+    plan = rough().plan
+    unasked = replace(rough(), plan=replace(plan, problem=replace(plan.problem, maneuver=ab.Line())))
+    for swept, told in ((rough(), True), (unasked, False)):
+        [(gate,)] = (fact.value for fact in facts(swept) if fact.key == "passages")
+        assert ("attitude" in {fact.label for fact in gate.value}) is told
+
+
 def test_the_distances_in_many_gates_are_those_in_the_worst_each_in_a_colour_of_its_own() -> None:
     swept = through_many_gates()
     (axes,) = (
@@ -103,8 +126,8 @@ def test_flights_that_do_not_come_to_a_gate_are_worse_than_any_that_miss_it() ->
     assert none.quantile("gate_miss_m", 0.0) == np.inf
     assert none.within("gate_miss_m", 1e9).count == 0
     assert none.passed("gate").count == 0
-    facts = plain(none)["passages"]["gate"]
-    assert facts["miss_m"] == {"50%": None, "95%": None, "100%": None}
+    gate = plain(none)["passages"]["gate"]
+    assert gate["miss_m"] == {"50%": None, "95%": None, "100%": None}
     with pytest.raises(ab.SpecError, match="no passage named 'gat'; did you mean 'gate'"):
         none.passed("gat")
     with pytest.raises(ab.SpecError, match="no column of numbers named 'outcome'"):

@@ -180,11 +180,8 @@ def _passed(passage: Passage) -> str:
         return "not passed"
     clearance = "" if isnan(passage.clearance) else f", {_clearance(passage)}"
     tolerance = passage.attitude_tolerance_deg
-    allowed = "" if isinf(tolerance) else f" of {tolerance:.3g}° allowed"
-    return (
-        f"{length(passage.miss)} off, {passage.attitude_error_deg:.2f}°{allowed}, "
-        f"at {passage.speed:.2f} m/s{clearance}"
-    )
+    attitude = "" if isinf(tolerance) else f"{passage.attitude_error_deg:.2f}° of {tolerance:.3g}° allowed, "
+    return f"{length(passage.miss)} off, {attitude}at {passage.speed:.2f} m/s{clearance}"
 
 
 def _clearance(passage: Passage) -> str:

@@ -115,11 +115,15 @@ def fit_to_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
     pad = 0.08 * (top - bottom)
     axes.set_ylim(bottom - pad, top + pad)
     if lowest < bottom or highest > top:
-        note = f"cut off: {lowest:.4g} to {highest:.4g}".replace("-", "−")
-        write_by(
-            axes, note, (1.0, 1.0), (-0.06, -0.06), size=SMALL, color=MUTED, ha="right", va="top",
-            bbox={"fc": "white", "ec": "none", "pad": 1.5}, zorder=4.0,
-        )  # fmt: skip
+        note_cut_off(axes, f"{lowest:.4g} to {highest:.4g}")
+
+
+def note_cut_off(axes: Axes, what: str) -> None:
+    """Say in the upper right corner what an upright axis cuts off."""
+    write_by(
+        axes, f"cut off: {what}".replace("-", "−"), (1.0, 1.0), (-0.06, -0.06), size=SMALL, color=MUTED,
+        ha="right", va="top", bbox={"fc": "white", "ec": "none", "pad": 1.5}, zorder=4.0,
+    )  # fmt: skip
 
 
 def rotor_colours(vehicle: Vehicle) -> list[str]:

@@ -10,6 +10,7 @@ from math import isfinite
 import numpy as np
 
 from aerobat.evaluation.criteria import criterion
+from aerobat.planning import planned_passages
 from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture, said
 from aerobat.reporting.sweeps.figure import known_opening, outcome_name, sweep_figure
 from aerobat.simulation import Outcome
@@ -62,8 +63,11 @@ def _outcome(outcome: Outcome, share: Share) -> Fact:
 def _passage(sweep: Sweep, name: str) -> Iterator[Fact]:
     passed = sweep.passed(name)
     yield Fact("passed", passed, "passed", str(passed))
-    for column, label in (("miss_m", "off its centre"), ("attitude_error_deg", "attitude")):
-        yield replace(_quantiles(sweep, f"{name}_{column}", label), key=column)
+    yield replace(_quantiles(sweep, f"{name}_miss_m", "off its centre"), key="miss_m")
+    attitude = replace(_quantiles(sweep, f"{name}_attitude_error_deg", "attitude"), key="attitude_error_deg")
+    planned = planned_passages(sweep.plan.stages, sweep.plan.problem)
+    asked = {each.gate.name for each in planned if isfinite(each.attitude_tolerance)}
+    yield attitude if sweep.passages[name].name in asked else replace(attitude, label="", text=None)
     shares = {width: sweep.within(f"{name}_miss_m", width) for width in WIDTHS}
     text = ", ".join(f"{length(width)} {shares[width]}" for width in WIDTHS[1:3])
     rows = [Facts((Fact("miss_m", width), *facts(share))) for width, share in shares.items()]

@@ -42,6 +42,7 @@ GATE_PITCH = GATE + AXIS + TITLES  # [in] from one to the next
 BAR = 0.36  # [in] an outcome's height
 NAMES = 1.05  # [in] the width of their names
 CURVES = 1.3  # [in] the height of the distributions
+SEEN = 4.0  # times what 95 % of flights keep within: as far axes reach, however far a lost one strays
 
 
 @validated
@@ -104,7 +105,10 @@ def _draw_band(axes: Axes, times: Array, errors: Array) -> None:
     axes.fill_between(times, band.low, band.high, color=BAND, linewidth=0.0, label="5 to 95 %")
     axes.plot(times, band.median, color=INK, label="median")
     axes.plot(times, band.max, color=MUTED, linewidth=0.8, label="max")
-    axes.set_ylim(0.0, max(1.08 * float(band.max.max()), 1e-2))
+    largest, seen = float(band.max.max()), SEEN * float(band.high.max())
+    axes.set_ylim(0.0, max(1.08 * min(largest, seen), 1e-2))
+    if largest > seen:
+        timelines.note_cut_off(axes, f"up to {largest:.3g}")
 
 
 def _draw_gate(figure: Figure, name: str, crossed: Crossings, bottom: float) -> None:
@@ -142,8 +146,9 @@ def _draw_distributions(figure: Figure, sweep: Sweep, left: float, bottom: float
         distances = np.sort(sweep.table[column])
         axes.step(100.0 * distances, shares, where="post", color=colour, label=name)
     axes.axhline(95.0, color=MUTED, linewidth=0.8, linestyle=(0, (4, 2)))
-    ends = [100.0 * sweep.quantile(column, 0.99) for column in columns.values()]
-    widest = max(filter(isfinite, ends), default=1.0)
+    ends = [sweep.quantile(column, 0.99) for column in columns.values()]
+    most = [SEEN * sweep.quantile(column, 0.95) for column in columns.values()]
+    widest = 100.0 * min(max(filter(isfinite, each), default=0.01) for each in (ends, most))
     label = "error, or distance from the gate's centre [cm]" if worst else "position error [cm]"
     axes.set(xlim=(0.0, widest), ylim=(0.0, 102.0), xlabel=label, ylabel="flights within [%]")
     axes.set_yticks([0, 50, 95], ["0", "50", "95"])
