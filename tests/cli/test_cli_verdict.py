@@ -16,6 +16,7 @@ from aerobat.reporting.facts import REPORT
 from aerobat.reporting.plain_data import to_json
 from aerobat.reporting.report import Report
 from aerobat.reporting.tables import print_table, table
+from aerobat.simulation import Outcome
 from aerobat.studies.share import Trials
 from aerobat.studies.sweep import Share
 from shared_plans import shared_flight, shared_plan
@@ -40,6 +41,14 @@ def test_more_than_needed_of_those_flown_may_prove_too_little(share: Share, caps
     assert "certified, but not proven to succeed often enough under 'lab' conditions" in shown
     assert f"lab: {share.count} of {share.of} flights succeed, so {share.range} of all" in shown
     assert "plan for more with --pass 0.95" in shown
+
+
+def test_what_became_of_flights_that_fail_is_told(capsys) -> None:
+    failures = (*[Outcome.WRONG_ATTITUDE] * 30, *[Outcome.HIT_FRAME] * 7)
+    found = replace(report(Share(63, 100)), trials=Trials(LAB, 0, Share(63, 100), failures))
+    print_table(table(found, most=REPORT))
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "95 % confidence; the others: 30 wrong attitude, 7 hit frame; plan for more with" in shown
 
 
 def test_a_verdict_is_well_where_enough_are_proven_to_succeed(capsys) -> None:

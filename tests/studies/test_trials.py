@@ -7,6 +7,7 @@ import pytest
 
 import aerobat as ab
 from aerobat.environment import load_dispersion
+from aerobat.simulation import Outcome
 from aerobat.studies import flights as trials
 from aerobat.studies.flights import LOOKS, FlightTask, fly_trials
 from aerobat.studies.share import Trials
@@ -20,7 +21,7 @@ LAB = load_dispersion("lab")
 class Drawn:
     """Flights of which each succeeds with one probability."""
 
-    succeeded: np.ndarray
+    outcomes: list[Outcome]
 
 
 @pytest.fixture
@@ -34,7 +35,8 @@ def drawn(monkeypatch, task: FlightTask, probability: float, seed: int) -> Trial
     rng = np.random.default_rng(seed)
 
     def flights_drawn(pool, tasks, flights: range) -> list[Drawn]:
-        return [Drawn(rng.uniform(size=len(flights)) < probability)]
+        well = rng.uniform(size=len(flights)) < probability
+        return [Drawn([Outcome.COMPLETE if each else Outcome.OFF_PATH for each in well])]
 
     monkeypatch.setattr(trials, "fly_scores", flights_drawn)
     return fly_trials(task)

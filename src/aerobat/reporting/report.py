@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
 from aerobat.reporting.facts import REPORT, Fact, Facts, facts, kept, said
+from aerobat.simulation.outcome import counted
 from aerobat.studies.share import Trials
 from aerobat.vehicle import implausibilities
 
@@ -88,7 +89,8 @@ def _of_trials(trials: Trials) -> Fact:
         proven=trials.proven,
     )
     of_all = f"{share.range} of all, at 95 % confidence"
-    remedy = "" if trials.proven else f"; plan for more with --pass {trials.NEEDED:g}"
+    failed = f"; the others: {counted(trials.failures)}" if trials.failures else ""
+    remedy = "" if trials.proven else f"{failed}; plan for more with --pass {trials.NEEDED:g}"
     sentence = f"{name}: {share.count} of {share.of} flights succeed, so {of_all}{remedy}"
     style = "" if trials.proven else "red"
     return Fact("trials", Facts(values), "conditions", sentence, level=REPORT, style=style)

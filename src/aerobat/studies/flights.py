@@ -15,7 +15,7 @@ from aerobat.environment import Dispersion
 from aerobat.evaluation.score import Score
 from aerobat.evaluation.score_flights import score_flights
 from aerobat.planning import Plan
-from aerobat.simulation import FlightConfig
+from aerobat.simulation import FlightConfig, Outcome
 from aerobat.studies.share import Share, Trials
 from aerobat.studies.workers import Pool, pool
 from aerobat.vehicle import Vehicle
@@ -75,14 +75,15 @@ def fly_trials(task: FlightTask, progress: Callable[[int, int], None] | None = N
         task: What is flown, and under which conditions.
         progress: Called with the flights done, and of them those that succeeded.
     """
-    flown = succeeded = 0
+    flown, failures = 0, list[Outcome]()
     with pool(1, None, 1) as flying:  # hundreds of flights are over before another process has begun
         for look in LOOKS:
             (scores,) = fly_scores(flying, (task,), range(flown, look))
-            flown, succeeded = look, succeeded + int(scores.succeeded.sum())
+            flown, failures = look, [*failures, *(end for end in scores.outcomes if not end.is_success)]
+            share = Share(flown - len(failures), flown)
             if progress is not None:
-                progress(flown, succeeded)
-            trials = Trials(task.conditions, task.seed, Share(succeeded, flown))
+                progress(flown, share.count)
+            trials = Trials(task.conditions, task.seed, share, tuple(failures))
             if trials.proven or trials.refuted:
                 break
     return trials

@@ -9,6 +9,7 @@ from typing import ClassVar
 from aerobat.arrays import Mask
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
+from aerobat.simulation import Outcome
 
 CONFIDENCE = 0.95  # of the intervals
 MAX_DIGITS = 6  # of a percentage, behind the point
@@ -88,6 +89,7 @@ class Trials:
     conditions: Dispersion
     seed: int
     share: Share
+    failures: tuple[Outcome, ...] = ()  # of those that do not, where they are known
 
     @property
     def proven(self) -> bool:
