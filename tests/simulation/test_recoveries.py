@@ -136,6 +136,16 @@ def test_a_hover_is_kept_at_once_and_loses_no_height(flip: ab.Plan) -> None:
     np.testing.assert_allclose(found.height_lost, 0.0, atol=0.01)
 
 
+@pytest.mark.parametrize("drag", [(0.4, 0.4, 0.2), (0.45, 0.3, 0.1)])
+def test_in_wind_a_vehicle_hovers_that_leans_against_its_drag(drag: tuple[float, float, float]) -> None:
+    vehicle = replace(ab.load_vehicle("agile-quad"), drag_body=drag)
+    windy = ab.Environment(wind=(6.0, 5.0, 0.0))  # [m/s] it leans by 20°
+    at_rest = ab.Trajectory([1.0], np.zeros((1, 1, 3)))
+    found = ab.recoveries(at_rest, vehicle, times=[0.0, 1.0], environment=windy, ground=-3.0)
+    assert found.possible.all()
+    assert found.durations.max() < 0.5
+
+
 def test_where_the_ground_is_too_near_for_all_of_a_path_it_is_said(flip: ab.Plan) -> None:
     found = ab.recoveries(flip, times=[1.4, 1.5], ground=2.0)
     assert str(found) == "from no instant does it come back to a hover above the ground"

@@ -43,7 +43,7 @@ _CHUNK = 100  # ticks flown at once, so that their references take little memory
 _HOVERING = 0.5  # [s] of all of them, which are not followed any longer then
 _FEW_SPANS = 3  # that a sentence names one by one
 _STILL = 0.2  # [m/s] of a hover
-_LEVEL = 0.2  # [rad] likewise
+_ALIGNED = 0.2  # [rad] likewise, of its thrust axis from the thrust that holds it there
 
 
 class UndeterminedAttitude(SpecError):
@@ -178,7 +178,7 @@ class _Flock:
     def __init__(
         self, setpoint: Setpoint, thrusts: Array, vehicle: Vehicle, environment: Environment
     ) -> None:
-        self._vehicle, self._gravity = vehicle, environment.gravity
+        self._vehicle, self._environment = vehicle, environment
         flat, count = setpoint.flat, len(thrusts)
         start = bodies(BodyState(flat.position, flat.velocity, setpoint.q_world_body, setpoint.omega_body))
         first = first_row(autopilot_inputs(_kept(setpoint, np.zeros(1), vehicle), True))
@@ -203,15 +203,15 @@ class _Flock:
 
     def brake(self, floor: float) -> None:
         """Come to a hover, no lower than a floor [m]; who does not by the horizon never will."""
-        body = self._carry[2].body
+        body, gravity = self._carry[2].body, self._environment.gravity
         velocity = from_components(body.velocity)
-        way = Braking.of(from_components(body.position), velocity, self._vehicle, self._gravity, floor)
+        way = Braking.of(from_components(body.position), velocity, self._vehicle, gravity, floor)
         since = np.arange(round(HORIZON * RATE)) / RATE
         yaw = nearest_heading(from_components(body.q_world_body))
         begun = self._time
         for begin in range(0, len(since), _CHUNK):
             parts = way.at(since[begin : begin + _CHUNK])
-            self._fly(point_reference(*parts, yaw, self._gravity), False)
+            self._fly(point_reference(*parts, yaw, gravity), False)
             if self._time > max(begun + way.durations.max(), self.durations.max()) + _HOVERING:
                 break
         self.durations[self.durations >= self._time - _CHUNK / RATE] = inf
@@ -221,12 +221,18 @@ class _Flock:
         self._carry, body = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude))
         self.lowest = np.fmin(self.lowest, np.fmin.reduce(body.position[2], axis=1))  # NaN: it flew to pieces
         speed = np.linalg.norm(from_components(body.velocity), axis=-1)
-        lean = so3.thrust_axis(from_components(body.q_world_body))[..., 2]
-        moving = ~((speed <= _STILL) & (lean >= np.cos(_LEVEL)))
+        moving = ~((speed <= _STILL) & self._holds(from_components(body.q_world_body)))
         ticks = moving.shape[1]
         latest = ticks - np.argmax(moving[:, ::-1], axis=1)
         self.durations = np.where(moving.any(axis=1), self._time + latest / RATE, self.durations)
         self._time += ticks / RATE
+
+    def _holds(self, q_world_body: Array) -> NDArray[np.bool_]:
+        """True for attitudes (..., 4) whose thrust points where it holds the vehicle still in the wind."""
+        carried = self._vehicle.drag_body * so3.unrotate(q_world_body, self._environment.wind)
+        needed = self._vehicle.mass * self._environment.weight - so3.rotate(q_world_body, carried)
+        along = np.sum(so3.thrust_axis(q_world_body) * needed, axis=-1)
+        return np.asarray(along >= np.cos(_ALIGNED) * np.linalg.norm(needed, axis=-1))
 
 
 def _body(signals: Signals) -> Body:
