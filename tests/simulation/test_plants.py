@@ -71,7 +71,7 @@ PATHS = pytest.mark.parametrize(
 
 @PATHS
 def test_drag_wind_and_full_inertia_are_the_same_in_mujoco(path: Callable[[], Any]) -> None:
-    """Its drag, unknown to the controller, is held for a step of a millisecond, hence 0.5 mm."""
+    """Its drag, unknown to the controller, is that of the middle of a step, hence micrometres."""
     known = ab.load_vehicle("agile-quad")
     vehicle = replace(
         known,
@@ -83,7 +83,7 @@ def test_drag_wind_and_full_inertia_are_the_same_in_mujoco(path: Callable[[], An
         ab.fly(path(), vehicle, environment=windy, nominal=known, plant=plant) for plant in (None, "mujoco")
     ]
     assert flights[0].position_error.max() > 1e-3
-    np.testing.assert_allclose(flights[1].position, flights[0].position, rtol=0, atol=5e-4)
+    np.testing.assert_allclose(flights[1].position, flights[0].position, rtol=0, atol=2e-6)
 
 
 @pytest.mark.parametrize(
@@ -129,8 +129,8 @@ def test_conditions_are_the_same_in_mujoco(path: Callable[[], Any]) -> None:
         ab.fly(path(), "agile-quad", conditions="lab", seed=1, flights=range(3, 4), plant=plant)[0]
         for plant in (None, "mujoco")
     )
-    np.testing.assert_allclose(other.position, own.position, rtol=0, atol=2e-3)
-    np.testing.assert_allclose(other.observed_position, own.observed_position, rtol=0, atol=2e-3)
+    np.testing.assert_allclose(other.position, own.position, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(other.observed_position, own.observed_position, rtol=0, atol=1e-5)
     assert own.position_error.max() > 0.01
 
 

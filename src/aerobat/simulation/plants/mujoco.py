@@ -2,8 +2,9 @@
 
 The vehicle is a free body with an ellipsoid as its hull. Each rotor is an actuator at a site in its centre of
 mass: thrust along +z and the moments of its column of the allocation, a first-order lag. Drag is a force of
-its own, held for a step. Gates are frames of bars, or walls where they have these; the ground is a plane.
-Obstacles are MuJoCo's own shapes where it has them, all others the meshes of their convex pieces.
+its own, held for a step at what it is half-way. Gates are frames of bars, or walls where they have these; the
+ground is a plane. Obstacles are MuJoCo's own shapes where it has them, all others the meshes of their convex
+pieces.
 """
 
 from __future__ import annotations
@@ -82,6 +83,7 @@ class MujocoRun:
         data.qvel[:] = [*body.velocity, *body.omega_body]
         data.ctrl[:] = motion.thrusts
         data.act[:] = np.array(motion.thrusts)[self._lagging]
+        self._last_velocity = np.array(body.velocity)  # [m/s] a step ago
         self._mujoco.mj_forward(self._model, data)
         self._feel()
 
@@ -108,9 +110,11 @@ class MujocoRun:
         self._data.ctrl[:] = np.clip(actuation.commands, self._airframe.rotors.min_thrust, actuation.ceilings)
         drag = np.array(self._airframe.mass_properties.drag_body)
         for _ in range(steps):
-            q = self._data.qpos[3:7]
-            airspeed = self._data.qvel[:3] - np.array(actuation.wind)
+            now, omega = self._data.qvel[:3].copy(), self._data.qvel[3:6]
+            q = so3.multiply(self._data.qpos[3:7], so3.exp(0.5 * self._model.opt.timestep * omega))
+            airspeed = now + 0.5 * (now - self._last_velocity) - np.array(actuation.wind)
             self._data.xfrc_applied[1, :3] = -so3.rotate(q, drag * so3.unrotate(q, airspeed))
+            self._last_velocity = now
             self._mujoco.mj_step(self._model, self._data)
             self._move_obstacles()
             self._feel()
