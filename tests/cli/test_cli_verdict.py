@@ -60,6 +60,14 @@ def test_a_verdict_is_well_where_enough_are_proven_to_succeed(capsys) -> None:
     assert "--pass" not in shown
 
 
+def test_one_flight_in_physics_of_others_says_nothing_of_undisturbed_flights(capsys) -> None:
+    """It may have met wind."""
+    plan = shared_plan("line")
+    found = Report(plan, ab.score(shared_flight("line"), plan), plant="mujoco")
+    print_table(table(found, most=REPORT))
+    assert "certified, and this flight succeeds" in " ".join(capsys.readouterr().out.split())
+
+
 def test_a_plan_that_leaves_little_to_the_controller_is_told_what_leaves_enough(capsys) -> None:
     """A reserve of 0.1, which is less than plans keep by default, was advised."""
     print_table(table(Report(shared_plan("line", "agile-quad", ab.Miqp())), most=REPORT))

@@ -73,6 +73,12 @@ def test_a_mistyped_value_is_told_by_its_field_and_the_unit_meant(mistake: str) 
     assert told[0].isprintable()
 
 
+def test_of_dead_rotors_without_which_nothing_hovers_the_doubt_leaves_the_vehicle_to_who_tells_it() -> None:
+    dead = replace(QUAD.rotors[0], max_thrust=0.0)
+    (doubt,) = implausibilities(replace(QUAD, rotors=(dead, *QUAD.rotors[1:])))
+    assert doubt.startswith("rotors cannot hold a level hover without rotors[0]")
+
+
 def test_a_suspicion_is_told_on_standard_error_and_in_the_report_and_refuses_nothing(
     tmp_path: Path, monkeypatch, capsys
 ) -> None:

@@ -109,4 +109,6 @@ def _verdict(report: Report) -> str:
         if report.trials.refuted:
             return f"certified, but too few flights succeed {conditions}"
         return f"certified, but not proven to succeed often enough {conditions}"
+    if report.trials is None and report.plant is not None:  # the conditions are this flight's alone
+        return "certified, and this flight succeeds"
     return "certified, and it flies" + ("" if report.trials is not None else " undisturbed")

@@ -65,7 +65,7 @@ def _of_dead_rotors(vehicle: Vehicle) -> Iterator[str]:
     try:
         flying = vehicle.without_dead_rotors()
     except SpecError as error:
-        yield str(error)
+        yield str(error).removeprefix(f"vehicle '{vehicle.name}': ")
         return
     names = ", ".join(f"rotors[{i}]" for i in vehicle.dead_rotors)
     yield (
