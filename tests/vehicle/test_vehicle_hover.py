@@ -150,6 +150,21 @@ def test_a_vehicle_is_refused_only_if_no_sharing_of_its_weight_holds_a_hover(mad
         np.testing.assert_array_equal(Fleet.of([vehicle, vehicle]).mixer, [mixer(vehicle)] * 2)
 
 
+@pytest.mark.parametrize("most", [0.5, 1.0, 2.0])
+def test_a_rotor_hardly_as_strong_as_its_part_of_the_weight_gives_what_it_can_and_others_the_rest(
+    most: float,
+) -> None:
+    """Its part by the least norm is 1.64 N; a map over `max_thrust` said that no hover is possible."""
+    weak = dataclasses.replace(HEXAROTOR.rotors[1], min_thrust=0.0, max_thrust=most)
+    vehicle = dataclasses.replace(HEXAROTOR, rotors=(HEXAROTOR.rotors[0], weak, *HEXAROTOR.rotors[2:]))
+    vehicle.require_hover(9.81)
+    np.testing.assert_allclose(vehicle.allocation @ mixer(vehicle), np.eye(4), rtol=0, atol=1e-9)
+    mixers = Fleet.of([HEXAROTOR, vehicle]).mixer
+    np.testing.assert_array_equal(mixers, [mixer(HEXAROTOR), mixer(vehicle)])
+    hover = vehicle.mass * 9.81 * mixer(vehicle)[:, 0]
+    assert hover[1] <= 0.8 * most
+
+
 def test_a_fleet_shares_the_weight_as_each_of_its_vehicles_does() -> None:
     skew = [
         dataclasses.replace(r, position_body=np.add(r.position_body, [0.05, 0.02, 0.0]))

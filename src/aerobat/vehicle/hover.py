@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 
 ROUNDING = 1e-9  # [-] a fraction of the weight that is none
+MIN_ROOM = 0.2  # [-] of a rotor's range, above what a hover takes of it: with less, it hardly steers
 MIN_FRACTION = 1e-3  # [-] of the weight; a rotor that can bear no more has no room to steer
 
 
@@ -37,6 +39,37 @@ def mixing_matrix(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> 
         if smallest > MIN_FRACTION:
             inverses[at][:, 0] = balanced
     return inverses
+
+
+def relieved(
+    inverses: Array, allocation: Array, min_thrusts: Array, max_thrusts: Array, weights: Array
+) -> Array:
+    """Mixing matrices by which a hover leaves all rotors `MIN_ROOM`, where those that are given do not.
+
+    Loads are then shared by strength, so that Σ f² / f_max is the least: a rotor that is much weaker than
+    the others gives what it can. Vehicles that this does not help keep their own.
+
+    Args:
+        inverses: by which loads are shared, (..., n, 4).
+        allocation: from rotor thrusts to thrust and moments, (..., 4, n).
+        min_thrusts: [N], (..., n).
+        max_thrusts: [N], (..., n).
+        weights: of the vehicles [N], (...).
+    """
+    limits = min_thrusts, max_thrusts - MIN_ROOM * (max_thrusts - min_thrusts)
+    loads = weights[..., None]
+    beyond = outside(loads * inverses[..., 0], *limits).any(axis=-1)
+    if not beyond.any():
+        return inverses
+    root = np.sqrt(max_thrusts)
+    by_strength = root[..., None] * np.linalg.pinv(allocation * root[..., None, :])
+    helps = np.asarray(beyond & ~outside(loads * by_strength[..., 0], *limits).any(axis=-1))
+    return np.where(helps[..., None, None], by_strength, inverses)
+
+
+def outside(thrusts: Array, min_thrusts: Array, max_thrusts: Array) -> NDArray[np.bool_]:
+    """True for the rotors whose thrusts are beyond their limits."""
+    return np.asarray((thrusts < min_thrusts) | (thrusts > max_thrusts))
 
 
 def overloaded(fractions: Array, min_thrusts: Array, max_thrusts: Array) -> Array:

@@ -29,7 +29,7 @@ from aerobat.errors import Reason, SpecError
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.ellipsoid import ENCLOSING, Ellipsoid, about_rotors
-from aerobat.vehicle.hover import mixing_matrix, overloaded, why_no_hover
+from aerobat.vehicle.hover import mixing_matrix, outside, overloaded, relieved, why_no_hover
 from aerobat.vehicle.rotor import Rotor, rotor_table
 
 _ROUNDING = 1e-9  # [-] relative: inertias are written with a few digits
@@ -151,7 +151,9 @@ class Vehicle:
     @cached_property
     def mixer(self) -> Array:
         """The inverse of the allocation by which loads are shared among rotors, (n, 4)."""
-        return frozen(mixing_matrix(self.allocation, self.min_thrusts, self.max_thrusts), "mixer")
+        rotors = self.allocation, self.min_thrusts, self.max_thrusts
+        weight = np.array(self.mass * STANDARD_GRAVITY)
+        return frozen(relieved(mixing_matrix(*rotors), *rotors, weight), "mixer")
 
     @cached_property
     def bounding_ellipsoid(self) -> Ellipsoid:
@@ -221,7 +223,7 @@ class Vehicle:
             )
             raise SpecError(Reason(sentence, ("max_thrust",)))
         hover = weight * self.mixer[:, 0]
-        wrong = (hover < self.min_thrusts) | (hover > self.max_thrusts)
+        wrong = outside(hover, self.min_thrusts, self.max_thrusts)
         if wrong.any():
             i = int(np.argmax(wrong))
             sentence = (
