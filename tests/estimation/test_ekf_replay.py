@@ -136,6 +136,13 @@ def test_an_outage_is_said_from_when_to_when_and_its_errors_are_stated() -> None
     assert estimates_of(to_the_end).coasting[0].end == log.imu_times[-1]
 
 
+def test_poses_that_are_late_one_after_another_leave_no_gap() -> None:
+    """Of 160 ms, longer than a gap, each; it was said to be without poses all the time."""
+    late = estimates_of(log_of(0.160))
+    assert late.coasting == ()
+    assert "without poses" not in str(late)
+
+
 def test_what_became_of_each_pose_is_told() -> None:
     """One outlier, then a jump that stays."""
     log = log_of()

@@ -189,7 +189,7 @@ class Estimates:
     nis: Array  # normalized innovation squared of each pose, NaN for those that were not fused, (P,)
     accepted: Mask  # poses that were taken; the first is where the filter begins, (P,)
     jumps: Array  # [s] arrivals of poses that were taken as a jump, (J,)
-    coasting: tuple[TimeInterval, ...]  # from a pose's exposure to the next that was taken, or to the end
+    coasting: tuple[TimeInterval, ...]  # from a pose's exposure to the next one's arrival, or to the end
 
     def __str__(self) -> str:
         """One line for people."""
@@ -241,7 +241,7 @@ def estimate(
         accepted=accepted,
         jumps=np.cumsum(plan.inputs.elapsed)[np.diff(rows["jumps"], prepend=0.0) > 0.0]
         + log.pose_times[plan.first_pose],
-        coasting=tuple(_coasting(plan.sample_times, at_samples["since_pose"], max_gap)),
+        coasting=tuple(_coasting(log, accepted, max_gap)),
         **{name: at_samples[name] for name in (*_NOMINAL, "sigma")},
     )
 
@@ -270,12 +270,14 @@ def _kept(states: EkfState) -> dict[str, Array]:
     """States with leaves (1, rows) as arrays (rows, ...)."""
     kept = {name: from_components(getattr(states.nominal, name))[0] for name in _NOMINAL}
     kept["sigma"] = np.sqrt(from_components([states.covariance[i] for i in _DIAGONAL])[0])
-    return kept | {name: getattr(states, name)[0] for name in ("since_pose", "jumps", "nis", "accepted")}
+    return kept | {name: getattr(states, name)[0] for name in ("jumps", "nis", "accepted")}
 
 
-def _coasting(times: Array, since_pose: Array, max_gap: float) -> Iterator[TimeInterval]:
-    """The times between poses that were longer apart than that."""
-    coasts = since_pose > max_gap
-    edges = np.flatnonzero(np.diff(coasts, prepend=False, append=False))
-    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        yield TimeInterval(float(times[begin] - since_pose[begin]), float(times[min(end, len(times) - 1)]))
+def _coasting(log: SensorLog, accepted: Mask, max_gap: float) -> Iterator[TimeInterval]:
+    """The times after poses that were taken until the next one arrives, where that takes longer."""
+    taken = np.flatnonzero(accepted)
+    taken = taken[np.argsort(log.arrivals[taken])]
+    arrivals = log.arrivals[taken]
+    ends = np.append(arrivals[1:], log.imu_times[-1])
+    for gap in np.flatnonzero(ends - arrivals > max_gap).tolist():
+        yield TimeInterval(float(log.pose_times[taken[gap]]), float(ends[gap]))
