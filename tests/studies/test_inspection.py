@@ -68,6 +68,15 @@ def with_an_empty_battery(plan: ab.Plan, seed: int) -> ab.Flight:
     return under(plan, seed, battery=ab.Battery(endurance=30.0, sag=0.45, charge_spread=0.9))
 
 
+def with_its_battery_moved(plan: ab.Plan, seed: int) -> ab.Flight:
+    """The centre of mass is 15 % of an arm off, to one side or another."""
+    assert plan.vehicle is not None
+    rotors = plan.vehicle.rotors
+    off = 0.15 * np.hypot(*rotors[0].position_body[:2]) * np.array([np.cos(seed), np.sin(seed), 0.0])
+    moved = tuple(replace(rotor, position_body=rotor.position_body - off) for rotor in rotors)
+    return ab.fly(plan, replace(plan.vehicle, rotors=moved), nominal=plan.vehicle)
+
+
 def with_weak_gains(plan: ab.Plan, seed: int) -> ab.Flight:
     frequency = (12.0, 14.0, 16.0)[seed % 3]
     weak = ab.Controller(attitude_frequency=frequency, moment_feedforward=False)
@@ -82,6 +91,7 @@ PLANTED: dict[str, Callable[[ab.Plan, int], ab.Flight]] = {
     "delay": with_late_commands,
     "lag": with_slow_rotors,
     "thrust": with_an_empty_battery,
+    "balance": with_its_battery_moved,
     "gains": with_weak_gains,
 }
 

@@ -14,6 +14,7 @@ from aerobat.flatness import vehicle_of
 from aerobat.planning import Plan
 from aerobat.simulation import Flight
 from aerobat.studies.inspection.alignment import aligned
+from aerobat.studies.inspection.balance import balance_fault
 from aerobat.studies.inspection.disturbances import (
     Disturbances,
     PositionLoop,
@@ -142,7 +143,11 @@ def inspect_flight(
     error = flight.position - flight.setpoint_position
     rate = flight.velocity - flight.setpoint_velocity
     unsaturated = "delay" if delay.time > NOTICED else "gains"
-    fault = inner_loop_fault(flight, nominal) or rotor_fault(flight, nominal, delay)
+    fault = (
+        inner_loop_fault(flight, nominal)
+        or rotor_fault(flight, nominal, delay)
+        or balance_fault(flight, nominal)
+    )
     named = None if fault is None else fault.cause
     errors = responses(flight.times, (error[0], rate[0]), causes, loop, unsaturated, named)
     return Inspection(

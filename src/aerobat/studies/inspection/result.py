@@ -54,6 +54,10 @@ CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "rotors that give less thrust than they are commanded",
             "charge the battery, measure `max_thrust`, and plan with a larger `reserve`",
         ),
+        "balance": (
+            "a centre of mass other than planned for, or rotors that pull unevenly",
+            "balance the vehicle, or set `centre_of_mass`, and plan and configure anew",
+        ),
     }
 )
 UNOBSERVED = (  # of a log that does not tell what an observer saw, in the place of a delay

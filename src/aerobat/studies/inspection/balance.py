@@ -1,0 +1,33 @@
+"""A centre of mass off the one planned for, by the moment that turned a logged vehicle beside its rotors'.
+
+Rotors of the collective thrust T about a centre of mass at (x, y) from the planned one give M_x = −y T and
+M_y = x T beyond the moment planned for: x and y are found by regression.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerobat import so3
+from aerobat.simulation import Flight
+from aerobat.studies.inspection.result import Fault
+from aerobat.vehicle import Vehicle
+
+_OFF = 0.05  # of the longest arm, by which the centre is off: four times what a lab's rotors pull unevenly
+_EXPLAINED = 0.5  # [-] of the missing moment of roll and pitch (mean square), that it explains at least
+
+
+def balance_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
+    """Return how far a log shows the centre of mass off the vehicle's, None where it shows no such thing."""
+    omega, thrusts = (0.5 * (each[1:] + each[:-1]) for each in (flight.omega_body, flight.thrusts))
+    turned = np.diff(flight.omega_body, axis=0) / np.diff(flight.times)[:, None] @ vehicle.inertia
+    moment = turned + so3.cross(omega, omega @ vehicle.inertia)
+    roll, pitch, _ = (moment - thrusts @ vehicle.allocation[1:].T).T
+    missing, collective = np.stack([pitch, -roll]), thrusts.sum(axis=1)
+    place = missing @ collective / np.sum(collective**2)
+    rest = np.sum((missing - place[:, None] * collective) ** 2)
+    arm = max(np.hypot(*rotor.position_body[:2]) for rotor in vehicle.rotors)
+    if np.hypot(*place) < _OFF * arm or rest > (1.0 - _EXPLAINED) * np.sum(missing**2):
+        return None
+    ahead, left = (1e3 * each for each in place)
+    return Fault("balance", f"the centre of mass is off by {ahead:.1f} mm in x and {left:.1f} mm in y")
