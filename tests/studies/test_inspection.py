@@ -117,6 +117,16 @@ def test_a_planted_cause_is_named_first_and_explains_most_of_the_error(
     assert sum(share.error for share in found.shares) == pytest.approx(found.largest, abs=1e-3)
 
 
+def test_a_rotor_that_has_stopped_is_told_to_give_nothing_and_motor_and_propeller_to_be_looked_at() -> None:
+    plan = planned(0)
+    assert plan.vehicle is not None
+    first, second, *others = plan.vehicle.rotors
+    stopped = replace(plan.vehicle, rotors=(first, replace(second, min_thrust=0.0, max_thrust=0.0), *others))
+    told = str(ab.inspect_flight(ab.fly(plan, stopped, nominal=plan.vehicle), plan))
+    assert told.startswith("rotor 1 gives 0 N where ")
+    assert "motor and propeller" in told
+
+
 @cache
 def by_rates() -> tuple[ab.Plan, ab.Flight]:
     plan = shared_plan("half-flip")

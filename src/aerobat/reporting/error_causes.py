@@ -36,7 +36,7 @@ def _row(measured: ErrorCauses, result: TrialResult) -> Iterator[Fact]:
     None stands where no gate was crossed, or flights are too few.
     """
     cost, is_none = measured.cost(result.cause), result is measured.none
-    low, middle, high = (f"{100 * value:.1f}" for value in (cost.low, cost.median, cost.high))
+    low, middle, high = (f"{100 * value:z.1f}" for value in (cost.low, cost.median, cost.high))
     median, most = (_quantile(result.position_error, level) for level in (0.5, 0.95))
     gate, attitude = _quantile(result.gate_error, 0.5), _quantile(result.gate_attitude_error, 0.5)
     saturated = float(np.mean(result.scores.saturated_fraction))

@@ -52,7 +52,8 @@ CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "thrust": (
             "rotors that give less thrust than they are commanded",
-            "charge the battery, measure `max_thrust`, and plan with a larger `reserve`",
+            "charge the battery, check motor and propeller, measure `max_thrust`, and plan with a larger "
+            "`reserve`",
         ),
         "balance": (
             "a centre of mass other than planned for, or rotors that pull unevenly",

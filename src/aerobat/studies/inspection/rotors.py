@@ -21,6 +21,7 @@ _SHORT = 0.1  # of a rotor's range, by which thrust stays below its command,
 _WHILE = 0.06  # [s] for which it has been commanded so much: longer than delays,
 _STILL = 0.2  # of what it should rise by within a row: it rises by less
 _FEWEST_STILL = 0.02  # of the rows, that show it
+_DIGITS = 3  # of a thrust [N], below which it is none
 _BETTER = 0.5  # of what a delay leaves unexplained, that another lag leaves at most
 
 
@@ -68,7 +69,9 @@ def _weak(flight: Flight, vehicle: Vehicle) -> Fault | None:
     if still.mean() < _FEWEST_STILL:
         return None
     rotor = int(np.argmax(still.sum(axis=0)))
-    short, asked = (float(np.median(x[:, rotor][still[:, rotor]])) for x in (given, lasting))
+    short, asked = (
+        round(float(np.median(each[:, rotor][still[:, rotor]])), _DIGITS) for each in (given, lasting)
+    )
     return Fault("thrust", f"rotor {rotor} gives {short:.2g} N where {asked:.2g} N are commanded")
 
 
