@@ -55,7 +55,6 @@ def rows(engine: str, flights: int = 3) -> list[np.ndarray]:
 class HeldPlant:
     """A body that stands still at its start, so that there is little to compile."""
 
-    period: int = 1
     feedthrough: bool = False
 
     def init(self, ops: Any, thrusts: Any, inputs: Any, signals: Any) -> VehicleState:

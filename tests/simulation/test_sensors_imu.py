@@ -76,7 +76,7 @@ def measured(parameters: ImuParameters, felt: ImuSample, noise: ImuSample) -> Im
 
 def noise_of(ticks: int, vehicles: int, stream: str = "imu") -> ImuSample:
     draws = Draws(Dispersion(), 4, 1, range(vehicles))
-    noise: ImuSample = expanded(imu_source(draws, stream, 1).chunk(0, ticks))
+    noise: ImuSample = expanded(imu_source(draws, stream, 1)(0, ticks))
     return noise
 
 

@@ -33,7 +33,7 @@ def gusts_of(rate: float, steps: int, **changes: float) -> np.ndarray:
     flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, Environment(), rate, hover(1.0))
     part = wind_part(dispersion.gusts, flights)
     state = wind.init(part.parameters)
-    noise = expanded(wind_source(draws, 1).chunk(0, steps))
+    noise = expanded(wind_source(draws, 1)(0, steps))
     rows = []
     for k in range(steps):
         along, across, vertical = noise.along[k], *(tuple(x[k] for x in pair) for pair in noise[1:])

@@ -6,9 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from aerobat.arrays import Array
 from aerobat.kernels import control, motors, rate_loop
 from aerobat.kernels.battery import BatteryState
 from aerobat.kernels.control import Commands, ControllerModel, ControllerState, Controlling, FeatureFlags
@@ -34,8 +31,6 @@ def rigid_body_steps(duration: float) -> int:
 @dataclass(frozen=True)
 class StateObserver(Component):
     """The true state, as if it were known."""
-
-    period: int = 1
 
     def init(self, ops: Ops, parameters: tuple[()], inputs: tuple[()], signals: Signals) -> Estimate:
         """See `Component.init`."""
@@ -63,7 +58,6 @@ class TrackingController(Component):
     """
 
     flags: FeatureFlags
-    period: int = 1
 
     def init(
         self,
@@ -183,20 +177,6 @@ class ComputationDelay(Component):
             select_tree(ops, takes_effect > 0.5, state.latest, state.in_effect),
             _sent(signals.controller),
         )
-
-
-@dataclass(frozen=True, eq=False)
-class DelayTicks:
-    """The ticks at which delayed commands take effect."""
-
-    period: int  # ticks from one step of the controller to the next
-    delay: int  # ticks from a step to its commands' effect, no more than a period
-    per_vehicle: bool = False
-
-    def chunk(self, begin: int, end: int) -> Array:
-        """See `Source.chunk`."""
-        since = np.arange(begin, end) - self.delay
-        return np.asarray((since >= 0) & (since % self.period == 0), dtype=np.float64)
 
 
 class PlantParameters(NamedTuple):

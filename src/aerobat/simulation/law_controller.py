@@ -52,7 +52,6 @@ class LawController(Component):
 
     law: ControlLaw
     flags: FeatureFlags  # of the way from its force and moment to the rotors
-    period: int = 1
 
     def init(
         self, ops: Ops, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
@@ -132,17 +131,16 @@ def _complaint(method: Any, complaint: str) -> str:
     return f"controller '{method.__self__.kind}': {method.__name__}() {complaint}"
 
 
-def flown_by(law: ControlLaw | None, settings: Controller, period: int = 1) -> Component:
+def flown_by(law: ControlLaw | None, settings: Controller) -> Component:
     """Return the controller's component: of a law, or else the tracking controller.
 
     Args:
         law: What is flown by, if it is none of settings.
         settings: Whose switches count.
-        period: Ticks from one step to the next.
     """
     if law is None:
-        return TrackingController(settings.feature_flags, period)
-    return LawController(law, _BEHIND_RATES if law.GIVES_RATES else settings.feature_flags, period)
+        return TrackingController(settings.feature_flags)
+    return LawController(law, _BEHIND_RATES if law.GIVES_RATES else settings.feature_flags)
 
 
 def inner_loop(law: ControlLaw | None, model: ControllerModel) -> tuple[LoopPart, ...]:

@@ -1,9 +1,9 @@
-"""The loop over time, a tuple of components, each with its own period: sensors, controller, plant, monitors.
+"""The loop over time, a tuple of components: sensors, controller, plant, monitors.
 
 At each tick the components step in order. One with direct feedthrough (a sensor, a controller) is seen in its
 new state by those after it and by the log; one without (the plant) leads to the next tick, and is seen as it
-is at this one. A component of period k steps at the first tick and at every k-th after it, and holds its
-state between.
+is at this one. A component whose period is k ticks steps at the first tick and at every k-th after it, and
+holds its state between.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple, Protocol, TypeAlias, TypeVar
 
+import numpy as np
+
+from aerobat.arrays import Array
 from aerobat.engines.engine import Init, Step
 from aerobat.engines.pytree import Tree
 from aerobat.kernels.control import Controlling
@@ -80,6 +83,8 @@ class Signals:
 
 
 Log: TypeAlias = Callable[[Signals], Tree]
+# inputs of a component at the ticks from one to before another, leaves (ticks,) or (ticks, vehicles)
+Source: TypeAlias = Callable[[int, int], Tree]
 
 
 class LoopParameters(NamedTuple):
@@ -96,6 +101,15 @@ class Due(NamedTuple):
     clock: StepClock  # about the latest of these ticks, from the one before to the next
 
 
+def due_ticks(period: int, begin: int, end: int, delay: int = 0) -> Array:
+    """Return 1 for each tick from `begin` to before `end` that follows a step by `delay` ticks, else 0.
+
+    The steps are at tick 0 and at every `period` ticks after it.
+    """
+    since = np.arange(begin, end) - delay
+    return np.asarray((since >= 0) & (since % period == 0), dtype=np.float64)
+
+
 class LoopInput(NamedTuple):
     """Inputs from outside at a tick."""
 
@@ -107,11 +121,6 @@ class LoopInput(NamedTuple):
 
 class Component(Protocol):
     """One part of the loop: a frozen, hashable value that holds no numbers of a flight."""
-
-    @property
-    def period(self) -> int:
-        """The ticks from one step to the next."""
-        return 1
 
     @property
     def feedthrough(self) -> bool:

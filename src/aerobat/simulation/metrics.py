@@ -72,18 +72,6 @@ class MetricsMonitor(Component):
         return running_metrics.step(ops, parameters, metrics, motion.body, reference, actuation, time)
 
 
-@dataclass(frozen=True, eq=False)
-class MetricsSource:
-    """The instants of ticks."""
-
-    times: Array
-    per_vehicle: bool = False
-
-    def chunk(self, begin: int, end: int) -> Array:
-        """See `Source.chunk`."""
-        return self.times[begin:end]
-
-
 def metrics_row(signals: Signals) -> RunningMetrics:
     """The metrics so far."""
     return signals.of(RunningMetrics)
@@ -123,7 +111,7 @@ def with_metrics(setup: FlightSetup, criteria: Criteria = Criteria()) -> FlightS
         waypoints=for_all(tuple(map(waypoint_target, (*criteria.waypoints, *criteria.places)))),
         attitudes=for_all(tuple(map(attitude_direction, criteria.attitudes))),
     )
-    metrics = LoopPart(MetricsMonitor(), parameters, MetricsSource(setup.times))
+    metrics = LoopPart(MetricsMonitor(), parameters, lambda begin, end: setup.times[begin:end])
     return replace(setup, parts=(*setup.parts, metrics))
 
 

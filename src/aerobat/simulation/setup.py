@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 
@@ -14,14 +13,14 @@ from aerobat.arrays import Array
 from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
 from aerobat.engines import CompiledLoop, Engine, choose, logged_ticks
 from aerobat.engines.engine import first_row
-from aerobat.engines.pytree import Tree, tree_map, tree_stack
+from aerobat.engines.pytree import Tree, tree_leaves, tree_map, tree_stack
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.components import PlantParameters, RigidBodyPlant, log_row, rigid_body_steps
 from aerobat.simulation.config import FlightConfig
-from aerobat.simulation.loop import Component, Log, LoopInput, LoopParameters, compose
+from aerobat.simulation.loop import Component, Log, LoopInput, LoopParameters, Source, compose
 from aerobat.simulation.reference_source import BLOCK, ReferenceSource
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
@@ -31,24 +30,14 @@ _VEHICLE_TICKS = 512_000  # whose own inputs are made at once, so that they take
 _MIN_CHUNK = 16  # ticks
 
 
-class Source(Protocol):
-    """The source of one component's inputs."""
-
-    @property
-    def per_vehicle(self) -> bool:
-        """True if each vehicle has its own."""
-
-    def chunk(self, begin: int, end: int) -> Tree:
-        """The inputs of the ticks from `begin` to before `end`, leaves (ticks,) or (ticks, vehicles)."""
-
-
 @dataclass(frozen=True, eq=False)
 class LoopPart:
-    """One component of the loop, its parameters with leaves (vehicles,), and where its inputs come from."""
+    """One component of the loop: what its parameters are, where its inputs come from, when it steps."""
 
     component: Component
-    parameters: Tree = ()
-    source: Source | None = None
+    parameters: Tree = ()  # leaves (vehicles,)
+    source: Source | None = None  # None for a component without inputs
+    period: int = 1  # ticks from one step to the next
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +145,8 @@ class FlightSetup(LoopSetup):
 
     def inputs(self, begin: int, end: int) -> LoopInput:
         """The inputs of the ticks from `begin` to before `end`, all of one block, for `scan`."""
-        own = tuple(() if part.source is None else part.source.chunk(begin, end) for part in self.parts)
-        periods = (part.component.period for part in self.parts)
+        own = tuple(() if part.source is None else part.source(begin, end) for part in self.parts)
+        periods = (part.period for part in self.parts)
         due = tuple(() if period == 1 else self.reference.due(period, begin, end) for period in periods)
         return LoopInput(self.reference.clock(begin, end), due, self.reference.chunk(begin, end), own)
 
@@ -189,7 +178,7 @@ class FlightSetup(LoopSetup):
         A piece that holds rows of the log begins with one. Each of `copies` of a vehicle has its own inputs.
         """
         ticks, size = len(self.times), BLOCK
-        if any(part.source is not None and part.source.per_vehicle for part in self.parts):
+        if any(np.ndim(leaf) for leaf in tree_leaves(self.first_tick.own)):  # each vehicle has its own
             size = min(max(_VEHICLE_TICKS // (copies * len(self.fleet)), _MIN_CHUNK), BLOCK)
         cuts = {ticks, *range(0, ticks, BLOCK)}
         if log_stride > size:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerobat.arrays import Array
 from aerobat.kernels import ekf, motors, rigid_body
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.ekf import EkfParameters, EkfState
@@ -17,7 +16,7 @@ from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.vectors import ZERO, add_scaled, low_passed, scale, subtract
 from aerobat.simulation.components import Disturbance
 from aerobat.simulation.conditions.sensors import MocapState, MotionCaptureSensor
-from aerobat.simulation.loop import Component, Estimate, Signals
+from aerobat.simulation.loop import Component, Estimate, Signals, Source, due_ticks
 
 
 class DisturbanceParameters(NamedTuple):
@@ -35,8 +34,6 @@ class DisturbanceObserver(Component):
     The model's is that of the rotors as the controller takes them to be, of drag at the estimated state, and
     of the gyroscopic moment; the angular acceleration that is measured is the change of the gyro's rates.
     """
-
-    period: int = 1
 
     def init(
         self, ops: Ops, parameters: DisturbanceParameters, inputs: tuple[()], signals: Signals
@@ -153,20 +150,14 @@ class EkfObserver(Component):
         return after, tuple(ekf.carried_back(before, after, past, since) for past, since in known)
 
 
-@dataclass(frozen=True, eq=False)
-class ObserverSource:
-    """When poses are taken and arrive."""
+def observer_source(sensor: MotionCaptureSensor, rate: float) -> Source:
+    """Return the source of when poses of a sensor are taken and arrive, for so many ticks a second."""
 
-    sensor: MotionCaptureSensor
-    rate: float  # [1/s] of the ticks
-    per_vehicle: bool = False
-
-    def chunk(self, begin: int, end: int) -> ObserverInput:
-        """See `Source.chunk`."""
-        ticks = np.arange(begin, end)
-        numbers: tuple[Array, Array, Array] = (
-            np.where(ticks > 0, 1.0 / self.rate, 0.0),
-            np.asarray(ticks % self.sensor.period == 0, dtype=np.float64),
-            np.asarray(self.sensor.arrives(ticks), dtype=np.float64),
+    def inputs(begin: int, end: int) -> ObserverInput:
+        return ObserverInput(
+            np.where(np.arange(begin, end) > 0, 1.0 / rate, 0.0),
+            due_ticks(sensor.period, begin, end),
+            due_ticks(sensor.period, begin, end, sensor.latency),
         )
-        return ObserverInput(*numbers)
+
+    return inputs

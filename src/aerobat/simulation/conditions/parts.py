@@ -123,7 +123,7 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
         gust_filter(period / flights.rate / time_constant, len(flights.draws)),
         GustState(along, (first, second), (third, fourth)),
     )
-    return LoopPart(Wind(period), parameters, wind_source(flights.draws, period))
+    return LoopPart(Wind(), parameters, wind_source(flights.draws, period), period)
 
 
 def gust_filter(step: float, vehicles: int) -> GustFilter:
@@ -152,7 +152,7 @@ def battery_part(battery: Battery, flights: DispersedFlights) -> LoopPart:
     hover_power = np.sum(hover**1.5 / radii)
     usage = flights.effectiveness**1.5 / radii / hover_power / battery.endurance
     parameters = BatteryParameters(flights.each("charge"), components(usage), flights.all(battery.sag))
-    return LoopPart(BatterySag(flights.slow_period()), parameters)
+    return LoopPart(BatterySag(), parameters, period=flights.slow_period())
 
 
 def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
@@ -178,8 +178,8 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
         ImuParameters(*map(flights.all, numbers)),
     )
     return (
-        LoopPart(ImuBias(slow), biases, imu_source(flights.draws, "imu_bias", slow, block=32)),
-        LoopPart(ImuSensor(period), felt, imu_source(flights.draws, "imu", period)),
+        LoopPart(ImuBias(), biases, imu_source(flights.draws, "imu_bias", slow, block=32), slow),
+        LoopPart(ImuSensor(), felt, imu_source(flights.draws, "imu", period), period),
     )
 
 
@@ -206,7 +206,7 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
         first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
     )
     source = mocap_source(flights.draws, period, flights.rate)
-    return LoopPart(MotionCaptureSensor(period, latency), parameters, source)
+    return LoopPart(MotionCaptureSensor(period, latency), parameters, source, period)
 
 
 def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:

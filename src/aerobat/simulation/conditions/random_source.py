@@ -35,8 +35,6 @@ class RandomSource:
     ticks into chunks, in any order, give the same bits. Only ticks at which the component steps draw numbers.
     """
 
-    per_vehicle = True
-
     def __init__(
         self,
         seeds: Sequence[ISeedSequence],
@@ -68,7 +66,7 @@ class RandomSource:
         self._restart()
 
     def chunk(self, begin: int, end: int) -> Tree:
-        """See `Source.chunk`; inputs are held from one sample to the next."""
+        """Return inputs of the ticks from `begin` to before `end`, held from one sample to the next."""
         first = begin // self._period
         words = self._samples(first, (end - 1) // self._period + 1)
         high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.arrays import Array, Mask
+from aerobat.arrays import Array
 from aerobat.engines.engine import Coded
 from aerobat.kernels import battery, imu, mocap, motors, rigid_body, wind
 from aerobat.kernels.battery import BatteryParameters, BatteryState
@@ -22,14 +22,12 @@ from aerobat.kernels.wind import GustNoise, WindParameters, WindState
 from aerobat.simulation.components import with_wind
 from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.random_source import RandomSource
-from aerobat.simulation.loop import Component, Signals
+from aerobat.simulation.loop import Component, Signals, Source
 
 
 @dataclass(frozen=True)
 class Wind(Component):
     """The wind, held from one step to the next; the plant and the accelerometer feel it."""
-
-    period: int = 1
 
     def init(self, ops: Ops, parameters: WindParameters, noise: GustNoise, signals: Signals) -> WindState:
         """See `Component.init`."""
@@ -42,20 +40,18 @@ class Wind(Component):
         return wind.step(parameters, state, noise)
 
 
-def wind_source(draws: Draws, period: int) -> RandomSource:
+def wind_source(draws: Draws, period: int) -> Source:
     """Return the random numbers of gusts, for a component that steps at every so many ticks."""
 
     def noise(x: Sequence[Coded], *_: object) -> GustNoise:
         return GustNoise(x[0], (x[1], x[2]), (x[3], x[4]))
 
-    return RandomSource(draws.stream("wind"), noise, normals=5, period=period, block=32)
+    return RandomSource(draws.stream("wind"), noise, normals=5, period=period, block=32).chunk
 
 
 @dataclass(frozen=True)
 class BatterySag(Component):
     """The battery, emptied by the rotors' thrusts; the plant's ceilings are what it leaves of them."""
-
-    period: int = 1
 
     def init(
         self, ops: Ops, parameters: BatteryParameters, inputs: tuple[()], signals: Signals
@@ -78,8 +74,6 @@ class BatterySag(Component):
 @dataclass(frozen=True)
 class ImuBias(Component):
     """The biases of an IMU, held from one step to the next."""
-
-    period: int = 1
 
     def init(self, ops: Ops, parameters: BiasParameters, noise: ImuSample, signals: Signals) -> ImuSample:
         """See `Component.init`."""
@@ -104,8 +98,6 @@ class FeltParameters(NamedTuple):
 class ImuSensor(Component):
     """An IMU at the centre of mass, biased as `ImuBias` says; its sample ends at the tick of its step."""
 
-    period: int = 1
-
     def init(self, ops: Ops, parameters: FeltParameters, noise: ImuSample, signals: Signals) -> ImuState:
         """See `Component.init`."""
         return imu.init()
@@ -122,7 +114,7 @@ class ImuSensor(Component):
         return imu.step(ops, parameters.errors, state, felt, signals.of(ImuSample), noise)
 
 
-def imu_source(draws: Draws, stream: str, period: int, block: int = 256) -> RandomSource:
+def imu_source(draws: Draws, stream: str, period: int, block: int = 256) -> Source:
     """Return the random numbers of an IMU's white noise, or of the walk of its biases.
 
     Args:
@@ -135,7 +127,7 @@ def imu_source(draws: Draws, stream: str, period: int, block: int = 256) -> Rand
     def noise(x: Sequence[Coded], *_: object) -> ImuSample:
         return ImuSample((x[0], x[1], x[2]), (x[3], x[4], x[5]))
 
-    return RandomSource(draws.stream(stream), noise, normals=6, period=period, block=block)
+    return RandomSource(draws.stream(stream), noise, normals=6, period=period, block=block).chunk
 
 
 class MocapState(NamedTuple):
@@ -153,13 +145,13 @@ class MocapState(NamedTuple):
 class MotionCaptureSensor(Component):
     """Motion capture: a pose is taken at every step, and arrives `latency` ticks later.
 
-    It steps at exposures alone. Of tick t with `arrives([t])`, `MocapState.delivered` is the
-    pose of tick t − latency. Before the first arrival it is a pose from before the flight, not valid as a
-    measurement, with an error of its own.
+    It steps at exposures alone. At the tick t of an arrival `MocapState.delivered` is the pose of tick
+    t − latency. Before the first arrival it is a pose from before the flight, not valid as a measurement,
+    with an error of its own.
     """
 
-    period: int = 1
-    latency: int = 0  # ticks
+    period: int  # ticks from one exposure to the next
+    latency: int  # ticks
 
     def init(self, ops: Ops, parameters: MocapParameters, inputs: MocapInput, signals: Signals) -> MocapState:
         """See `Component.init`."""
@@ -178,13 +170,8 @@ class MotionCaptureSensor(Component):
         taken = mocap.sample(ops, parameters, signals.plant.body, inputs)
         return MocapState((taken, *state.queue[:-1]))
 
-    def arrives(self, ticks: np.ndarray) -> Mask:
-        """True for ticks at which a pose of this flight arrives."""
-        since = np.asarray(ticks) - self.latency
-        return np.asarray((since >= 0) & (since % self.period == 0))
 
-
-def mocap_source(draws: Draws, period: int, rate: float) -> RandomSource:
+def mocap_source(draws: Draws, period: int, rate: float) -> Source:
     """Return the time, and the random numbers of motion capture.
 
     Args:
@@ -198,4 +185,4 @@ def mocap_source(draws: Draws, period: int, rate: float) -> RandomSource:
 
     return RandomSource(
         draws.stream("motion_capture"), sampled, normals=9, uniforms=1, period=period, block=32
-    )
+    ).chunk

@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from aerobat.environment import Dispersion, Environment
 from aerobat.errors import SpecError
 from aerobat.estimation import Ekf, ekf_parameters
 from aerobat.flatness import Planned
 from aerobat.simulation.bodies import bodies
-from aerobat.simulation.components import (
-    ComputationDelay,
-    ControllerParameters,
-    DelayTicks,
-    StateObserver,
-)
+from aerobat.simulation.components import ComputationDelay, ControllerParameters, StateObserver
 from aerobat.simulation.conditions.draw import Draws, dispersed_fleet
 from aerobat.simulation.conditions.observer import (
     DisturbanceObserver,
     DisturbanceParameters,
     EkfObserver,
     ObserverParameters,
-    ObserverSource,
+    observer_source,
 )
 from aerobat.simulation.conditions.parts import WHOLE, DispersedFlights, condition_parts, whole_ticks
 from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.law_controller import flown_by, inner_loop
+from aerobat.simulation.loop import due_ticks
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, LoopPart, controller_model, plant_part
 from aerobat.trajectory import Trajectory, as_trajectory
@@ -118,7 +115,7 @@ def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequ
     return LoopPart(
         EkfObserver(sensor.period, sensor.latency),
         ObserverParameters(parameters, flights.all(1.0 / flights.rate)),
-        ObserverSource(sensor, flights.rate),
+        observer_source(sensor, flights.rate),
     )
 
 
@@ -139,18 +136,19 @@ def _controller(
             f"computation_delay must be at most a period of the controller, {period / rate:g} s, "
             f"got {conditions.computation_delay:g} s; lower control_rate"
         )
-    controller = flown_by(config.law, settings, period)
     observer: tuple[LoopPart, ...] = ()
     slowest = max(rotor.lag for rotor in nominal.rotors)
     if settings.disturbance_filter > 0.0 and conditions.imu is not None and slowest <= _SLOWEST_ANSWERED:
         # a filter faster than the rotors takes their lag's misfit for a disturbance, and unsettles the loop
         times = flights.all(max(settings.disturbance_filter, slowest)), flights.all(delay / rate)
-        observer = (LoopPart(DisturbanceObserver(period), DisturbanceParameters(model, *times)),)
+        observer = (LoopPart(DisturbanceObserver(), DisturbanceParameters(model, *times), period=period),)
     source = None
     if period > 1 or delay > 0:
         source = ReferenceSource(
             flights.trajectory, nominal, environment, rate, every=period, delay=delay / rate
-        )
+        ).chunk
     parameters = ControllerParameters(model, flights.all(delay / rate) if delay else ())
-    waiting = (LoopPart(ComputationDelay(), (), DelayTicks(period, delay)),) if delay else ()
-    return (*observer, LoopPart(controller, parameters, source), *waiting, *inner_loop(config.law, model))
+    controller = LoopPart(flown_by(config.law, settings), parameters, source, period)
+    takes_effect = partial(due_ticks, period, delay=delay)
+    waiting = (LoopPart(ComputationDelay(), (), takes_effect),) if delay else ()
+    return (*observer, controller, *waiting, *inner_loop(config.law, model))
