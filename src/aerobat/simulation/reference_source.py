@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from aerobat.environment import Environment
 from aerobat.flatness.references import axial_drag, force_balance, has_unequal_drag, reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.simulation.flight import joined_setpoints, setpoint_rows
-from aerobat.simulation.loop import Due, StepClock
+from aerobat.simulation.loop import Due, StepClock, due_ticks
 from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -24,42 +24,21 @@ from aerobat.vehicle import Vehicle
 BLOCK = 4096  # ticks; blocks begin at its multiples, so that no chunk's size changes a bit of a reference
 
 
+@dataclass(frozen=True)
 class ReferenceSource:
     """Set-points of a trajectory for a nominal vehicle, at the ticks of a loop."""
 
-    per_vehicle = False
+    trajectory: Trajectory
+    vehicle: Vehicle  # the nominal one
+    environment: Environment
+    rate: float  # [1/s] of the ticks
+    every: int = 1  # ticks from one step of the controller to the next
+    delay: float = 0.0  # [s] until its commands take effect, whose set-points are those of so much later
 
-    def __init__(
-        self,
-        trajectory: Trajectory,
-        vehicle: Vehicle,
-        environment: Environment,
-        rate: float,
-        *,
-        every: int = 1,
-        delay: float = 0.0,
-    ) -> None:
-        """Prepare to make set-points.
-
-        Args:
-            trajectory: the path.
-            vehicle: the nominal one.
-            environment: where it flies.
-            rate: of the ticks [1/s].
-            every: ticks from one step of the controller to the next.
-            delay: of its commands [s], by which set-points are those of later.
-        """
-        self.times = trajectory.sample(rate)
-        self._trajectory = trajectory
-        self.vehicle = vehicle
-        self._environment = environment
-        self.rate = rate
-        self._period = 1.0 / rate
-        self._every = every
-        self._delay = delay
-
-    def __len__(self) -> int:
-        return len(self.times)
+    @cached_property
+    def times(self) -> Array:
+        """The instants of the ticks [s], (ticks,)."""
+        return self.trajectory.sample(self.rate)
 
     @property
     def start(self) -> BodyState:
@@ -72,21 +51,20 @@ class ReferenceSource:
     @property
     def max_rate(self) -> float:
         """The most [rad/s] that the reference turns about any axis of the body."""
-        return float(np.abs(self.setpoint(np.arange(len(self))).omega_body).max())
+        return float(np.abs(self.setpoint(np.arange(len(self.times))).omega_body).max())
 
     def setpoint(self, ticks: NDArray[np.intp]) -> Setpoint:
         """Return the set-points of some ticks, in rising order."""
         in_blocks = np.split(ticks, np.flatnonzero(np.diff(ticks // BLOCK)) + 1)
         return joined_setpoints(
-            [setpoint_rows(self._block(int(each[0])).setpoint, each % BLOCK) for each in in_blocks]
+            [setpoint_rows(_block(self, int(each[0]) // BLOCK).setpoint, each % BLOCK) for each in in_blocks]
         )
 
     def chunk(self, begin: int, end: int) -> ReferencePoint:
         """References of the controller at the ticks from `begin` to before `end`, all of one block."""
-        first = begin - begin % BLOCK
-        points: ReferencePoint = tree_map(
-            lambda leaf: leaf[begin - first : end - first], self._block(begin).points
-        )
+        number, first = divmod(begin, BLOCK)
+        rows = slice(first, first + end - begin)
+        points: ReferencePoint = tree_map(lambda leaf: leaf[rows], _block(self, number).points)
         return points
 
     def clock(self, begin: int, end: int, every: int = 1) -> StepClock:
@@ -101,8 +79,7 @@ class ReferenceSource:
 
     def due(self, every: int, begin: int, end: int) -> Due:
         """The turns, at these ticks, of a component that steps at every so many."""
-        now = np.arange(begin, end) % every == 0
-        return Due(now.astype(np.float64), self.clock(begin, end, every))
+        return Due(due_ticks(every, begin, end), self.clock(begin, end, every))
 
     def _period_after(self, steps: NDArray[np.intp], every: int) -> Array:
         """The period [s] that begins with each step; the last begins none."""
@@ -110,14 +87,7 @@ class ReferenceSource:
         begins = np.minimum(steps * every, final)
         ends = np.minimum(begins + every, final)
         whole = ends < final
-        return np.where(whole, every * self._period, self.times[ends] - self.times[begins])
-
-    def _block(self, tick: int) -> _Block:
-        """The block that a tick is in."""
-        vehicle, environment = self.vehicle, self._environment
-        return _block(
-            self._trajectory, vehicle, environment, self.rate, self._every, self._delay, tick // BLOCK
-        )
+        return np.where(whole, every * (1.0 / self.rate), self.times[ends] - self.times[begins])
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,22 +99,15 @@ class _Block:
 
 
 @lru_cache(maxsize=16)  # of 2 MB: the flights of a study are of one plan or few, whatever else they draw
-def _block(
-    trajectory: Trajectory,
-    vehicle: Vehicle,
-    environment: Environment,
-    rate: float,
-    every: int,
-    delay: float,
-    number: int,
-) -> _Block:
-    """The block of that number of a `ReferenceSource`, whose arguments the others are."""
-    grid = trajectory.sample(rate)
+def _block(source: ReferenceSource, number: int) -> _Block:
+    """The block of that number of a source."""
+    grid, every = source.times, source.every
+    vehicle, environment = source.vehicle, source.environment
     first, last = number * BLOCK, len(grid) - 1
     ticks = min(BLOCK, len(grid) - first)
     known = grid[np.minimum(np.arange(first, first + ticks + every), last)]
-    times = np.minimum(known + delay, grid[last])
-    rows = reference(trajectory, vehicle, times, environment=environment).setpoint
+    times = np.minimum(known + source.delay, grid[last])
+    rows = reference(source.trajectory, vehicle, times, environment=environment).setpoint
     setpoint, following = setpoint_rows(rows, slice(ticks)), np.arange(every, every + ticks)
     points = reference_points(setpoint, setpoint_rows(rows, following), environment, vehicle)
     return _Block(setpoint, tree_map(read_only, points))
