@@ -8,16 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import StrEnum
 from math import dist, hypot
-from typing import NamedTuple
 
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.links.goals import Observed, PathGoal, PositionGoal, yaw_of
 from aerobat.links.mission import Mission, Phase
-from aerobat.links.routes import DESCENT_SPEED, SPEED, goal_on, rest_to_rest, straight_down
+from aerobat.links.routes import DESCENT_SPEED, SPEED, Route, rest_to_rest, straight_down
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
@@ -43,23 +41,6 @@ class Doing(StrEnum):
     MANEUVERING = "flying a maneuver"
     BRAKING = "coming to a hover"
     LANDING = "landing"
-
-
-class Route(NamedTuple):
-    """A route to a hover, or to the ground."""
-
-    path: Trajectory
-    began: float  # [s]
-    yaw: float  # [rad]
-
-    @property
-    def end(self) -> Array:
-        """The position that it leads to [m], (3,)."""
-        return self.path.evaluate(self.path.duration)
-
-    def goal(self, now: float) -> PositionGoal:
-        """The goal at a time [s]."""
-        return goal_on(self.path, max(now - self.began, 0.0), self.yaw)
 
 
 class Commander:

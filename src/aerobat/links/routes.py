@@ -1,13 +1,16 @@
-"""Routes outside a maneuver, from hover to hover."""
+"""Routes outside a maneuver, from hover to hover or to the ground."""
 
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.links.goals import PositionGoal
+from aerobat.simulation.autopilot.braking import point_reference
 from aerobat.trajectory import Trajectory, minimum_effort
 
 SPEED = 2.0  # [m/s] on the way from hover to hover
@@ -15,6 +18,30 @@ DESCENT_SPEED = 1.0  # [m/s] of a landing
 _SHORTEST = 0.2  # [s] of any route, however near its end is
 _PEAK_SPEED = 15.0 / 8.0  # [-] of the quintic from rest to rest, over its mean speed
 _PEAK_ACCELERATION = 10.0 / sqrt(3.0)  # [-] likewise, times duration squared over length
+
+
+class Route(NamedTuple):
+    """A route that began at some time; at its end the vehicle hovers."""
+
+    path: Trajectory
+    began: float  # [s]
+    yaw: float  # [rad] from east
+
+    @property
+    def end(self) -> Array:
+        """The position that it leads to [m], (3,)."""
+        return self.path.evaluate(self.path.duration)
+
+    def goal(self, now: float) -> PositionGoal:
+        """The goal at a time [s]."""
+        return goal_on(self.path, max(now - self.began, 0.0), self.yaw)
+
+    def reference(self, times: Array, gravity: float) -> ReferencePoint:
+        """References of a controller at times [s], leaves (T,)."""
+        since = times - self.began
+        flat = self.path.flat(np.clip(since, 0.0, self.path.duration))
+        jerk = np.where((since < self.path.duration)[:, None], flat.jerk, 0.0)  # at its end it jumps to rest
+        return point_reference(flat.position, flat.velocity, flat.acceleration, jerk, self.yaw, gravity)
 
 
 def rest_to_rest(

@@ -41,12 +41,12 @@ class LiveBody:
         self._carry: Tree = self._loop.init(first)
         self.stop_rotors()
 
-    def fly(self, references: ReferencePoint, by_attitude: bool, upright: bool = True) -> None:
+    def fly(self, references: ReferencePoint, by_attitude: bool, upright: bool) -> None:
         """Go on by as many ticks as there are references, leaves (T,); see `autopilot_inputs`."""
         self._carry, _ = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude, upright))
         self.state = BodyState(*(np.concatenate(leaves) for leaves in self._carry[2].body))
 
-    def restart_position_loop(self, references: ReferencePoint, upright: bool = True) -> None:
+    def restart_position_loop(self, references: ReferencePoint, upright: bool) -> None:
         """Have the outer loop begin anew towards the first of the references, without what was before.
 
         See `autopilot_inputs` for `upright`.

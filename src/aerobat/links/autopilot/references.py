@@ -1,4 +1,4 @@
-"""The references that an autopilot follows: routes, points that a client sends, attitudes that it sends."""
+"""The references that an autopilot follows of what a client sends: points, pieces of a path, attitudes."""
 
 from __future__ import annotations
 
@@ -14,25 +14,9 @@ from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.links.goals import AttitudeGoal, PathPiece, PositionGoal
 from aerobat.simulation.autopilot.braking import point_reference
 from aerobat.simulation.autopilot.loop import KEPT
-from aerobat.trajectory import Trajectory
 
 _SLOW = 0.5  # [m/s] and [m/s²] of a path that hardly leads away from where it is
 _SMOOTHING = 0.002  # [s] time constant of the low-pass on the change of commanded rates and thrust
-
-
-class RouteReference(NamedTuple):
-    """A way to go, at whose end the vehicle hovers."""
-
-    path: Trajectory
-    began: float  # [s]
-    yaw: float  # [rad] from east
-
-    def reference(self, times: Array, gravity: float) -> ReferencePoint:
-        """References at times [s], leaves (T,)."""
-        since = times - self.began
-        flat = self.path.flat(np.clip(since, 0.0, self.path.duration))
-        jerk = np.where((since < self.path.duration)[:, None], flat.jerk, 0.0)  # at its end it jumps to rest
-        return point_reference(flat.position, flat.velocity, flat.acceleration, jerk, self.yaw, gravity)
 
 
 class PointReference(NamedTuple):
@@ -111,19 +95,14 @@ class AttitudeReference(NamedTuple):
     goal: AttitudeGoal
     sent: float  # [s] by the sender's clock
     since: float  # [s] by our clock, when it holds
-    omega_dot: Array  # [rad/s²] body axes, (3,)
-    thrust_rate: float  # [N/s]
-
-    @classmethod
-    def first(cls, goal: AttitudeGoal, sent: float, arrived: float) -> AttitudeReference:
-        """The first of a series."""
-        return cls(goal, sent, arrived, np.zeros(3), 0.0)
+    omega_dot: Array = np.zeros(3)  # [rad/s²] body axes, (3,)
+    thrust_rate: float = 0.0  # [N/s]
 
     def followed_by(self, goal: AttitudeGoal, sent: float, arrived: float) -> AttitudeReference:
         """The next one after this; itself where that is a little older, as one that was overtaken."""
         elapsed = sent - self.sent
         if abs(elapsed) > 10.0 * KEPT:
-            return self.first(goal, sent, arrived)
+            return AttitudeReference(goal, sent, arrived)
         if elapsed <= 0.0:
             return self
         fraction = elapsed / (elapsed + _SMOOTHING)

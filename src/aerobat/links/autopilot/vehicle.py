@@ -9,15 +9,11 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
+from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.links.autopilot.live_body import LiveBody
-from aerobat.links.autopilot.references import (
-    AttitudeReference,
-    PathReference,
-    PointReference,
-    RouteReference,
-)
+from aerobat.links.autopilot.references import AttitudeReference, PathReference, PointReference
 from aerobat.links.goals import AttitudeGoal, Mode, PathPiece, PositionGoal
-from aerobat.links.routes import rest_to_rest, straight_down
+from aerobat.links.routes import Route, rest_to_rest, straight_down
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading
 from aerobat.simulation.autopilot.loop import RATE
 from aerobat.states import BodyState
@@ -53,7 +49,7 @@ class SimulatedVehicle:
         self.armed, self.landed, self.crashed = False, True, False
         self.notices: list[str] = []  # sentences for whoever listens, who empties it
         self._body = LiveBody(vehicle, environment)
-        self._route = RouteReference(rest_to_rest(np.zeros(3), np.zeros(3)), self.time, 0.0)
+        self._route = Route(rest_to_rest(np.zeros(3), np.zeros(3)), self.time, 0.0)
         self._then: tuple[Array, float | None] | None = None  # [m], [rad] where to go once it hovers
         self._goal: PointReference | PathReference | AttitudeReference | None = None
         self._heard = -np.inf  # [s] when the last goal came
@@ -122,17 +118,11 @@ class SimulatedVehicle:
 
     def follow_point(self, goal: PositionGoal) -> None:
         """Take a goal from a client; it is followed in the mode offboard."""
-        switching = not isinstance(self._goal, PointReference)
-        self._goal, self._heard = PointReference(goal, self.time), self.time
-        if switching:
-            self._restart_position_loop()
+        self._follow(PointReference(goal, self.time))
 
     def follow_path(self, piece: PathPiece) -> None:
         """Take a piece of a path from a client; it is followed in the mode offboard."""
-        switching = not isinstance(self._goal, PathReference)
-        self._goal, self._heard = PathReference(piece), self.time
-        if switching:
-            self._restart_position_loop()
+        self._follow(PathReference(piece))
 
     def follow_attitude(self, goal: AttitudeGoal, sent: float) -> None:
         """Take a goal, `sent` [s] by the client's clock; it is followed in the mode offboard."""
@@ -140,7 +130,7 @@ class SimulatedVehicle:
         if isinstance(known, AttitudeReference):
             self._goal = known.followed_by(goal, sent, self.time)
         else:
-            self._goal = AttitudeReference.first(goal, sent, self.time)
+            self._goal = AttitudeReference(goal, sent, self.time)
 
     def advance(self, now: float) -> None:
         """Go on to a time [s], to the last tick before it."""
@@ -153,38 +143,51 @@ class SimulatedVehicle:
                 self._fly(ticks)
             self.time += ticks / RATE
 
+    def _follow(self, goal: PointReference | PathReference) -> None:
+        is_another_kind = type(goal) is not type(self._goal)
+        self._goal, self._heard = goal, self.time
+        if is_another_kind:
+            self._restart_position_loop()
+
     def _fly(self, ticks: int) -> None:
-        goal = self._followed
-        times = self.time + np.arange(ticks) / RATE
-        if isinstance(goal, AttitudeReference):
-            self._body.fly(goal.reference(times, 1.0 / RATE, self.vehicle.mass), by_attitude=True)
-        elif isinstance(goal, PathReference):
-            references = goal.reference(times, 1.0 / RATE, self.gravity)
-            self._body.fly(references, by_attitude=False, upright=False)
-        else:
-            self._body.fly(goal.reference(times, self.gravity), by_attitude=False)
+        references = self._references(self.time + np.arange(ticks) / RATE)
+        self._body.fly(references, isinstance(self._followed, AttitudeReference), self._stays_upright)
         if self.state.position[2] <= 0.0:
             self._touch_ground()
         else:
             self.landed = False
 
     @property
-    def _followed(self) -> RouteReference | PointReference | PathReference | AttitudeReference:
+    def _followed(self) -> Route | PointReference | PathReference | AttitudeReference:
         """The present goal."""
         if self.mode is Mode.OFFBOARD and self._goal is not None:
             return self._goal
         return self._route
 
+    @property
+    def _stays_upright(self) -> bool:
+        """True unless the present goal is a piece of a path, which has attitudes of its own."""
+        return not isinstance(self._followed, PathReference)
+
+    def _references(self, times: Array) -> ReferencePoint:
+        """References of the present goal at times [s], leaves (T,)."""
+        goal = self._followed
+        if isinstance(goal, AttitudeReference):
+            return goal.reference(times, 1.0 / RATE, self.vehicle.mass)
+        if isinstance(goal, PathReference):
+            return goal.reference(times, 1.0 / RATE, self.gravity)
+        return goal.reference(times, self.gravity)
+
     def _go(self, mode: Mode, path: Trajectory, yaw: float | None = None) -> None:
         """Take a way of its own."""
         own = float(nearest_heading(self.state.q_world_body)) if yaw is None else yaw
         self.mode, self._then = mode, None
-        self._route = RouteReference(path, self.time, own)
+        self._route = Route(path, self.time, own)
         self._restart_position_loop()
 
     def _go_on(self) -> None:
         """Begin what follows the present way, which has ended."""
-        here = self._route.path.evaluate(self._route.path.duration)
+        here = self._route.end
         if self._then is not None and self.mode is Mode.HOLD:
             position, yaw = self._then
             self._go(Mode.HOLD, rest_to_rest(here, position), yaw)
@@ -206,11 +209,9 @@ class SimulatedVehicle:
             self.hold()
 
     def _restart_position_loop(self) -> None:
-        goal, now = self._followed, np.array([self.time])
-        if isinstance(goal, PathReference):
-            self._body.restart_position_loop(goal.reference(now, 1.0 / RATE, self.gravity), upright=False)
-        elif not isinstance(goal, AttitudeReference):
-            self._body.restart_position_loop(goal.reference(now, self.gravity))
+        if not isinstance(self._followed, AttitudeReference):
+            references = self._references(np.array([self.time]))
+            self._body.restart_position_loop(references, self._stays_upright)
 
     def _touch_ground(self) -> None:
         """Stand on the ground, or lie there."""

@@ -13,7 +13,7 @@ import numpy as np
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, RosMessage
-from aerobat.links.commander import Commander, Doing, Route
+from aerobat.links.commander import Commander, Doing
 from aerobat.links.goals import Observed, PathGoal, PathPiece, yaw_of
 from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.path_follower import PathForwarder
@@ -22,6 +22,7 @@ from aerobat.links.report import LinkReport, link_report
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Answer, Middleware
 from aerobat.links.ros.preparation import ManeuverRequest, Prepared, prepare
+from aerobat.links.routes import Route
 from aerobat.planning import Planner
 from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
