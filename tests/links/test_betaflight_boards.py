@@ -145,7 +145,7 @@ def flown(wire: Any, inner: Any, maneuver: str = "flip-roll") -> Bench:
 def test_a_flip_on_demand_is_flown_by_rates_and_thrust_alone(protocol: ReceiverProtocol) -> None:
     wire = Wire(protocol)
     bench = flown(wire, ModelledLoop(QUAD, lambda: heard(wire)))
-    assert bench.node.commander.reason == ""
+    assert bench.node.commander.mission.reason == ""
     assert any("through gate" in sentence for sentence in bench.said), bench.said
     assert not heard(wire)[0]
 
@@ -155,7 +155,7 @@ def test_a_flip_on_demand_is_flown_by_betaflights_firmware_over_tcp() -> None:
     """Its receiver is MSP_SET_RAW_RC on its serial line, and arms, flies and disarms by that alone."""
     with closing(FirmwareLoop(QUAD)) as loop:
         bench = flown(loop, loop)
-        assert bench.node.commander.reason == ""
+        assert bench.node.commander.mission.reason == ""
         assert any("through gate" in sentence for sentence in bench.said), bench.said
         motors = loop.firmware.step(0.1).commands
     assert not any(motors)

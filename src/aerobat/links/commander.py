@@ -70,11 +70,6 @@ class Commander:
         self._there_by = 0.0  # [s] until when a vehicle has to be up, or down
         self._leapt = False  # between two states, since that began
 
-    @property
-    def reason(self) -> str:
-        """The reason why the last mission was given up; empty where it was not."""
-        return "" if self.mission is None else self.mission.reason
-
     def observe(self, observed: Observed) -> None:
         """Take note of a state."""
         if self.observed is not None:
@@ -144,9 +139,10 @@ class Commander:
             return PathGoal.upright(goal, self._gravity) if isinstance(goal, PositionGoal) else goal
         if self.route is None or self._leave_silent(now):
             return None
-        if self._begins_anew and not self._begin_anew(now):
+        if self._is_behind and not self._begin_anew(now):
             return None
-        if self._leave_astray():
+        if (off := self._off()) > _ASTRAY:
+            self._leave(f"the vehicle is {length(off)} off its goal")
             return None
         since = now + self._period - self.route.began
         if self.doing is not Doing.LANDING and since >= self.route.path.duration:
@@ -159,8 +155,7 @@ class Commander:
     def _of_mission(self, now: float, late: float) -> PathGoal | PositionGoal | None:
         """The goal of the mission, or of what follows it."""
         assert self.mission is not None, "maneuvers are missions"
-        assert self.observed is not None, "a vehicle is observed before it is flown"
-        phase, goal = self.mission.phase, self.mission.step(now, self.observed, self._period, late)
+        phase, goal = self.mission.phase, self.mission.step(now, self._last_state, self._period, late)
         if self.mission.phase not in (phase, Phase.LAND):
             reason = f": {self.mission.reason}" if self.mission.reason else ""
             self._say(f"{self.mission.phase}{reason}")
@@ -170,11 +165,11 @@ class Commander:
             self._go(Doing.HOVERING, now, at_end, end.yaw)
             return self._goal_on_route(now)
         if self.mission.phase is Phase.ABORTED:
-            off = self.mission.error(self.observed) if phase is Phase.MANEUVER else 0.0
+            off = self.mission.error(self._last_state) if phase is Phase.MANEUVER else 0.0
             if off > self.mission.settings.max_error + _ASTRAY:  # it is seen to jump, and goals would too
                 self._leave(f"the vehicle is {length(off)} off its goal")
                 return None
-            self._brake(now, self.observed)
+            self._brake(now, self._last_state)
             silent = self._leave_silent(now, self.mission.settings.max_silence)
             return None if silent else self._goal_on_route(now)
         return goal
@@ -187,31 +182,21 @@ class Commander:
 
     def _leave_silent(self, now: float, allowed: float = _LONG) -> bool:
         """True where no state came for longer than allowed [s]: the vehicle is left to itself then."""
-        assert self.observed is not None, "a vehicle is observed before it is flown"
-        silence = now - self.observed.time
+        silence = now - self._last_state.time
         if silence <= allowed:
             return False
         self._leave(f"no news of the vehicle for {silence:.1f} s")
         return True
 
-    def _leave_astray(self) -> bool:
-        """True where a vehicle does not follow its route: it is left to itself then."""
-        off = self._off()
-        if off <= _ASTRAY:
-            return False
-        self._leave(f"the vehicle is {length(off)} off its goal")
-        return True
-
     @property
-    def _begins_anew(self) -> bool:
+    def _is_behind(self) -> bool:
         """True of a vehicle that does not climb or land as it is told, and is in the air or to get there.
 
         Whoever obeys may hear of the goals late, or hover for a pause of them, and takes up none that is far.
         """
         if self.doing not in (Doing.CLIMBING, Doing.LANDING) or self._off() <= _BEHIND:
             return False
-        assert self.observed is not None, "a vehicle is observed before it is flown"
-        return self.doing is Doing.CLIMBING or self.observed.body.position[2] > self.ground + _ALOFT
+        return self.doing is Doing.CLIMBING or self._last_state.body.position[2] > self.ground + _ALOFT
 
     def _begin_anew(self, now: float) -> bool:
         """Lead it on from where it is.
@@ -219,26 +204,34 @@ class Commander:
         False where it is left to itself: where that has lasted too long, or it was seen to leap, since goals
         would leap too.
         """
-        assert self.observed is not None and self.route is not None, "it is on a route"  # noqa: PT018
         if self._leapt or now > self._there_by:
             order = "climb" if self.doing is Doing.CLIMBING else "land"
             why = ", it is seen to leap" if self._leapt else ""
             self._leave(f"the vehicle does not {order} as it is told{why}")
             return False
-        end, here = self.route.end, np.array(self.observed.body.position)
+        end, here = self._present_route.end, np.array(self._last_state.body.position)
         speed = DESCENT_SPEED if self.doing is Doing.LANDING else SPEED
-        self._go(self.doing, now, rest_to_rest(here, end, speed), self.route.yaw)
+        self._go(self.doing, now, rest_to_rest(here, end, speed), self._present_route.yaw)
         return True
 
     def _leave(self, reason: str) -> None:
         self.doing, self.route = Doing.NOTHING, None
         self._say(f"{reason}; it is left to itself")
 
+    @property
+    def _last_state(self) -> Observed:
+        assert self.observed is not None, "a vehicle is observed before it is flown"
+        return self.observed
+
+    @property
+    def _present_route(self) -> Route:
+        assert self.route is not None, "it is on a route"
+        return self.route
+
     def _off(self) -> float:
         """How far the vehicle was off its route [m] when it was last observed."""
-        assert self.observed is not None and self.route is not None, "it is on a route"  # noqa: PT018
-        goal = self.route.goal(self.observed.time).position
-        return float(np.linalg.norm(np.array(self.observed.body.position) - goal))
+        goal = self._present_route.goal(self._last_state.time).position
+        return float(np.linalg.norm(np.array(self._last_state.body.position) - goal))
 
     def _recent(self, now: float) -> Observed:
         if self.observed is None or now - self.observed.time > _RECENT:
@@ -249,5 +242,4 @@ class Commander:
         self.doing, self.route = doing, Route(path, now, yaw)
 
     def _goal_on_route(self, now: float) -> PositionGoal:
-        assert self.route is not None, "it is on a route"
-        return self.route.goal(now + self._period)
+        return self._present_route.goal(now + self._period)

@@ -154,7 +154,7 @@ class ManeuverNode:
                 self._flown.stream,
                 commander.log,
                 offset=self._flown.offset,
-                aborted=commander.reason,
+                aborted=commander.mission.reason,
                 ended=str(commander.doing),
                 delay=0.0,
                 late=commander.mission.max_lateness,
