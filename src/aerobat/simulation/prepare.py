@@ -67,12 +67,19 @@ def setup_of(
     if isinstance(vehicle, str) and vehicle in dispersion_names() and vehicle not in vehicle_names():
         raise SpecError(f"{vehicle!r} are conditions, not a vehicle; give conditions={vehicle!r}")
     environment = environment_of(plan, environment)
+    if vehicle is None or isinstance(vehicle, Vehicle | str):
+        vehicles, is_fleet = [vehicle_of(plan, vehicle)], False
+    elif config.conditions is None:
+        vehicles, is_fleet = [as_vehicle(each) for each in vehicle], True
+    else:
+        raise SpecError(
+            "vehicle must be one where there are conditions, which draw what really flies from it"
+        )
     if config.conditions is not None:
         from aerobat.simulation.conditions.setup import dispersed_setup  # sensors, wind, a filter
 
-        return dispersed_setup(plan, _one_vehicle(plan, vehicle), environment, config, config.conditions)
-    flying, nominal = _broadcast_vehicles(_vehicles(plan, vehicle), config)
-    is_fleet = isinstance(vehicle, Sequence) and not isinstance(vehicle, str)
+        return dispersed_setup(plan, vehicles[0], environment, config, config.conditions)
+    flying, nominal = _broadcast_vehicles(vehicles, config)
     is_batch = is_fleet or _batch_of(config.start) != ()
     reference = ReferenceSource(as_trajectory(plan), nominal[0], environment, config.rate)
     fleet = Fleet.of(flying)
@@ -95,24 +102,6 @@ def setup_of(
         controller=controller,
         is_batch=is_batch,
     )
-
-
-def _one_vehicle(
-    plan: Planned | Trajectory, vehicle: Vehicle | str | Sequence[Vehicle | str] | None
-) -> Vehicle:
-    """The nominal vehicle of flights under conditions, which draw what really flies."""
-    if vehicle is None or isinstance(vehicle, Vehicle | str):
-        return vehicle_of(plan, vehicle)
-    raise SpecError("vehicle must be one where there are conditions, which draw what really flies from it")
-
-
-def _vehicles(
-    plan: Planned | Trajectory, vehicle: Vehicle | str | Sequence[Vehicle | str] | None
-) -> list[Vehicle]:
-    """The vehicles that are named, by default the plan's own."""
-    if vehicle is None or isinstance(vehicle, Vehicle | str):
-        return [vehicle_of(plan, vehicle)]
-    return [as_vehicle(each) for each in vehicle]
 
 
 def _batch_of(start: BodyState | None) -> tuple[int, ...]:
