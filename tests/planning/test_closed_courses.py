@@ -169,7 +169,7 @@ def test_a_plan_that_begins_in_flight_is_not_begun_from_rest() -> None:
     plan = planned()
     stream = SetpointStream(plan.trajectory, plan.vehicle, plan.problem.environment, np.zeros(3))
     with pytest.raises(SpecError, match=r"begins at .* m/s, a mission at rest"):
-        Mission(plan, MissionSettings(), stream, PathForwarder(stream))
+        Mission(plan, MissionSettings(), PathForwarder(stream))
 
 
 @pytest.mark.parametrize(

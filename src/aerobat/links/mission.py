@@ -61,6 +61,8 @@ GoalT_co = TypeVar("GoalT_co", covariant=True)
 class Follower(Protocol[GoalT_co]):
     """Goals along a path, from observed states of the vehicle; times are since the path's start [s]."""
 
+    stream: SetpointStream  # of the path, in the vehicle's own frame
+
     def observe(self, observed: Observed) -> None:
         """Take note of a state."""
 
@@ -71,16 +73,13 @@ class Follower(Protocol[GoalT_co]):
 class Mission(Generic[GoalT_co]):
     """The course of a flight: the goal of each tick, from observed states of the vehicle."""
 
-    def __init__(
-        self, plan: Plan, settings: MissionSettings, stream: SetpointStream, follower: Follower[GoalT_co]
-    ) -> None:
+    def __init__(self, plan: Plan, settings: MissionSettings, follower: Follower[GoalT_co]) -> None:
         """Prepare to fly a plan.
 
         Args:
             plan: what is flown, certified for its vehicle; see `require_flyable`.
             settings: how.
-            stream: its set-points, in the vehicle's own frame.
-            follower: the goals along them.
+            follower: makes the goals along its set-points.
         """
         assert plan.vehicle is not None, "a plan that is flyable has a vehicle"
         self.settings = settings
@@ -88,7 +87,7 @@ class Mission(Generic[GoalT_co]):
         self.reason = ""  # of an abort
         self.max_lateness = 0.0  # [s] of all set-points of the plan so far
         environment = plan.problem.environment
-        self.stream = stream
+        self.stream = follower.stream
         self._follower = follower
         first, last = self.stream.flat(0.0), self.stream.flat(self.stream.duration)
         for end, state in (("begins", first), ("ends", last)):

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections import deque
 
-import numpy as np
-
 from aerobat.control.parameters import controller_parameters
 from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.environment import Environment
@@ -37,17 +35,14 @@ class PathForwarder:
     """The points of a stream as they are, for vehicles whose own controller tracks them."""
 
     def __init__(self, stream: SetpointStream) -> None:
-        self._stream = stream
+        self.stream = stream
 
     def observe(self, observed: Observed) -> None:
         """Let the vehicle see to its errors."""
 
     def command(self, time: float) -> PathGoal:
         """The goal at a time [s] since the plan's start."""
-        point = self._stream.at(time)
-        flat = self._stream.flat(time)
-        turning = (np.array(part) for part in (point.q_world_body, point.omega, point.omega_dot))
-        return PathGoal(flat.position, flat.velocity, flat.acceleration, flat.jerk, *turning)
+        return self.stream.goal(time)
 
 
 class PathFollower:
@@ -63,7 +58,7 @@ class PathFollower:
         """
         model = controller_parameters(vehicle.controller, Fleet.of([vehicle]), environment)
         self._model: ControllerModel = first_numbers(model)
-        self._stream = stream
+        self.stream = stream
         self._outer: PositionLoopState | None = None
         self._observed: Observed | None = None
         self._commanded: deque[tuple[float, Vector]] = deque()  # [s] from when, [m/s²] the feedback
@@ -75,7 +70,7 @@ class PathFollower:
 
     def command(self, time: float) -> AttitudeGoal:
         """The goal at a time [s] since the plan's start. Something must have been observed before."""
-        reference = self._stream.at(time)
+        reference = self.stream.at(time)
         model, body = self._model, self._predicted(time, reference)
         if self._outer is None:
             self._outer = init_position_loop(FloatOps, model.gains, body, reference)
@@ -94,7 +89,7 @@ class PathFollower:
         """The body at a time, as far from its reference as what was seen, and commanded since, makes it."""
         assert self._observed is not None, "a vehicle is observed before it is commanded"
         observed_at, body = self._observed.time, self._observed.body
-        then = self._stream.at(observed_at)
+        then = self.stream.at(observed_at)
         position = subtract(then.position, body.position)
         velocity = subtract(then.velocity, body.velocity)
         while len(self._commanded) > 1 and self._commanded[1][0] <= observed_at:

@@ -9,15 +9,14 @@ from aerobat.engines.pytree import tree_leaves, tree_unflatten
 from aerobat.environment import Environment
 from aerobat.flatness import reference
 from aerobat.kernels.control_loops import ReferencePoint
+from aerobat.links.goals import PathGoal
 from aerobat.simulation.flight import setpoint_rows
 from aerobat.simulation.reference_source import reference_points
 from aerobat.states import FlatState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-_RATE = (
-    1000.0  # [1/s] of the rows between which set-points are straight: 0.1 mm and 0.01° in the fastest flips
-)
+_RATE = 1000.0  # [1/s] of rows; straight lines between are off by 0.1 mm and 0.01° in the fastest flips
 
 
 class SetpointStream:
@@ -52,6 +51,12 @@ class SetpointStream:
         """Position to snap [m/s^k] at a time [s] since the start, (3,) each."""
         flat = self.trajectory.flat(min(max(time, 0.0), self.duration))
         return FlatState(flat.position + self._offset, flat.velocity, flat.acceleration, flat.jerk, flat.snap)
+
+    def goal(self, time: float) -> PathGoal:
+        """The point of the path at a time [s] since the start, for a vehicle that tracks it by itself."""
+        point, flat = self.at(time), self.flat(time)
+        turning = (np.array(part) for part in (point.q_world_body, point.omega, point.omega_dot))
+        return PathGoal(flat.position, flat.velocity, flat.acceleration, flat.jerk, *turning)
 
     def at(self, time: float) -> ReferencePoint:
         """All that a controller follows at a time [s] since the start, in plain numbers."""

@@ -17,7 +17,6 @@ from aerobat.interchange.exports.crazyflie import AXES, PIECE, as_path
 from aerobat.interchange.ros import NANOSECONDS, RosMessage
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.goals import Mode, PathGoal, PathPiece
-from aerobat.links.path_follower import PathForwarder
 from aerobat.links.ros import topics
 from aerobat.links.ros.crazyswarm import FULL_STATE, SERVICES, Ros2
 from aerobat.links.ros.vehicle_node import VehicleNode
@@ -47,9 +46,9 @@ class CrazyswarmServer(VehicleNode):
         """Go on to this time [s] along the trajectory, and send what is due."""
         if self._flown is not None:
             stream, began = self._flown
-            since, forward = self.vehicle.time - began, PathForwarder(stream)
+            since = self.vehicle.time - began
             if since < stream.duration:
-                ends = forward.command(since), forward.command(since + _AHEAD)
+                ends = stream.goal(since), stream.goal(since + _AHEAD)
                 self._follow(PathPiece(*ends, self.vehicle.time, _AHEAD))
             else:
                 self._flown = None

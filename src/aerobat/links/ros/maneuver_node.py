@@ -223,8 +223,7 @@ class ManeuverNode:
         if isinstance(planned, str):
             answer(False, planned)
             return
-        stream = planned.stream
-        mission = Mission(planned.plan, self.settings.mission, stream, PathForwarder(stream))
+        mission = Mission(planned.plan, self.settings.mission, PathForwarder(planned.stream))
         try:
             self.commander.begin(self._now, mission)
         except SpecError as error:
