@@ -1,4 +1,4 @@
-"""Clocks of live links: the time that a link lives by, which need not be that of the wall."""
+"""Clocks of live links, which need not show the time of the wall."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Time that passes."""
+    """A clock to read and to wait by."""
 
     def now(self) -> float:
         """The time [s] since the clock began."""

@@ -1,6 +1,6 @@
 """A vehicle's course through a session of maneuvers: up, from hover to hover by missions, and down.
 
-The same for every link whose vehicle tracks points of a path: it knows times, states and goals, no messages.
+It is the same for every link whose vehicle tracks points of a path: it knows times, states and goals only.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-_STANDING = 1.0  # [s] that goals stay there once it is reached
-_BEHIND = 0.25  # [m] that a vehicle is off its goal when it does not climb or land as it is told
-_PATIENCE = 10.0  # [s] longer than either takes, after which it is told no more
-_SPINNING_UP = 1.5  # [s] that goals stay on the ground before they climb, so that who obeys gets ready
+_STANDING = 1.0  # [s] for which goals stay on the ground once it is reached
+_BEHIND = 0.25  # [m] off its goal, from which on a vehicle does not climb or land as ordered
+_PATIENCE = 10.0  # [s] longer than either takes, after which the vehicle is left to itself
+_SPINNING_UP = 1.5  # [s] for which goals stay on the ground before they climb: the vehicle gets ready
 _ASTRAY = 1.5  # [m] from its goal, from which on a vehicle does not follow it
 _STILL = 0.15  # [m/s] of a hover
 _ALOFT = 0.3  # [m] above the ground, from which on a still vehicle hovers
 _RECENT = 0.5  # [s] for which an observed state counts as the present one
-_LONG = 1.0  # [s] without news, after which nothing can be told it any more
+_LONG = 1.0  # [s] without a state, after which the vehicle is left to itself
 
 
 class Doing(StrEnum):
@@ -132,7 +132,7 @@ class Commander:
     def step(self, now: float, late: float = 0.0) -> PathGoal | None:
         """The goal for a period after this time [s]; None where the vehicle is left to itself.
 
-        It is given `late` [s].
+        `late`: by how much the goal misses its time [s].
         """
         if self.doing is Doing.MANEUVERING:
             goal = self._of_mission(now, late)
@@ -190,19 +190,19 @@ class Commander:
 
     @property
     def _is_behind(self) -> bool:
-        """True of a vehicle that does not climb or land as it is told, and is in the air or to get there.
+        """True of a vehicle that does not climb or land as ordered, and is in the air or to get there.
 
-        Whoever obeys may hear of the goals late, or hover for a pause of them, and takes up none that is far.
+        It may have received goals late, or hovered while none came, and does not take up goals far away.
         """
         if self.doing not in (Doing.CLIMBING, Doing.LANDING) or self._off() <= _BEHIND:
             return False
         return self.doing is Doing.CLIMBING or self._last_state.body.position[2] > self.ground + _ALOFT
 
     def _begin_anew(self, now: float) -> bool:
-        """Lead it on from where it is.
+        """Begin the route anew from where the vehicle is, and return True.
 
-        False where it is left to itself: where that has lasted too long, or it was seen to leap, since goals
-        would leap too.
+        The vehicle is left to itself, and False returned, where the order has taken too long, or where its
+        position was seen to leap, since goals would leap too.
         """
         if self._leapt or now > self._there_by:
             order = "climb" if self.doing is Doing.CLIMBING else "land"

@@ -1,4 +1,4 @@
-"""Goals, modes and seen states that a link and a vehicle tell each other; ENU and FLU."""
+"""Goals, modes and observed states, as a link and a vehicle exchange them; ENU and FLU."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class Mode(StrEnum):
     OFFBOARD = "offboard"
 
 
-_LARGEST = 1e6  # [m], [m/s] and [rad/s] of what is believed of a vehicle
+_LARGEST = 1e6  # [m], [m/s] and [rad/s] that a vehicle can have
 _UNIT = 1e-2  # [-] by which the norm of a quaternion may be off: what few decimals leave
 _STILL: Array = np.zeros(3)
 _STILL.flags.writeable = False
 
 
 class PositionGoal(NamedTuple):
-    """A point to be at, moving as it says."""
+    """A point to track, with its derivatives."""
 
     position: Array  # [m], (3,)
     velocity: Array  # [m/s], (3,)
@@ -76,7 +76,7 @@ class PathPiece(NamedTuple):
 
 
 class AttitudeGoal(NamedTuple):
-    """An attitude to have, turning as it says, at a collective thrust."""
+    """An attitude to track, with its body rates and the collective thrust."""
 
     q_world_body: Quaternion
     omega_body: Vector  # [rad/s]
@@ -84,9 +84,9 @@ class AttitudeGoal(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """A vehicle as telemetry tells it."""
+    """A vehicle's state, by its telemetry."""
 
-    time: float  # [s] when it was so, by the link's clock
+    time: float  # [s] by the link's clock
     body: Body
 
 
@@ -98,7 +98,7 @@ def observed(
     Every number is finite and below 10⁶, and the attitude is a unit quaternion within 1 %.
 
     Args:
-        time: When the vehicle was so [s], by the link's clock.
+        time: When the state held [s], by the link's clock.
         position: World [m].
         q_world_body: The attitude, body to world.
         velocity_body: The velocity in the body's axes [m/s].

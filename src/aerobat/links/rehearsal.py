@@ -1,4 +1,4 @@
-"""A flight for nobody, so that what a real one takes is imported before a vehicle waits for it."""
+"""A flight without a vehicle, which imports all that a real one needs before a vehicle waits for it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _STANDING = Body((0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), (0.0,) * 3)
 
 
 def rehearse(vehicle: Vehicle, gravity: float) -> None:
-    """Lead a vehicle that is wherever it is told to be up, to a halt, and down.
+    """Lead a vehicle that is always at its goal up, to a halt, and down.
 
     Args:
         vehicle: whose thrust counts when braking.
@@ -26,7 +26,7 @@ def rehearse(vehicle: Vehicle, gravity: float) -> None:
         while commander.doing not in (Doing.HOVERING, Doing.NOTHING):
             goal, now = commander.step(now), now + _STEP
             if goal is not None:
-                told = goal.position, goal.velocity, goal.q_world_body, goal.omega
-                commander.observe(Observed(now, Body(*(tuple(part.tolist()) for part in told))))
+                reached = goal.position, goal.velocity, goal.q_world_body, goal.omega
+                commander.observe(Observed(now, Body(*(tuple(part.tolist()) for part in reached))))
         if order is not None:
             order(now)

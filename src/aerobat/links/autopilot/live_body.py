@@ -23,7 +23,7 @@ from aerobat.simulation.components import log_row
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
 
-_LONG = 10**6  # ticks: what a live flight takes is not known
+_LONG = 10**6  # ticks, since the length of a live flight is not known
 
 
 class LiveBody:
@@ -42,12 +42,12 @@ class LiveBody:
         self.stop_rotors()
 
     def fly(self, references: ReferencePoint, by_attitude: bool, upright: bool) -> None:
-        """Go on by as many ticks as there are references, leaves (T,); see `autopilot_inputs`."""
+        """Simulate a tick for each of the references, leaves (T,); see `autopilot_inputs`."""
         self._carry, _ = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude, upright))
         self.state = BodyState(*(np.concatenate(leaves) for leaves in self._carry[2].body))
 
     def restart_position_loop(self, references: ReferencePoint, upright: bool) -> None:
-        """Have the outer loop begin anew towards the first of the references, without what was before.
+        """Restart the outer loop towards the first of the references, without its state from before.
 
         See `autopilot_inputs` for `upright`.
         """
@@ -58,14 +58,14 @@ class LiveBody:
         self._carry = (observer, restarted, motion)
 
     def stand(self) -> None:
-        """Be at rest on the ground below, rotors as they turn."""
+        """Put the vehicle at rest on the ground below it; the rotors keep their thrusts."""
         state = self.state
         self.state = _at_rest(state.position[:2], yaw_of(state.q_world_body))
         observer, controller, motion = self._carry
         self._carry = (observer, controller, VehicleState(_one(self.state), motion.thrusts))
 
     def stop_rotors(self) -> None:
-        """Have the rotors give the least that they can, and be known to."""
+        """Set all rotors to their least thrust, in the plant and as the controller knows them."""
         observer, controller, motion = self._carry
         commands = controller.commands._replace(thrusts=self._idle)
         stopped = controller._replace(thrusts=self._idle, commands=commands)

@@ -15,12 +15,12 @@ from aerobat.links.goals import AttitudeGoal, PathPiece, PositionGoal
 from aerobat.simulation.autopilot.braking import point_reference
 from aerobat.simulation.autopilot.loop import KEPT
 
-_SLOW = 0.5  # [m/s] and [m/s²] of a path that hardly leads away from where it is
+_SLOW = 0.5  # [m/s] and [m/s²]: a piece that ends no faster is almost at rest then
 _SMOOTHING = 0.002  # [s] time constant of the low-pass on the change of commanded rates and thrust
 
 
 class PointReference(NamedTuple):
-    """A goal of position, carried on by its velocity."""
+    """A position goal, extrapolated by its velocity."""
 
     goal: PositionGoal
     arrived: float  # [s]
@@ -35,31 +35,31 @@ class PointReference(NamedTuple):
 
 
 class PathReference(NamedTuple):
-    """A short piece of a path, carried on beyond its end by the snap and angular jerk that it tells."""
+    """A short piece of a path, extrapolated beyond its end by its snap and angular jerk."""
 
     piece: PathPiece
 
     @property
     def leads_away(self) -> bool:
-        """True unless it is hardly anything but a hover."""
+        """True unless it ends almost at rest."""
         end = self.piece.end
         return float(np.linalg.norm(end.velocity)) > _SLOW or float(np.linalg.norm(end.acceleration)) > _SLOW
 
     def reference(self, times: Array, period: float, gravity: float) -> ReferencePoint:
-        """References at times [s], leaves (T,), for a controller that steps so often."""
+        """References at times [s], leaves (T,), for a controller that steps every `period` [s]."""
         begin, end, stamp, duration = self.piece
         age = np.clip(times - stamp, 0.0, duration + KEPT)[:, None]
         snap = (end.jerk - begin.jerk) / duration
-        position, velocity, acceleration, jerk, _ = _carried_on(age, (*begin[:4], snap))
+        position, velocity, acceleration, jerk, _ = _extrapolated(age, (*begin[:4], snap))
         (omega_body, omega_dot_body), (_, final) = (
             [so3.unrotate(goal.q_world_body, rate) for rate in (goal.omega, goal.omega_dot)]
             for goal in (begin, end)
         )
         turning = omega_body, omega_dot_body, (final - omega_dot_body) / duration
-        rotation, *now = _carried_on(age, (np.zeros(3), *turning))
+        rotation, *now = _extrapolated(age, (np.zeros(3), *turning))
         q = so3.multiply(begin.q_world_body, so3.exp(rotation))
         omega, omega_dot, ahead, ahead_dot = (
-            components(so3.rotate(q, rate)) for rate in (*now[:2], *_carried_on(age + period, turning)[:2])
+            components(so3.rotate(q, rate)) for rate in (*now[:2], *_extrapolated(age + period, turning)[:2])
         )
         thrust = acceleration + gravity * so3.UP
         coming = np.linalg.norm(thrust + period * (jerk + 0.5 * period * snap), axis=-1)
@@ -75,8 +75,8 @@ class PathReference(NamedTuple):
         )
 
 
-def _carried_on(age: Array, derivatives: Sequence[Array]) -> list[Array]:
-    """What has those derivatives at first, and its derivatives, at ages [s] (T, 1); the last one stays."""
+def _extrapolated(age: Array, derivatives: Sequence[Array]) -> list[Array]:
+    """A quantity and its derivatives, known at first, at ages [s] (T, 1); the last derivative stays."""
     last = len(derivatives) - 1
     parts = [np.broadcast_to(derivatives[last], (len(age), 3))] * (last + 1)
     for lower in range(last):
@@ -86,10 +86,9 @@ def _carried_on(age: Array, derivatives: Sequence[Array]) -> list[Array]:
 
 
 class AttitudeReference(NamedTuple):
-    """A goal of attitude, carried on by its rates, and what it is turning into as the last ones tell.
+    """An attitude goal, extrapolated by its rates and by how rates and thrust changed in the last goals.
 
-    Goals come with the time at which they were sent, so that those which the link held up for longer than
-    others count as if they had not been.
+    Goals carry the time at which they were sent, so that the varying delay of a link has little effect.
     """
 
     goal: AttitudeGoal
@@ -99,7 +98,7 @@ class AttitudeReference(NamedTuple):
     thrust_rate: float = 0.0  # [N/s]
 
     def followed_by(self, goal: AttitudeGoal, sent: float, arrived: float) -> AttitudeReference:
-        """The next one after this; itself where that is a little older, as one that was overtaken."""
+        """Return the reference of the next goal, or this one where that goal was overtaken by it."""
         elapsed = sent - self.sent
         if abs(elapsed) > 10.0 * KEPT:
             return AttitudeReference(goal, sent, arrived)
@@ -117,7 +116,7 @@ class AttitudeReference(NamedTuple):
         )
 
     def reference(self, times: Array, period: float, mass: float) -> ReferencePoint:
-        """References at times [s], leaves (T,), for a controller that steps so often, of a vehicle's mass."""
+        """References at times [s], leaves (T,), for a controller's period [s] and a vehicle's mass [kg]."""
         age = np.clip(times - self.since, 0.0, KEPT)[:, None]
         omega_body = self.goal.omega_body + age * self.omega_dot
         mean_rate = self.goal.omega_body + 0.5 * age * self.omega_dot

@@ -20,34 +20,34 @@ from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-# [s] without goals after which a client is taken for lost: attitudes and paths lead away fast, points do not
+# [s] without goals after which a client counts as lost: attitudes and paths lead away fast, points do not
 ATTITUDE_TIMEOUT = 0.1
 POINT_TIMEOUT = 0.5
 
-_CHUNK = 5  # ticks at most between looks at the ground and at the client's silence
-_HARD_SPEED = 1.5  # [m/s] of a touchdown that is none
+_CHUNK = 5  # ticks at most between checks for the ground and for a silent client
+_HARD_SPEED = 1.5  # [m/s] from which on a touchdown is a crash
 _HARD_TILT = 0.5  # [rad] likewise
 
 
 class SimulatedVehicle:
-    """A vehicle that obeys; on the ground at first, disarmed.
+    """A simulated vehicle with an autopilot; on the ground at first, disarmed.
 
-    Times are those of a clock that `advance` is told. Its own frame is ENU with the origin where it stands,
-    on flat ground.
+    Times are those given to `advance`. The vehicle's own frame is ENU with the origin where it stands, on
+    flat ground.
     """
 
     def __init__(self, vehicle: Vehicle, environment: Environment) -> None:
         """Put a vehicle on the ground.
 
         Args:
-            vehicle: which; its controller's gains count.
-            environment: where; its gravity and wind count.
+            vehicle: what flies, with the gains of its controller.
+            environment: whose gravity and wind act on it.
         """
         self.vehicle, self.gravity = vehicle, environment.gravity
         self.time = 0.0  # [s]
         self.mode = Mode.HOLD
         self.armed, self.landed, self.crashed = False, True, False
-        self.notices: list[str] = []  # sentences for whoever listens, who empties it
+        self.notices: list[str] = []  # sentences for a front end, which empties the list
         self._body = LiveBody(vehicle, environment)
         self._route = Route(rest_to_rest(np.zeros(3), np.zeros(3)), self.time, 0.0)
         self._then: tuple[Array, float | None] | None = None  # [m], [rad] where to go once it hovers
@@ -93,7 +93,7 @@ class SimulatedVehicle:
         return True
 
     def hold(self) -> bool:
-        """Come to a hover from whatever it does."""
+        """Come to a hover from any motion."""
         self.mode, self._then = Mode.HOLD, None
         if not self.landed:
             motion = self.state.position, self.state.velocity
@@ -133,7 +133,7 @@ class SimulatedVehicle:
             self._goal = AttitudeReference(goal, sent, self.time)
 
     def advance(self, now: float) -> None:
-        """Go on to a time [s], to the last tick before it."""
+        """Simulate up to the last tick before a time [s]."""
         while (ticks := min(int((now - self.time) * RATE + 1e-6), _CHUNK)) > 0:
             self._watch_client()
             if not self.landed and self.time - self._route.began >= self._route.path.duration:
@@ -179,14 +179,14 @@ class SimulatedVehicle:
         return goal.reference(times, self.gravity)
 
     def _go(self, mode: Mode, path: Trajectory, yaw: float | None = None) -> None:
-        """Take a way of its own."""
+        """Begin a route of the autopilot's own."""
         own = float(nearest_heading(self.state.q_world_body)) if yaw is None else yaw
         self.mode, self._then = mode, None
         self._route = Route(path, self.time, own)
         self._restart_position_loop()
 
     def _go_on(self) -> None:
-        """Begin what follows the present way, which has ended."""
+        """Begin what follows the present route, which has ended."""
         here = self._route.end
         if self._then is not None and self.mode is Mode.HOLD:
             position, yaw = self._then
@@ -214,7 +214,7 @@ class SimulatedVehicle:
             self._body.restart_position_loop(references, self._stays_upright)
 
     def _touch_ground(self) -> None:
-        """Stand on the ground, or lie there."""
+        """Stop on the ground: landed, or crashed where it came down hard."""
         state = self.state
         tilt = float(np.arccos(np.clip(so3.thrust_axis(state.q_world_body)[2], -1.0, 1.0)))
         speed = float(np.linalg.norm(state.velocity))

@@ -27,7 +27,7 @@ from aerobat.vehicle.fleet import Fleet
 
 PROTOCOLS = {"msp": MSP, "crsf": CRSF}
 _PATIENCE = 0.1  # [s] for a line to take a frame
-_READ = 4096  # bytes of answers that are dropped at once
+_READ = 4096  # bytes of answers that are discarded at once
 _LIFT = 0.01  # [m] above where it stands, from which on a goal means to take off
 _DOWN = 0.05  # [m] above the ground, within which a goal beneath it ends the flight
 _ALOFT = 0.3  # [m] above the ground, from which on motors are not stopped: the failsafe says what is done
@@ -38,13 +38,13 @@ class SerialLine:
     """A serial line, or a TCP connection in its place, that frames are written to."""
 
     def __init__(self, address: str, baud: int) -> None:
-        """Open it.
+        """Open the line.
 
         Args:
             address: A serial device, or socket://HOST:PORT.
             baud: Of a serial device [bit/s].
 
-        Raises SpecError where it cannot be had, BackendMissing without pyserial.
+        Raises SpecError where it cannot be opened, BackendMissing without pyserial.
         """
         serial = import_extra("serial", "boards need pyserial", "aerobat[board]")
         self._address, self._broken = address, (OSError, serial.SerialException)
@@ -56,7 +56,7 @@ class SerialLine:
             ) from None
 
     def send(self, frame: bytes) -> None:
-        """Write a frame, and drop what came. Raises SpecError where the line is cut."""
+        """Write a frame, and discard what was received. Raises SpecError where the line is cut."""
         try:
             self._line.write(frame)
             self._line.read(_READ)
@@ -64,7 +64,7 @@ class SerialLine:
             raise SpecError(f"the line to the board, {self._address}, is cut: {error}") from None
 
     def close(self) -> None:
-        """Give it up."""
+        """Close the line."""
         self._line.close()
 
 
@@ -129,7 +129,7 @@ class Board:
             self._line.send(self._flown(piece, observed, now))
 
     def close(self) -> None:
-        """Give up the line."""
+        """Close the line."""
         self._line.close()
 
     def _stop(self) -> None:
@@ -141,7 +141,7 @@ class Board:
         middle = now + 0.5 * self._period
         points = PathReference(piece).reference(np.array([middle]), self._period, self._gravity)
         reference: ReferencePoint = first_numbers(points)
-        law_input = Seen(_carried_on(observed, reference, middle, self._gravity), (), reference)
+        law_input = Seen(_extrapolated(observed, reference, middle, self._gravity), (), reference)
         if self._state is None or now - self._last > _PAUSE:
             self._state = self._law.init(FloatOps, self._model, law_input)
         else:
@@ -161,7 +161,7 @@ def board_at(address: str, vehicle: Vehicle, environment: Environment, period: f
         environment: Where it flies.
         period: From one goal to the next [s].
 
-    Raises SpecError for a line that cannot be had or a vehicle that no board flies, BackendMissing without
+    Raises SpecError for a line that cannot be opened or a vehicle that no board flies, BackendMissing without
     pyserial.
     """
     name, _, place = address.partition(":")
@@ -171,8 +171,8 @@ def board_at(address: str, vehicle: Vehicle, environment: Environment, period: f
     return Board(SerialLine(place, protocol.baud), protocol, vehicle, environment, period)
 
 
-def _carried_on(observed: Observed, reference: ReferencePoint, time: float, gravity: float) -> Body:
-    """The body at a time [s], moving since it was observed as its reference does."""
+def _extrapolated(observed: Observed, reference: ReferencePoint, time: float, gravity: float) -> Body:
+    """The body at a time [s], extrapolated from its observation by the accelerations of its reference."""
     age, body = time - observed.time, observed.body
     acceleration = subtract(reference.specific_thrust, (0.0, 0.0, gravity))
     turning = to_body(axes(body.q_world_body), reference.omega_dot)

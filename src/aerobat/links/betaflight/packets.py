@@ -28,7 +28,7 @@ def state_packet(sensed: Sensed) -> bytes:
 
 
 class ReceiverProtocol(NamedTuple):
-    """A way of the receiver's channels to a firmware: whole counts of a step, beyond an offset."""
+    """The form in which a firmware receives channels: whole counts of a step, beyond an offset."""
 
     frame: Callable[[Sequence[int]], bytes]  # of 16 counts
     offset: float = 0.0  # [µs] of a stick's pulse, which count 0 stands for
@@ -44,7 +44,7 @@ SIMULATOR = ReceiverProtocol(lambda counts: struct.pack("<d16H", _TIMESTAMP, *co
 
 
 class Sticks:
-    """Channels of a receiver for body rates and thrust; later ones make up for what rounding leaves."""
+    """Channels of a receiver for body rates and thrust; rounding errors are carried over to later frames."""
 
     def __init__(self, max_rate: float, protocol: ReceiverProtocol = SIMULATOR) -> None:
         """Prepare.

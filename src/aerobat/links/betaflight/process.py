@@ -1,4 +1,4 @@
-"""Betaflight's simulator target as a process of its own, in step with who simulates its vehicle."""
+"""Betaflight's simulator target as a process of its own, in step with the simulation of its vehicle."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class FirmwareEnded(SpecError):
 
 
 class _Folder(tempfile.TemporaryDirectory[str]):
-    """A temporary folder, locked as long as this process lives; those that killed ones left are removed."""
+    """A temporary folder, locked while this process lives; folders that killed processes left are removed."""
 
     def __init__(self) -> None:
         for left in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
@@ -50,7 +50,7 @@ class _Folder(tempfile.TemporaryDirectory[str]):
         self._lock = _locked(self.name)
 
     def cleanup(self) -> None:
-        """Remove it."""
+        """Remove the folder."""
         super().cleanup()
         os.close(self._lock)
 
@@ -83,10 +83,10 @@ class Firmware:
     """
 
     def __init__(self, saved: bytes | None = None) -> None:
-        """Start it.
+        """Start the firmware.
 
         Args:
-            saved: Its saved settings; by default it has its own.
+            saved: The settings to start with; by default the firmware's own.
 
         Raises:
             BackendMissing: It is not installed, or there is no C compiler.
@@ -121,9 +121,9 @@ class Firmware:
             theirs.close()
 
     def step(self, duration: float, state: bytes | None = None, sticks: bytes | None = None) -> Motors:
-        """Have the firmware live for a while [s], after it got a state and the receiver's channels.
+        """Advance the firmware by a duration [s], once it has a state and the receiver's channels.
 
-        Raises FirmwareEnded where it does not.
+        Raises FirmwareEnded where its process has ended.
         """
         order = _ORDER.pack(
             round(1e9 * duration), state is not None, sticks is not None, state or b"", sticks or b""
@@ -153,7 +153,7 @@ class Firmware:
     def exchange(self, data: bytes, until: Callable[[bytes], bool]) -> bytes:
         """Send bytes to the serial line, and return what comes back once a predicate holds of it.
 
-        The firmware lives on meanwhile. Raises FirmwareEnded where they do not come.
+        The firmware is advanced meanwhile. Raises FirmwareEnded where no such answer comes.
         """
         if self._serial is None:
             self._serial = self._connected()
@@ -182,15 +182,15 @@ class Firmware:
         raise FirmwareEnded(f"autopilot: Betaflight does not listen on port {self._port}; run it again")
 
     def configure(self, lines: tuple[str, ...]) -> bytes:
-        """Give it lines of its command line and have it save them, which ends it; return what it saved.
+        """Enter lines at its command line and save, which ends it; return the saved settings.
 
         Raises SpecError for a line that it refuses.
         """
         self.exchange(b"#", partial(_has_prompts, 1))
         for begin in range(0, len(lines), _LINES_AT_ONCE):
             few = lines[begin : begin + _LINES_AT_ONCE]
-            told = "".join(f"{line}\n" for line in few).encode()
-            answer = self.exchange(told, partial(_has_prompts, len(few)))
+            entered = "".join(f"{line}\n" for line in few).encode()
+            answer = self.exchange(entered, partial(_has_prompts, len(few)))
             for line, each in zip(few, answer.decode(errors="replace").split(_PROMPT.decode()), strict=False):
                 if "###ERROR" in each:
                     said = " ".join(each.split())
@@ -224,7 +224,7 @@ class Firmware:
 
 
 def _looks() -> Iterator[None]:
-    """Go on for as long as an answer is waited for, however slowly a busy machine gives it."""
+    """Iterate for as long as an answer is waited for, at whatever pace a busy machine gives it."""
     last = time.monotonic() + _PATIENCE
     while time.monotonic() < last:
         yield

@@ -124,7 +124,7 @@ class AutopilotLink:
             self._send("command_long", self._system, _AUTOPILOT, number, 0, *padded)
 
     def follow(self, goal: PositionGoal | AttitudeGoal, max_thrust: float) -> None:
-        """Send a goal, of thrusts as a part of the greatest [N]."""
+        """Send a goal, its thrust as a fraction of `max_thrust` [N]."""
         stamp = round(1e3 * self._now)
         if isinstance(goal, AttitudeGoal):
             q, rates = swap_attitude(goal.q_world_body), swap_body(goal.omega_body)
@@ -236,7 +236,7 @@ class AutopilotLink:
 
 
 def _of_odometry(message: MavlinkMessage, offset: float) -> Observed | None:
-    """A state that one message tells, by a clock that is behind the vehicle's by so much [s]."""
+    """The state in one message, by a clock that is `offset` [s] behind the vehicle's."""
     return observed(
         1e-6 * message.time_usec - offset,
         swap_world((message.x, message.y, message.z)),
@@ -249,7 +249,7 @@ def _of_odometry(message: MavlinkMessage, offset: float) -> Observed | None:
 def _of_position(
     position: MavlinkMessage, attitude: MavlinkMessage, age: float, offset: float
 ) -> Observed | None:
-    """A state that two messages tell: the attitude turns on by its rates to when the position was so."""
+    """The state in two messages, the attitude extrapolated by its rates to the time of the position."""
     rates = swap_body((attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed))
     attitude_then = np.array(swap_attitude((attitude.q1, attitude.q2, attitude.q3, attitude.q4)))
     q = so3.multiply(attitude_then, so3.exp(age * np.array(rates)))

@@ -1,6 +1,6 @@
-"""A Crazyflie behind crazyswarm2's server of ROS 2: what its services and its topic of full states are told.
+"""A Crazyflie behind crazyswarm2's server of ROS 2: requests to its services, and full states on its topic.
 
-Routes to a hover and to the ground are the firmware's own. It hovers by itself where it is told nothing.
+Routes to a hover and to the ground are the firmware's own. It hovers by itself where it receives nothing.
 Maneuvers are streamed as full states, or, where the plan has the pieces, uploaded and flown by itself.
 """
 
@@ -58,7 +58,7 @@ class Crazyflie:
         self._streams = self._flies = False  # whether full states are sent, and a trajectory is flown
 
     def take(self, tick: Tick) -> None:
-        """Tell what is due: an order where another route begins, else the full state of a maneuver's goal."""
+        """Send what is due: an order where another route begins, else the full state of a maneuver's goal."""
         enters, self._doing = tick.doing is not self._doing, tick.doing
         own = tick.flown is not None and tick.flown.pieces is not None
         if tick.route is None and tick.doing is Doing.NOTHING:

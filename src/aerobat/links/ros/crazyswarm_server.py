@@ -1,6 +1,6 @@
 """The simulated vehicle as a Crazyflie behind crazyswarm2's server: orders in, odometry out.
 
-A stand-in: ways are flown at the simulated vehicle's own speeds, trajectories in the heading of their begin.
+A stand-in: routes are flown at the simulated vehicle's own speeds, trajectories with their first heading.
 Jerk and angular acceleration, which full states leave out, are taken from the last two.
 """
 
@@ -72,12 +72,12 @@ class CrazyswarmServer(VehicleNode):
         stamp = (topics.nanoseconds(message.header.stamp) - self.origin) / NANOSECONDS
         goal = PathGoal(position, velocity, acceleration, _ZERO, q, so3.rotate(q, omega), _ZERO)
         if np.isfinite(np.concatenate([*goal, [stamp]])).all():
-            goal = self._changing(goal, stamp)
+            goal = self._with_jerk(goal, stamp)
             self.vehicle.advance(stamp)
             self._follow(PathPiece(goal, goal, stamp, _KEPT))
 
-    def _changing(self, goal: PathGoal, stamp: float) -> PathGoal:
-        """The same, changing as it did since the one before."""
+    def _with_jerk(self, goal: PathGoal, stamp: float) -> PathGoal:
+        """The goal with the jerk and the angular acceleration since the one before."""
         (before, when), self._last = self._last, (goal, stamp)
         elapsed = stamp - when
         if not 0.0 < elapsed < _STREAM:

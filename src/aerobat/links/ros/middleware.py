@@ -38,10 +38,10 @@ def interface_class(kind: str) -> Any:
 
 
 class PacedClock:
-    """A clock that others follow, `speed` times as fast as the wall's; at first it shows the same.
+    """A clock that other nodes follow, `speed` times as fast as the wall's, whose time it begins with.
 
-    It waits for who is late, itself among them, so that a flight is the same on a busy machine. While it
-    waits it has its last time told again: who is late may have missed the message by which to go on.
+    It waits for nodes that are late, its own among them, so that a flight is the same on a busy machine.
+    While it waits, its last time is sent again: a late node may have missed the message by which to go on.
     """
 
     def __init__(self, speed: float) -> None:
@@ -93,7 +93,7 @@ class Middleware(Protocol):
         """Do what comes, messages and requests, until a time [ns] or for so long [s] of the wall."""
 
     def close(self) -> None:
-        """Leave."""
+        """Leave the graph."""
 
 
 def require_time(clock: Callable[[], int]) -> None:

@@ -41,9 +41,9 @@ def goal_message(messages: Messages, piece: PathPiece, stamp: int, with_jerk: bo
 
 
 def read_goal(message: RosMessage, origin: int) -> PathPiece | None:
-    """The piece of a path that a message tells, by a clock that began at an instant [ns]; None if malformed.
+    """The piece of a path in a message, by a clock that began at an instant [ns]; None if malformed.
 
-    Of a goal of others the jerk, a second point, velocities and accelerations may be missing.
+    Goals of other programs may lack the jerk, a second point, velocities and accelerations.
     """
     if not message.points or not all(point.transforms for point in message.points):
         return None
