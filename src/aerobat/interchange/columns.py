@@ -4,7 +4,7 @@ A header names each column; units are SI, world axes, attitude body to world, ra
 
     t | x y z | vx vy vz | ax ay az | jx jy jz | qw qx qy qz | wx wy wz | f0 f1 ... (thrusts [N])
 
-Read back, columns go by their names, in any order; those that nobody knows are left out.
+Columns are read back by their names, in any order; unknown ones are left out.
 """
 
 from __future__ import annotations

@@ -229,7 +229,7 @@ def named_columns(text: str, needed: Sequence[str], asked: str) -> dict[str, Arr
     Args:
         text: The file's.
         needed: The names of columns that must be there.
-        asked: A sentence without its full stop that says so.
+        asked: What messages say of that, without a full stop.
     """
     words = text.partition("\n")[0].strip().lstrip("#").split(",")
     header = [SYNONYMS.get(name, name) for name in (word.strip().strip('"').lower() for word in words)]
@@ -262,7 +262,7 @@ def number_table(text: str, first: int, counts: Sequence[int], asked: str) -> Ar
         text: The file's.
         first: The number of the first line that counts, from 1.
         counts: The numbers of columns that may be.
-        asked: A sentence without its full stop that says so.
+        asked: What messages say of that, without a full stop.
     """
     if text.count("\n") > MAX_ROWS:
         raise SpecError(f"it has more than {MAX_ROWS} lines; give the part that is a path's")

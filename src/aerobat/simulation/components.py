@@ -44,7 +44,7 @@ class StateObserver(Component):
 
 
 class ControllerParameters(NamedTuple):
-    """A controller, and when its commands take effect."""
+    """A controller, and the delay of its commands."""
 
     model: ControllerModel
     delay: Scalar | tuple[()]  # [s] from the state to the commands made of it; () for at once
@@ -52,7 +52,7 @@ class ControllerParameters(NamedTuple):
 
 @dataclass(frozen=True)
 class TrackingController(Component):
-    """The tracking controller, told of the body by the observer.
+    """The tracking controller, which takes the body's state from the observer.
 
     Its reference is an input of its own where its commands come late, else that of the tick.
     """
@@ -128,7 +128,7 @@ class Disturbance(NamedTuple):
 def _answering(
     reference: ReferencePoint, body: Body, disturbance: Disturbance, takes_moments: bool
 ) -> ReferencePoint:
-    """The reference, with what is to be thrust and turned against a disturbance in body axes taken off it."""
+    """The reference less the linear and angular accelerations of a disturbance, which is in body axes."""
     body_axes = axes(body.q_world_body)
     force, turn = (
         to_world(body_axes, each) for each in (disturbance.force, disturbance.angular_acceleration)
@@ -154,7 +154,8 @@ class CommandsOnTheirWay(NamedTuple):
 class ComputationDelay(Component):
     """The controller's commands, which take effect a while after they are asked for.
 
-    Its input is 1 at the ticks at which the latest ones do, which may be those of the controller's next.
+    Its input is 1 at the ticks at which the latest commands take effect, which may be those of the
+    controller's next step.
     """
 
     def init(

@@ -1,4 +1,4 @@
-"""The loop's component that flies a control law: what it sees before it, rotor commands behind it."""
+"""The loop's component that flies a control law: the law's inputs before it, rotor commands behind it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class LawState(NamedTuple):
 
 @dataclass(frozen=True)
 class LawController(Component):
-    """A control law, told of the body by the observer; its input is as that of the tracking controller."""
+    """A control law on the observer's state; its input is that of the tracking controller."""
 
     law: ControlLaw
     flags: FeatureFlags  # of the way from its force and moment to the rotors

@@ -36,7 +36,7 @@ def digits(value: float, nothing: float = 0.0) -> str:
     """A number with two decimals, or two digits where those would show too little of it.
 
     Args:
-        value: In the unit that it is told in.
+        value: In the unit that is shown.
         nothing: Up to so much is rounding, 0.00.
     """
     return f"{value:.2g}" if nothing < abs(value) < FEW_DECIMALS else f"{value:.2f}"

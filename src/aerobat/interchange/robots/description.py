@@ -149,7 +149,7 @@ def _rotor(link: Link, motor: Motor | None) -> dict[str, Any]:
 
 
 def _defaults(robot: Robot, mass: float, rotors: int) -> dict[str, float]:
-    """What holds for all rotors; they push one way, from standstill on."""
+    """The values that all rotors share; their least thrust is 0."""
     defaults = {"min_thrust": 0.0} | robot.rotor_defaults
     if "thrust_to_weight" in defaults:
         total = defaults.pop("thrust_to_weight") * mass * STANDARD_GRAVITY

@@ -145,7 +145,7 @@ def _pose_of(name: str, frames: dict[str, Element]) -> RigidTransform:
 
 
 def _reference_frame(element: Element) -> str:
-    """What an element's pose is relative to, unless it says so: the model; of a joint its child."""
+    """The frame that an element's pose is relative to: by default the model's, of a joint its child's."""
     pose = element.find("pose")
     given = "" if pose is None else pose.get("relative_to", "")
     usual = (element.findtext("child") or "") if element.tag == "joint" else element.get("attached_to", "")

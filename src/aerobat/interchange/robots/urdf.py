@@ -124,7 +124,7 @@ def _end(joint: Element, which: str) -> str:
 
 
 def _properties(element: Element | None, links: tuple[Link, ...]) -> dict[str, float]:
-    """What gym-pybullet-drones says of all rotors; thrust2weight stays one, until they are counted."""
+    """The properties of all rotors by gym-pybullet-drones; the thrust is a ratio to the weight."""
     if element is None:
         return {}
     found = {

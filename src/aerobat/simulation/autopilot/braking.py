@@ -1,4 +1,4 @@
-"""From any motion to a hover: the way that an autopilot brakes, for one vehicle or many."""
+"""Paths from any motion to a hover, by which an autopilot brakes, for one vehicle or many."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _FALLING = 0.7  # [-] of gravity, which alone ends a climb
 
 
 class Braking(NamedTuple):
-    """To a rest straight on, or r higher: p = p₀ + v T (s − s³ + s⁴/2) + r (10 s³ − 15 s⁴ + 6 s⁵)."""
+    """Paths straight on to rest, or r higher: p = p₀ + v T (s − s³ + s⁴/2) + r (10 s³ − 15 s⁴ + 6 s⁵)."""
 
     durations: Array  # [s] T, (...)
     coefficients: Array  # [m] of s⁰ to s⁵, (..., 6, 3)
 
     @classmethod
     def of(cls, position: Array, velocity: Array, vehicle: Vehicle, gravity: float, floor: float) -> Braking:
-        """As hard as a vehicle can.
+        """Return the paths by which a vehicle brakes as hard as it can.
 
         Args:
             position: at first [m], (..., 3).
@@ -66,7 +66,7 @@ class Braking(NamedTuple):
 
     @property
     def trajectory(self) -> Trajectory:
-        """Of one vehicle."""
+        """The path of one vehicle."""
         return Trajectory(np.array([self.durations]), self.coefficients[None])
 
 

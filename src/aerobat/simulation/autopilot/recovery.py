@@ -196,13 +196,13 @@ class _Flock:
         self.durations = np.zeros(count)
 
     def keep(self, setpoint: Setpoint, seconds: float) -> None:
-        """Go on by the commands of the instants."""
+        """Fly on by the commands of the instants for so many seconds."""
         since = np.arange(round(seconds * RATE)) / RATE
         for begin in range(0, len(since), _CHUNK):
             self._fly(_kept(setpoint, since[begin : begin + _CHUNK], self._vehicle), True)
 
     def brake(self, floor: float) -> None:
-        """Come to a hover, no lower than a floor [m]; who does not by the horizon never will."""
+        """Come to a hover, no lower than a floor [m]; a copy that does not by the horizon never does."""
         body, gravity = self._carry[2].body, self._environment.gravity
         velocity = from_components(body.velocity)
         way = Braking.of(from_components(body.position), velocity, self._vehicle, gravity, floor)

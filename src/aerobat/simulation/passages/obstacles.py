@@ -104,7 +104,7 @@ class _Encounters(NamedTuple):
     piece: Indices  # (m,)
 
     def of(self, rows: Any) -> _Encounters:
-        """Some of them."""
+        """The encounters of some rows."""
         return _Encounters(*(part[rows] for part in self))
 
 

@@ -1,7 +1,7 @@
 """The loop with a plant, a flight controller's firmware or both outside of it.
 
-The rest is compiled as ever, and stepped tick by tick: it tells the firmware what is measured and which rates
-are asked, and the plant what the firmware commands.
+The rest of the loop is compiled as ever, and stepped tick by tick. The firmware takes measurements and the
+controller's rates; the plant takes the firmware's commands.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from aerobat.vehicle.ellipsoid import Ellipsoid
 
 @dataclass(frozen=True)
 class OutsidePlant(Component):
-    """A plant that the loop is told of at every tick; its parameters are those of the vehicle's model."""
+    """A plant whose state is an input of every tick; its parameters are those of the vehicle's model."""
 
     def init(
         self, ops: Ops, parameters: PlantParameters, inputs: VehicleState, signals: Signals

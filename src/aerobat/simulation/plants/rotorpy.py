@@ -26,7 +26,7 @@ from aerobat.vehicle import Rotor, Vehicle
 GRAVITY = 9.81  # [m/s²] that RotorPy has written into it
 _GRAVITY_SPREAD = 0.05  # [m/s²] by which places on Earth differ
 _ROTORS = 4  # RotorPy inverts a square allocation
-_THRUST_COEFFICIENT = 1e-5  # [N/(rad/s)²] of rotors that are told by thrusts: it cancels
+_THRUST_COEFFICIENT = 1e-5  # [N/(rad/s)²] of rotors that are given by their thrusts: it cancels
 _LEAST_LAG = 1e-3  # [s]: its integrator needs one
 
 
