@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from math import hypot, inf
+from math import hypot, inf, isnan, nan
 
 import numpy as np
 
@@ -95,16 +95,14 @@ class Client:
         self.settings = settings
         self._say = say
         self._announcement = announcement
-        self._began: float | None = None
+        self._now = self._began = nan  # [s] of the last tick, and when the present stage began
         self._ground: PositionGoal | None = None
         self._hovering_since = inf
         self._refusal = ""  # why it was not begun
         self._lost = ""  # why the vehicle was not followed to the ground
-        vehicle, gravity = plan.vehicle, environment.gravity
-        self._name = vehicle.name
-        self._weight = vehicle.mass * gravity
-        self._own_hover = self._weight / float(vehicle.max_thrusts.sum())
-        self._max_thrust = float(vehicle.max_thrusts.sum())
+        self._name = plan.vehicle.name
+        self._weight = plan.vehicle.mass * environment.gravity
+        self._max_thrust = float(plan.vehicle.max_thrusts.sum())  # [N] later as the vehicle's hover says
 
     @property
     def done(self) -> bool:
@@ -117,19 +115,20 @@ class Client:
         Raises SpecError for a vehicle that does not answer, is another one, or cannot be armed; nothing flies
         then.
         """
-        now = round(now, 3)  # goals are stamped in whole milliseconds, and are those of their stamps
-        if self._began is None:
-            self._began = now
-        states = self.link.receive(now)
+        self._now = round(now, 3)  # goals are stamped in whole milliseconds, and are those of their stamps
+        if isnan(self._began):
+            self._began = self._now
+        states = self.link.receive(self._now)
         if self.mission.phase is Phase.MANEUVER:
             self.log += states
-        getattr(self, f"_while_{self.stage.name.lower()}")(now)
+        getattr(self, f"_while_{self.stage.name.lower()}")()
 
     def abort(self, now: float, reason: str) -> None:
         """Give the flight up: the vehicle is told to hover, then to land."""
         if self.stage is ClientStage.FLYING:
+            self._now = now
             self.mission.abort(now, reason)
-            self._recover(now)
+            self._recover()
         else:
             self._lost = reason
 
@@ -147,21 +146,23 @@ class Client:
             late=self.mission.max_lateness,
         )
 
-    def _enter(self, stage: ClientStage, now: float) -> None:
-        self.stage, self._began = stage, now
+    def _enter(self, stage: ClientStage) -> None:
+        self.stage, self._began = stage, self._now
 
     @property
     def _observed(self) -> Observed:
         assert self.link.observed is not None, "flown only once it is seen"
         return self.link.observed
 
-    def _since(self, now: float) -> float:
-        return now - (self._began or 0.0)
+    @property
+    def _elapsed(self) -> float:
+        """Time in the present stage [s]."""
+        return self._now - self._began
 
-    def _while_connecting(self, now: float) -> None:
+    def _while_connecting(self) -> None:
         if self.link.is_known:
-            self._enter(ClientStage.ASKING, now)
-        elif self._since(now) > self.settings.wait:
+            self._enter(ClientStage.ASKING)
+        elif self._elapsed > self.settings.wait:
             waited, heard = f"{self.settings.wait:g} s", ", ".join(map(str, sorted(self.link.systems)))
             if heard:
                 raise SpecError(
@@ -175,7 +176,7 @@ class Client:
             numbers = " and ".join(map(str, sorted(self.link.systems)))
             raise SpecError(f"the systems {numbers} answer; name the vehicle's by --system")
 
-    def _while_asking(self, now: float) -> None:
+    def _while_asking(self) -> None:
         """Wait for its clock, its state and its parameters, and see that it is the plan's vehicle."""
         self._require_one_system()
         dialect, parameters = self.link.dialect, self.link.parameters
@@ -193,8 +194,8 @@ class Client:
             if self._announcement:
                 self._say(self._announcement)
             self.link.complaints.clear()
-            self._enter(ClientStage.ARMING, now)
-        elif self._since(now) > self.settings.wait:
+            self._enter(ClientStage.ARMING)
+        elif self._elapsed > self.settings.wait:
             missing = f"its state ({', '.join(dialect.states)})"
             remedy = "have it send that"
             if unknown:
@@ -214,17 +215,18 @@ class Client:
                 raise SpecError(
                     f"the vehicle's parameter {name} is {value}: {setting.meaning}; set it to {wanted}"
                 )
-        if not abs(hover / self._own_hover - 1.0) <= _HOVER_TOLERANCE:
+        planned = self._weight / self._max_thrust
+        if not abs(hover / planned - 1.0) <= _HOVER_TOLERANCE:
             raise SpecError(
-                f"the vehicle hovers at {hover:.3f} of its thrust, {self._name} at {self._own_hover:.3f}: "
+                f"the vehicle hovers at {hover:.3f} of its thrust, {self._name} at {planned:.3f}: "
                 "the plan is for another vehicle; plan it for this one"
             )
 
-    def _while_arming(self, now: float) -> None:
+    def _while_arming(self) -> None:
         """Stream where it stands, as PX4 asks before it obeys; then take the mode, then arm."""
         assert self._ground is not None, "its state is known"
         self.link.follow(self._ground, self._max_thrust)
-        if self._since(now) <= _STREAMED:
+        if self._elapsed <= _STREAMED:
             self._require_one_system()
         else:
             self.link.set_mode(Mode.OFFBOARD)
@@ -232,115 +234,115 @@ class Client:
                 self.link.arm()
         if self.link.armed and self.link.mode is Mode.OFFBOARD:
             self._say("armed")
-            self._enter(ClientStage.TAKING_OFF, now)
-            self._while_taking_off(now)
-        elif self._since(now) > _PATIENCE:
+            self._enter(ClientStage.TAKING_OFF)
+            self._while_taking_off()
+        elif self._elapsed > _PATIENCE:
             # a vehicle that was ordered to arm may have, and is told to land
             has_mode = self.link.mode is Mode.OFFBOARD
-            self._refuse(now, "arm" if has_mode else "take the mode offboard", lands=has_mode)
+            self._refuse("arm" if has_mode else "take the mode offboard", lands=has_mode)
 
-    def _while_taking_off(self, now: float) -> None:
+    def _while_taking_off(self) -> None:
         """Have it take off where set-points do not lead it off the ground; then fly."""
         assert self._ground is not None, "its state is known"
         height = self._observed.body.position[2] - self._ground.position[2]
         if self.link.dialect.leads_off or abs(height - _LIFT) < _LIFTED:
-            self.mission.begin(now, self._observed)
-            self._enter(ClientStage.FLYING, now)
-        elif self._since(now) > _PATIENCE:
-            self._refuse(now, "take off")
-        elif not self._yields(now):
+            self.mission.begin(self._now, self._observed)
+            self._enter(ClientStage.FLYING)
+        elif self._elapsed > _PATIENCE:
+            self._refuse("take off")
+        elif not self._yields():
             self.link.take_off(_LIFT)
 
-    def _refuse(self, now: float, what: str, lands: bool = True) -> None:
+    def _refuse(self, what: str, lands: bool = True) -> None:
         """Raise SpecError, with what ails the vehicle as it says, once it is on the ground."""
         complaints = "; ".join(self.link.complaints)
         reason = f": {complaints}" if complaints else "; its own ground station says why"
         self._refusal = f"the vehicle does not {what}{reason}"
         if not lands:
             raise SpecError(self._refusal)
-        self._land(now, f"the vehicle does not {what}")
+        self._land(f"the vehicle does not {what}")
 
-    def _while_flying(self, now: float) -> None:
+    def _while_flying(self) -> None:
         phase = self.mission.phase
-        goal = self.mission.step(now, self._observed, self.link.delay)
+        goal = self.mission.step(self._now, self._observed, self.link.delay)
         if self.mission.phase is not Phase.LAND:
-            self._watch_vehicle(now)
+            self._watch_vehicle()
         if self.mission.phase is Phase.ABORTED:
-            self._recover(now)
+            self._recover()
             return
         if self.mission.phase is not phase:
             self._say(str(self.mission.phase))
         if self.mission.phase is Phase.LAND:
-            self._land(now)
+            self._land()
         elif goal is not None:
             self.link.follow(goal, self._max_thrust)
 
-    def _watch_vehicle(self, now: float) -> None:
+    def _watch_vehicle(self) -> None:
         """Abort where the vehicle no longer obeys."""
         if self.link.mode is not Mode.OFFBOARD:
             mode = "a mode of a pilot's" if self.link.mode is None else f"the mode {self.link.mode}"
-            self.mission.abort(now, f"the vehicle went into {mode}")
+            self.mission.abort(self._now, f"the vehicle went into {mode}")
         elif not self.link.armed:
-            self.mission.abort(now, "the vehicle was disarmed")
+            self.mission.abort(self._now, "the vehicle was disarmed")
 
-    def _recover(self, now: float) -> None:
+    def _recover(self) -> None:
         self._say(f"aborted: {self.mission.reason}; the vehicle is told to hover")
-        self._enter(ClientStage.RECOVERING, now)
-        self._while_recovering(now)
+        self._enter(ClientStage.RECOVERING)
+        self._while_recovering()
 
-    def _while_recovering(self, now: float) -> None:
+    def _while_recovering(self) -> None:
         """Have it hover; once it has for a while, or is not seen to, have it land."""
-        if self._yields(now):
+        if self._yields():
             return
         self.link.set_mode(Mode.HOLD)
-        silence = now - self._observed.time
+        silence = self._now - self._observed.time
         is_still = hypot(*self._observed.body.velocity) < _STILL
         is_seen = silence < self.mission.settings.max_silence_outside
         hovers = is_still and is_seen and self.link.mode is Mode.HOLD
-        self._hovering_since = min(self._hovering_since, now) if hovers else inf
+        self._hovering_since = min(self._hovering_since, self._now) if hovers else inf
         if silence > _SILENCE:
-            self._land(now, "no news of the vehicle")
-        elif now - self._hovering_since > _HOVERING or self._is_down:
-            self._land(now)
-        elif self._since(now) > _RECOVERY:
-            self._land(now, "the vehicle does not come to a hover")
+            self._land("no news of the vehicle")
+        elif self._now - self._hovering_since > _HOVERING or self._is_down:
+            self._land()
+        elif self._elapsed > _RECOVERY:
+            self._land("the vehicle does not come to a hover")
 
-    def _land(self, now: float, reason: str = "") -> None:
+    def _land(self, reason: str = "") -> None:
         """Have it land, for a reason that is told."""
         if reason:
             self._say(f"{reason}; it is told to land")
-        self._enter(ClientStage.LANDING, now)
-        self._while_landing(now)
+        self._enter(ClientStage.LANDING)
+        self._while_landing()
 
-    def _while_landing(self, now: float) -> None:
+    def _while_landing(self) -> None:
         """Have it land until it has, a pilot takes over, or there is no hope."""
         height = max(self._observed.body.position[2], 0.0)
         if self._is_down and self._refusal:
             raise SpecError(self._refusal)
         if self._is_down:
-            self._enter(ClientStage.LANDED, now)
+            self._enter(ClientStage.LANDED)
             self._say("landed")
-        elif not self._yields(now):
+        elif not self._yields():
             self.link.set_mode(Mode.LAND)
-            if now - max(self.link.heard, self._began or 0.0) > _SILENCE:
-                self._lose(now, "no news of the vehicle")
-            elif self._since(now) > _RECOVERY + height / _SLOWEST_DESCENT:
-                self._lose(now, "the vehicle does not land as it is told")
+            if self._now - max(self.link.heard, self._began) > _SILENCE:
+                self._lose("no news of the vehicle")
+            elif self._elapsed > _RECOVERY + height / _SLOWEST_DESCENT:
+                self._lose("the vehicle does not land as it is told")
 
     @property
     def _is_down(self) -> bool:
         """True of a vehicle that has landed, by what it has told since it was told what to do."""
-        return bool(self.link.landed) and not self.link.armed and self.link.beat > (self._began or 0.0)
+        return bool(self.link.landed) and not self.link.armed and self.link.beat > self._began
 
-    def _yields(self, now: float) -> bool:
+    def _yields(self) -> bool:
         """True where a pilot has taken over: the vehicle is left to him."""
         if self.link.mode is not None:
             return False
-        self._lose(now, "a pilot has taken over", "the pilot")
+        self._lose("a pilot has taken over", "the pilot")
         return True
 
-    def _lose(self, now: float, reason: str, left_to: str = "its own failsafe") -> None:
-        self._enter(ClientStage.LOST, now)
+    def _lose(self, reason: str, left_to: str = "its own failsafe") -> None:
+        self._enter(ClientStage.LOST)
         self._lost = reason
         self._say(f"{reason}; it is left to {left_to}")
 
