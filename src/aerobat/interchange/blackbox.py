@@ -13,9 +13,6 @@ from aerobat.errors import SpecError, import_extra
 from aerobat.storage import read_whole
 
 MAX_LOG = 2**27  # bytes
-_AXES = 3
-_MICROSECOND = 1e-6  # [s]
-_FINE = 10.0  # steps of a degree per second in a log of high resolution
 _STEP = 0.005  # [s] between the beginnings that are tried
 
 
@@ -59,10 +56,10 @@ def read_blackbox(path: PathName) -> Blackbox:
         names, rows, header = _decoded(raw)
         columns = {name: rows[:, names.index(name)] for name in names}
         low, high = header["motorOutput"]
-        scale = pi / 180.0 / (_FINE if header.get("blackbox_high_resolution") else 1.0)
+        scale = pi / 180.0 / (10.0 if header.get("blackbox_high_resolution") else 1.0)
         motors = [columns[name] for name in names if name.startswith("motor[")]
         return Blackbox(
-            times=_MICROSECOND * columns["time"],
+            times=1e-6 * columns["time"],
             omega_body=scale * _three(columns, "gyroADC"),
             rate_setpoint=scale * _three(columns, "setpoint"),
             motors=(np.stack(motors, axis=-1) - low) / (high - low),
@@ -78,7 +75,7 @@ def read_blackbox(path: PathName) -> Blackbox:
 
 
 def _three(columns: dict[str, Array], name: str) -> Array:
-    return np.stack([columns[f"{name}[{axis}]"] for axis in range(_AXES)], axis=-1)
+    return np.stack([columns[f"{name}[{axis}]"] for axis in range(3)], axis=-1)
 
 
 def _decoded(raw: bytes) -> tuple[list[str], Array, dict[str, Any]]:

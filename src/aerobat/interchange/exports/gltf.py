@@ -28,8 +28,6 @@ from aerobat.vehicle import Vehicle
 
 Floats = NDArray[np.float32]
 FLOAT, UNSIGNED_INT, LINES, LINE_STRIP, TRIANGLES = 5126, 5125, 1, 3, 4  # as the format numbers them
-BEAM = 0.05  # [m] of a gate's frame
-CORNERS = 24  # of a rotor's disc
 COLORS: Mapping[str, Sequence[float]] = {  # red, green, blue, opacity
     "rotor": (0.05, 0.2, 0.6, 1.0),
     "arm": (0.1, 0.1, 0.1, 1.0),
@@ -169,7 +167,7 @@ def _material(color: str) -> dict[str, Any]:
 
 def _vehicle(scene: _Scene, vehicle: Vehicle) -> Sequence[dict[str, Any]]:
     """Discs of the rotors, and arms to them and forward."""
-    angles = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
+    angles = np.linspace(0.0, 2.0 * np.pi, 24 + 1)  # of a disc's corners, the last again the first
     rim = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
     fan = np.stack([np.zeros_like(rim[1:]), rim[:-1], rim[1:]], axis=1).reshape(-1, 3)
     centres = np.array([rotor.position_body for rotor in vehicle.rotors])
@@ -186,7 +184,7 @@ def _vehicle(scene: _Scene, vehicle: Vehicle) -> Sequence[dict[str, Any]]:
 def _frame(gate: Gate) -> Array:
     """Triangles of a gate's frame around its opening, two for each side of that, (6 sides, 3)."""
     inner = gate.outline
-    outer = gate.frame(BEAM)
+    outer = gate.frame(0.05)  # [m] wide
     inner_next, outer_next = np.roll(inner, -1, axis=0), np.roll(outer, -1, axis=0)
     sides = np.stack([inner, outer, outer_next, inner, outer_next, inner_next], axis=1)
     return np.asarray(sides.reshape(-1, 3))

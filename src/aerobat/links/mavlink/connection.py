@@ -20,7 +20,6 @@ from aerobat.links.clock import Clock
 
 _KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
 _PATIENCE = 1.0  # [s] of the wall, for opening a broken link, and until that is tried again
-_MANY = 1000  # messages at once, after which others have their turn
 
 MavlinkMessage: TypeAlias = Any  # of pymavlink's own class
 
@@ -125,7 +124,8 @@ class _PymavlinkConnection:
         if not self._is_open():
             return messages
         try:
-            while len(messages) < _MANY and (message := self._link.recv_msg()) is not None:
+            # after a thousand others have their turn
+            while len(messages) < 1000 and (message := self._link.recv_msg()) is not None:
                 messages.append(message)
             self._let_go_of_client()
         except OSError:

@@ -30,8 +30,6 @@ SERVICES = {
     "start_trajectory": "crazyflie_interfaces/srv/StartTrajectory",
     "notify_setpoints_stop": "crazyflie_interfaces/srv/NotifySetpointsStop",
 }
-_PIECE = "crazyflie_interfaces/msg/TrajectoryPolynomialPiece"
-_VALID = 100  # [ms] for which the last full state counts once no more come
 _SHORTEST = 0.5  # [s] of a route, however near its end is
 _TRAJECTORY = 1  # the number of the trajectory that is flown
 
@@ -94,7 +92,7 @@ class Crazyflie:
     def _order(self, service: str, **given: Any) -> None:
         """Ask for a route of the firmware's own, in place of full states."""
         if self._streams:
-            self._ask["notify_setpoints_stop"](group_mask=0, remain_valid_millisecs=_VALID)
+            self._ask["notify_setpoints_stop"](group_mask=0, remain_valid_millisecs=100)
         self._streams = False
         self._ask[service](group_mask=0, **given)
 
@@ -104,7 +102,7 @@ class Crazyflie:
         moved["polynomials"][:, :3, 0] += flown.offset
         pieces = [
             self._messages.make(
-                _PIECE,
+                "crazyflie_interfaces/msg/TrajectoryPolynomialPiece",
                 **{
                     f"poly_{axis}": numbers
                     for axis, numbers in zip(AXES, piece["polynomials"].tolist(), strict=True)

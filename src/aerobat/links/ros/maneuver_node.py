@@ -28,8 +28,6 @@ from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
 
 _MAX_AHEAD = 0.1  # [s] by which another machine's clock may be ahead of ours
-_SHOWN_EVERY = 0.15  # [s] between snapshots of the vehicle along a path that is shown
-_SHOWN_RATE = 50.0  # [1/s] of the points of a path that is shown
 
 
 @dataclass(frozen=True)
@@ -240,7 +238,7 @@ class ManeuverNode:
         shown = PlanMessages(self._messages, planned.plan, stamp, planned.offset)
         kind = "visualization_msgs/msg/Marker"
         wipe = self._messages.make(kind, header=self._messages.header(stamp), action=3)  # DELETEALL
-        lines = shown.lines(reference(planned.plan, rate=_SHOWN_RATE))
-        discs = [disc for _, found in shown.snapshots(_SHOWN_EVERY) for disc in found]
+        lines = shown.lines(reference(planned.plan, rate=50.0))
+        discs = [disc for _, found in shown.snapshots(every=0.15) for disc in found]
         markers = self._messages.make(topics.KIND_OF_MARKERS, markers=[wipe, *lines, *discs])
         self._send_markers(markers)

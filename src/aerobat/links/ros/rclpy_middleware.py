@@ -19,9 +19,6 @@ from aerobat.links.ros.middleware import (
     require_time,
 )
 
-_THREADS = 4  # services wait for their answers, each in one
-_OFFERED = 10.0  # [s] of the wall, for which a service of another node is waited for
-
 
 class RclpyMiddleware:
     """A node of ROS 2; see `Middleware`."""
@@ -47,7 +44,8 @@ class RclpyMiddleware:
         self._clock = clock
         self._calls = Calls()
         self._services = ReentrantCallbackGroup()
-        self._executors = SingleThreadedExecutor(), MultiThreadedExecutor(_THREADS)
+        # four services at most wait for their answers, each in a thread
+        self._executors = SingleThreadedExecutor(), MultiThreadedExecutor(4)
         for executor, node in zip(self._executors, (self._node, self._waiting), strict=True):
             executor.add_node(node)
             Thread(target=executor.spin, daemon=True).start()
@@ -97,7 +95,7 @@ class RclpyMiddleware:
         """See `crazyswarm.Ros2.client`. Raises SpecError where nobody offers it."""
         interface = interface_class(kind)
         client = self._waiting.create_client(interface, service, callback_group=self._services)
-        if not client.wait_for_service(_OFFERED):
+        if not client.wait_for_service(10.0):  # [s] of the wall
             raise SpecError(f"nobody offers the service {service}; start crazyswarm2's server first")
         return lambda **given: client.call_async(interface.Request(**given))
 
