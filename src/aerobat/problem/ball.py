@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 
 from aerobat.declaration import Positive, Vector3, declared
-from aerobat.problem.condition import Condition, Quantity
+from aerobat.problem.condition import Condition, within
 
 GOLDEN_RATIO = (1.0 + sqrt(5.0)) / 2.0
 # normals of a regular dodecahedron's six pairs of faces: the corners of an icosahedron, (6, 3)
@@ -31,17 +31,9 @@ class Ball:
     @property
     def inscribed(self) -> tuple[Condition, ...]:
         """The linear conditions of being in the regular dodecahedron whose corners lie on the ball."""
-        reach = INRADIUS * self.radius
-        middles = (FACES @ self.centre).tolist()
-        return tuple(
-            Condition(Quantity.POSITION, face, middle - reach, middle + reach)
-            for face, middle in zip(FACES, middles, strict=True)
-        )
+        return within(FACES, FACES @ self.centre, INRADIUS * self.radius)
 
     @property
     def circumscribed(self) -> tuple[Condition, ...]:
         """The linear conditions of being in the cube along the world's axes that encloses it."""
-        return tuple(
-            Condition(Quantity.POSITION, axis, x - self.radius, x + self.radius)
-            for axis, x in zip(np.eye(3), self.centre.tolist(), strict=True)
-        )
+        return within(np.eye(3), self.centre, self.radius)

@@ -221,6 +221,14 @@ def fixed(quantity: Quantity, value: Array) -> tuple[Condition, ...]:
     return tuple(Condition(quantity, axis, x, x) for axis, x in given if x == x)
 
 
+def within(directions: Array, middles: Array, margin: float) -> tuple[Condition, ...]:
+    """Position along each of some directions (n, 3) within a margin [m], either way, of a middle [m] (n,)."""
+    return tuple(
+        Condition(Quantity.POSITION, direction, middle - margin, middle + margin)
+        for direction, middle in zip(directions, middles.tolist(), strict=True)
+    )
+
+
 def thrust_in_plane(direction: Array, axis: Array, minimum: float) -> tuple[Condition, ...]:
     """Specific thrust along `direction` in the plane normal to `axis`: none across, a minimum along.
 

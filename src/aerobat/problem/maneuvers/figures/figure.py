@@ -20,7 +20,7 @@ from aerobat.declaration import (
     unit,
     validated,
 )
-from aerobat.problem.condition import Attitude, Condition, ConeAngle, Quantity, firm_thrust
+from aerobat.problem.condition import Attitude, Condition, ConeAngle, Quantity, firm_thrust, within
 from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.maneuvers.maneuver import Maneuver
 from aerobat.problem.stage import Stage
@@ -49,11 +49,7 @@ class Place:
 
     def near(self, point: Sequence[float], margin: float) -> tuple[Condition, ...]:
         """Position [m] within a box about a point, by a margin [m] either way along each axis."""
-        centre = self.axes @ (self.position + self.direction(*point))
-        return tuple(
-            Condition(Quantity.POSITION, axis, x - margin, x + margin)
-            for axis, x in zip(self.axes, centre.tolist(), strict=True)
-        )
+        return within(self.axes, self.axes @ (self.position + self.direction(*point)), margin)
 
     def stage(self, name: str, up: Sequence[float], *conditions: Condition, at_gate: bool = False) -> Stage:
         """A stage with the thrust along a direction.
