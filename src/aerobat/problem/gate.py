@@ -83,14 +83,9 @@ class Gate:
             raise FieldError("up", "must be normal to normal, the direction of passage")
         if len(self.path) > MAX_ROWS:
             raise FieldError("path", f"of a gate must have {MAX_ROWS} rows at most, got {len(self.path)}")
-        kinds = (
-            ("polygon", self.polygon),
-            ("radius", self.radius),
-            ("width", self.width),
-            ("height", self.height),
-        )
-        given = [key for key, value in kinds if value is not None]
-        if given[0:1] in (["polygon"], ["radius"]):
+        kinds = ("polygon", "radius", "width", "height")
+        given = [key for key in kinds if getattr(self, key) is not None]
+        if self.polygon is not None or self.radius is not None:
             if len(given) > 1:
                 raise FieldError(
                     given[0], f"stands beside {given[1]}, an opening of another kind; drop either"

@@ -114,7 +114,7 @@ class Heading:
 
     def _angles(self, fractions: Array) -> Array:
         """The headings [rad] of a spline through the knots, which begins and ends at rest."""
-        rows = self.knots_deg[self.knots_deg[:, :1].ravel() > 0.0]
+        rows = self.knots_deg[self.knots_deg[:, 0] > 0.0]
         if not len(rows):
             return np.full(len(fractions), self.start)
         knots = np.append(0.0, rows[:, 0])

@@ -205,17 +205,16 @@ class Problem:
 
     def __str__(self) -> str:
         """One line for people."""
-        if not self.ends:
-            facts = f"{self.name}: {self.maneuver.in_words(self.gates)}"
-            return "; ".join(filter(None, (facts, " ".join(self.description.split()))))
-        start, goal = (
-            "({:g}, {:g}, {:g}) m".format(*state.position.tolist()) for state in (self.start, self.goal)
-        )
-        on_ground = self.environment.ground is not None and self.goal.position[2] == self.environment.ground
-        moves = self.goal.free_velocity or self.goal.velocity.any()
-        at_end = "pass" if moves else "land at" if on_ground else "stop at"
-        facts = f"{self.name}: from {start}: {self.maneuver.in_words(self.gates)}, {at_end} {goal}"
-        return "; ".join(filter(None, (facts, " ".join(self.description.split()))))
+        course = self.maneuver.in_words(self.gates)
+        if self.ends:
+            start, goal = (
+                "({:g}, {:g}, {:g}) m".format(*end.position.tolist()) for end in self.ends.values()
+            )
+            on_ground = self.goal.position[2] == self.environment.ground
+            moves = self.goal.free_velocity or self.goal.velocity.any()
+            at_end = "pass" if moves else "land at" if on_ground else "stop at"
+            course = f"from {start}: {course}, {at_end} {goal}"
+        return "; ".join(filter(None, (f"{self.name}: {course}", " ".join(self.description.split()))))
 
     def _check_point(self, name: str, value: Array, derivative: int) -> None:
         lower, upper = self.path_limits.of(derivative)
