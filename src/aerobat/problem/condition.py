@@ -211,12 +211,12 @@ class Attitude:
 
 
 def free() -> Array:
-    """Components of which none is given."""
+    """Three components, all of them free: NaN."""
     return np.full(3, np.nan)
 
 
 def fixed(quantity: Quantity, value: Array) -> tuple[Condition, ...]:
-    """The given components of a quantity, world, SI units, (3,); those that are NaN are free."""
+    """Conditions that fix a quantity's components, world, SI units, (3,), but those that are NaN."""
     given = zip(np.eye(3), value.tolist(), strict=True)
     return tuple(Condition(quantity, axis, x, x) for axis, x in given if x == x)
 

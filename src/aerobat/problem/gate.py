@@ -139,7 +139,7 @@ class Gate:
         return np.asarray(np.broadcast_to(self.position + moved, (*times.shape, 3)))
 
     def at(self, time: float) -> Gate:
-        """Return it where it is at a time [s], standing still."""
+        """Return the gate where it is at a time [s], standing still."""
         if self.motion is None:
             return self
         place = self.places(np.array(time))
@@ -207,7 +207,7 @@ class Gate:
 
     @validated
     def tilted(self, tilt: Angle) -> Gate:
-        """The same gate with another tilt [rad]."""
+        """Return the gate with another tilt [rad]."""
         heading, elevation, _ = self.angles
         normal, up = _directions(heading, elevation, tilt)
         return replace(self, normal=normal, up=up)

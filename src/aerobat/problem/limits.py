@@ -53,14 +53,14 @@ class Limits:
 
     @validated
     def without(self, derivative: Derivative) -> Limits:
-        """The same limits with those on one derivative taken away."""
+        """Return the limits without those on one derivative."""
         if derivative == 0:
             return replace(self, lower=np.full(3, -np.inf), upper=np.full(3, np.inf))
         bounds: dict[str, Any] = {DERIVATIVES[derivative]: np.inf}
         return replace(self, **bounds)
 
     def tightened(self, derivative: int, below: Array, above: Array) -> Limits:
-        """The same limits, one derivative's tighter: by `below` at its lower ends, `above` at its upper ones.
+        """Return the limits, one derivative's tighter: lower ends by `below`, upper ones by `above`.
 
         Raises SpecError when nothing is left between them.
         """

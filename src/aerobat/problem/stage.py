@@ -139,13 +139,13 @@ class Stage:
 
     @property
     def linear(self) -> Stage:
-        """The same with a polytope in its ball, if it has one, among its conditions."""
+        """The stage with a polytope in its ball, if it has one, among its conditions."""
         return (
             self if self.ball is None else replace(self, conditions=(*self.ball.inscribed, *self.conditions))
         )
 
     def explicit(self, gate: Gate | None = None, body_radius: float = 0.0) -> Stage:
-        """The same at its gate, with all that it asks but its ball among its conditions: its attitude too.
+        """Return the stage at its gate: among its conditions is all that it asks, but its ball.
 
         Args:
             gate: Its gate.
@@ -206,7 +206,7 @@ class StageSequence:
 
     @property
     def linear(self) -> StageSequence:
-        """The same, a polytope in each ball among the conditions, for who holds nothing but those."""
+        """The sequence with a polytope in each ball among the conditions, for planners that hold these."""
         return replace(self, stages=tuple(stage.linear for stage in self.stages))
 
     @property

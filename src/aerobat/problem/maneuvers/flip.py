@@ -87,7 +87,7 @@ class Flip(Maneuver):
         return StageSequence(tuple(stages), ordered=self.ordered)
 
     def in_words(self, gates: Sequence[Gate]) -> str:
-        """Return it with its count and its side, as seen along the gate's passage, or along +x."""
+        """Return the flip with its count and side, as seen along the gate's passage, or along +x."""
         gate = passed_gate(gates, self.gate, self.kind) if self.gate or len(gates) == 1 else None
         forward = np.array([1.0, 0.0, 0.0]) if gate is None else gate.normal
         swing = np.cross(self.turn_axis, UP)
@@ -97,7 +97,7 @@ class Flip(Maneuver):
         return f"{_times(self.count)}flip {side}{within}"
 
     def as_in_paper(self) -> Flip:
-        """Return it unsigned, unordered, with ε_l = 18 and ε_z = 25 m/s²."""
+        """Return a flip that is unsigned and unordered, with ε_l = 18 and ε_z = 25 m/s²."""
         return replace(
             self,
             min_lateral_thrust=PAPER_LATERAL,
@@ -109,7 +109,7 @@ class Flip(Maneuver):
 
     @validated
     def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Flip:
-        """Return it with a least specific thrust [m/s²] in its gate; itself where it has none."""
+        """Return a copy with a least specific thrust [m/s²] in its gate; itself where it has none."""
         if not gates and self.gate is None:
             return self
         angle_deg = self._angle_deg(passed_gate(gates, self.gate, self.kind))

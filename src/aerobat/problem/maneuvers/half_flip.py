@@ -49,7 +49,7 @@ class HalfFlip(Maneuver):
         return StageSequence(stages, (never_upside_down,))
 
     def as_in_paper(self) -> HalfFlip:
-        """Return it with ε_y = 18 m/s²."""
+        """Return a half-flip with ε_y = 18 m/s²."""
         return replace(self, min_lateral_thrust=PAPER_LATERAL, passage=PAPER_PASSAGE)
 
     @validated
@@ -59,7 +59,7 @@ class HalfFlip(Maneuver):
 
     @validated
     def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> HalfFlip:
-        """Return it with a least specific thrust [m/s²] in its gate; itself where that is upright."""
+        """Return a copy with a least specific thrust [m/s²] in its gate; itself where that is upright."""
         up = passed_gate(gates, self.gate, self.kind).up
         across = float(np.hypot(up[0], up[1]))
         return self if across < _UPRIGHT else replace(self, min_lateral_thrust=thrust * across)

@@ -25,5 +25,5 @@ class Line(Maneuver):
         return ", ".join(f"through {gate_in_words(gate.name)}" for gate in gates) or "along a line"
 
     def as_in_paper(self) -> Line:
-        """Return it with the gate passed as there."""
+        """Return a line whose gates are passed as there."""
         return Line(PAPER_PASSAGE)

@@ -46,7 +46,7 @@ class Maneuver(ABC):
 
     @validated
     def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Maneuver:
-        """Return it with a least specific thrust [m/s²] in its gate or stages; itself if it asks none."""
+        """Return a copy with a least specific thrust [m/s²] in its gate or stages; itself if it asks none."""
         return self
 
     @property

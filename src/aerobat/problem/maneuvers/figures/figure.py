@@ -95,7 +95,7 @@ class Figure(Maneuver):
 
     @validated
     def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Figure:
-        """Return it with a least specific thrust [m/s²] in its stages."""
+        """Return a copy with a least specific thrust [m/s²] in its stages."""
         return replace(self, min_thrust=thrust)
 
     def in_words(self, gates: Sequence[Gate]) -> str:
