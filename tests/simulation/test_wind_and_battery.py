@@ -67,8 +67,8 @@ def test_gusts_have_the_dryden_spectrum_of_mil_f_8785c() -> None:
 
 def transition(made: GustFilter) -> tuple[np.ndarray, np.ndarray]:
     """Φ and the covariance of the inputs, of a component across."""
-    decay, coupling = made.decay[0], made.coupling[0]
-    a, b, c = (x[0] for x in made.across)
+    decay, coupling = made.decay, made.coupling
+    a, b, c = made.across
     root = np.array([[a, 0.0], [b, c]])
     return np.array([[decay, 0.0], [coupling, decay]]), root @ root.T
 
@@ -76,12 +76,12 @@ def transition(made: GustFilter) -> tuple[np.ndarray, np.ndarray]:
 @given(st.floats(1e-5, 5.0))
 def test_two_steps_are_one_of_twice_the_length(step: float) -> None:
     """The discretisation is exact: it does not depend on the tick, and keeps the stationary covariance."""
-    one, two = gust_filter(step, 1), gust_filter(2.0 * step, 1)
+    one, two = gust_filter(step), gust_filter(2.0 * step)
     phi, covariance = transition(one)
     np.testing.assert_allclose(transition(two)[0], phi @ phi, atol=1e-14)
     np.testing.assert_allclose(transition(two)[1], phi @ covariance @ phi.T + covariance, atol=1e-14)
     np.testing.assert_allclose(phi @ STATIONARY @ phi.T + covariance, STATIONARY, atol=1e-14)
-    assert one.along[0] ** 2 + one.decay[0] ** 2 == pytest.approx(1.0, abs=1e-14)
+    assert one.along**2 + one.decay**2 == pytest.approx(1.0, abs=1e-14)
 
 
 def test_the_mean_wind_is_that_of_the_place_and_the_flight_s_own() -> None:

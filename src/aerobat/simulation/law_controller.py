@@ -10,8 +10,6 @@ from math import pi
 from traceback import extract_tb
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from aerobat.control import ControlLaw, Controller, Seen
 from aerobat.declaration import placed, shown
 from aerobat.engines.floats import FloatOps
@@ -148,9 +146,8 @@ def inner_loop(law: ControlLaw | None, model: ControllerModel) -> tuple[LoopPart
 
     Args:
         law: What is flown by, if it is none of settings.
-        model: The nominal vehicles, leaves (vehicles,).
+        model: The nominal vehicles.
     """
     if law is None or not law.GIVES_RATES:
         return ()
-    filters = (np.full(len(model.airframe.mass_properties.mass), time) for time in (GYRO, DERIVATIVE))
-    return (LoopPart(RateLoop(), RateLoopModel(model.airframe, model.mixer, *filters)),)
+    return (LoopPart(RateLoop(), RateLoopModel(model.airframe, model.mixer, GYRO, DERIVATIVE)),)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.engines.floats import ArrayOps
-from aerobat.engines.pytree import Tree, components, tree_leaves, tree_map
+from aerobat.engines.pytree import components, tree_leaves, tree_map
 from aerobat.environment import Environment
 from aerobat.kernels import running_metrics
 from aerobat.kernels.gates import approach, pointing, progress
@@ -97,19 +97,15 @@ def pose_row(signals: Signals) -> PoseRow:
 
 def with_metrics(setup: FlightSetup, criteria: Criteria = Criteria()) -> FlightSetup:  # noqa: B008 - frozen
     """The same flight with its metrics added up, and judged by criteria."""
-
-    def for_all(tree: Tree) -> Tree:
-        return tree_map(lambda leaf: np.full(len(setup.fleet), leaf), tree)
-
     ellipsoid = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
     parameters = MetricsParameters(
-        divergence_radius_sq=for_all(DIVERGENCE_RADIUS**2),
-        path_radius_sq=for_all(criteria.path_radius**2),
-        ground=for_all(_ground(setup.environment)),
+        divergence_radius_sq=DIVERGENCE_RADIUS**2,
+        path_radius_sq=criteria.path_radius**2,
+        ground=_ground(setup.environment),
         ellipsoid=ellipsoid,
-        gates=for_all(tuple(plane for plane, _ in gate_places(criteria.gates, ellipsoid))),
-        waypoints=for_all(tuple(map(waypoint_target, (*criteria.waypoints, *criteria.places)))),
-        attitudes=for_all(tuple(map(attitude_direction, criteria.attitudes))),
+        gates=tuple(plane for plane, _ in gate_places(criteria.gates, ellipsoid)),
+        waypoints=tuple(map(waypoint_target, (*criteria.waypoints, *criteria.places))),
+        attitudes=tuple(map(attitude_direction, criteria.attitudes)),
     )
     metrics = LoopPart(MetricsMonitor(), parameters, lambda begin, end: setup.times[begin:end])
     return replace(setup, parts=(*setup.parts, metrics))

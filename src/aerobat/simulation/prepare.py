@@ -85,7 +85,7 @@ def setup_of(
     fleet = Fleet.of(flying)
     nominal_fleet = fleet if nominal is flying else Fleet.of(nominal)
     controller = config.controller_of(nominal)
-    model = controller_model(controller, nominal, nominal_fleet, environment, len(fleet))
+    model = controller_model(controller, nominal, nominal_fleet, environment)
     return FlightSetup(
         start=_start(config.start, reference, len(fleet)),
         parts=(

@@ -35,7 +35,7 @@ class LoopPart:
     """One component of the loop: what its parameters are, where its inputs come from, when it steps."""
 
     component: Component
-    parameters: Tree = ()  # leaves (vehicles,)
+    parameters: Tree = ()  # leaves (vehicles,), or one number for all
     source: Source | None = None  # None for a component without inputs
     period: int = 1  # ticks from one step to the next
 
@@ -54,8 +54,10 @@ class LoopSetup:
 
     @property
     def parameters(self) -> LoopParameters:
-        """Of the loop."""
-        return LoopParameters(self.start, tuple(part.parameters for part in self.parts))
+        """Of the loop, leaves (vehicles,)."""
+        vehicles = len(self.start.position[0])
+        own = tuple(part.parameters for part in self.parts)
+        return LoopParameters(self.start, tree_map(lambda leaf: np.broadcast_to(leaf, vehicles), own))
 
     def compile_for(self, engine: Engine, first_tick: LoopInput, log: Log) -> CompiledLoop:
         """The loop, ready for `init`, `step` and `scan`; its rows are what `log` takes of the signals."""
@@ -81,24 +83,22 @@ def plant_part(
 
 
 def controller_model(
-    controller: Controller, nominal: Sequence[Vehicle], known: Fleet, environment: Environment, flights: int
+    controller: Controller, nominal: Sequence[Vehicle], known: Fleet, environment: Environment
 ) -> ControllerModel:
-    """The model by which a controller flies, leaves (flights,).
+    """The model by which a controller flies, leaves (vehicles,) of those that it knows.
 
     Args:
         controller: its settings.
         nominal: the vehicles that it knows, one for each flight or one for all.
         known: the fleet of these.
         environment: where.
-        flights: how many there are.
 
     Raises SpecError for a vehicle that cannot hover.
     """
     model = controller_parameters(controller, known, environment)
     for grounded in np.flatnonzero(~np.isfinite(model.gains.stiffness)).tolist():
         nominal[grounded].require_hover(environment.gravity)
-    spread: ControllerModel = tree_map(lambda leaf: np.broadcast_to(leaf, flights), model)
-    return spread
+    return model
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,14 +68,6 @@ class DispersedFlights:
         values = self.draws.columns[name]
         return values if values.ndim == 1 else components(values)
 
-    def all(self, value: float) -> Array:
-        """A number for every vehicle."""
-        return np.full(len(self.draws), value)
-
-    def vector(self, value: Array) -> Tree:
-        """A vector (3,) for every vehicle."""
-        return tuple(map(self.all, value))
-
     @property
     def effectiveness(self) -> Array:
         """Of the rotors [-], (vehicles, n)."""
@@ -119,14 +111,14 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
             np.where(is_calm, np.cos(heading), mean[:, 0] / divisor),
             np.where(is_calm, np.sin(heading), mean[:, 1] / divisor),
         ),
-        flights.all(gusts.intensity),
-        gust_filter(period / flights.rate / time_constant, len(flights.draws)),
+        gusts.intensity,
+        gust_filter(period / flights.rate / time_constant),
         GustState(along, (first, second), (third, fourth)),
     )
     return LoopPart(Wind(), parameters, wind_source(flights.draws, period), period)
 
 
-def gust_filter(step: float, vehicles: int) -> GustFilter:
+def gust_filter(step: float) -> GustFilter:
     """The exact discretisation of the gusts' filters over `step` of their time constants [-].
 
     The two filters of a component across have the stationary covariance P = (1/2, 1/4; 1/4, 1/4) and the
@@ -139,9 +131,8 @@ def gust_filter(step: float, vehicles: int) -> GustFilter:
     both = 0.25 * lost - 0.5 * kept * step
     second = 0.25 * lost - 0.5 * kept * (step + step**2)
     cross = both / first
-    numbers = (decay, step * decay, np.sqrt(lost), first, cross, np.sqrt(max(second - cross**2, 0.0)))
-    a, b, c, d, e, f = (np.full(vehicles, x) for x in numbers)
-    return GustFilter(a, b, c, (d, e, f))
+    across = first, cross, np.sqrt(max(second - cross**2, 0.0))
+    return GustFilter(decay, step * decay, np.sqrt(lost), across)
 
 
 def battery_part(battery: Battery, flights: DispersedFlights) -> LoopPart:
@@ -151,7 +142,7 @@ def battery_part(battery: Battery, flights: DispersedFlights) -> LoopPart:
     radii = np.array([rotor.radius for rotor in flights.nominal.rotors])
     hover_power = np.sum(hover**1.5 / radii)
     usage = flights.effectiveness**1.5 / radii / hover_power / battery.endurance
-    parameters = BatteryParameters(flights.each("charge"), components(usage), flights.all(battery.sag))
+    parameters = BatteryParameters(flights.each("charge"), components(usage), battery.sag)
     return LoopPart(BatterySag(), parameters, period=flights.slow_period())
 
 
@@ -161,21 +152,17 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
     walk = np.sqrt(slow / flights.rate)
     biases = BiasParameters(
         ImuSample(flights.each("gyro_bias"), flights.each("accelerometer_bias")),
-        flights.all(imu.gyro_bias_walk * walk),
-        flights.all(imu.accelerometer_bias_walk * walk),
+        imu.gyro_bias_walk * walk,
+        imu.accelerometer_bias_walk * walk,
     )
     period = whole_ticks(flights.rate, imu.rate, "imu.rate")
     noise = np.sqrt(imu.rate)
-    numbers = (
-        imu.gyro_noise * noise,
-        imu.accelerometer_noise * noise,
-        imu.gyro_range,
-        imu.accelerometer_range,
-    )
     felt = FeltParameters(
         airframe_parameters(flights.fleet, flights.effectiveness),
         environment_parameters(flights.environment, len(flights.draws)),
-        ImuParameters(*map(flights.all, numbers)),
+        ImuParameters(
+            imu.gyro_noise * noise, imu.accelerometer_noise * noise, imu.gyro_range, imu.accelerometer_range
+        ),
     )
     return (
         LoopPart(ImuBias(), biases, imu_source(flights.draws, "imu_bias", slow, block=32), slow),
@@ -196,12 +183,12 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
     if capture.outage is not None:
         begin, end = capture.outage.start, capture.outage.start + capture.outage.duration
     parameters = MocapParameters(
-        position_noise=flights.all(capture.position_noise),
-        attitude_noise=flights.all(capture.attitude_noise),
-        dropout=flights.all(capture.dropout),
-        outlier=flights.all(capture.outlier),
-        outlier_size=flights.all(capture.outlier_size),
-        outage=(flights.all(begin), flights.all(end)),
+        position_noise=capture.position_noise,
+        attitude_noise=capture.attitude_noise,
+        dropout=capture.dropout,
+        outlier=capture.outlier,
+        outlier_size=capture.outlier_size,
+        outage=(begin, end),
         seam=_seam(capture.hand_off, flights),
         first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
     )
@@ -214,11 +201,11 @@ def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
     point, normal = hand_off_plane(hand_off or HandOff(), flights.trajectory, flights.gates)
     rotation = so3.exp(flights.draws.columns["hand_off_rotation"])
     return Seam(
-        flights.vector(point),
-        flights.vector(normal),
+        components(point),
+        components(normal),
         Pose(flights.each("hand_off_translation"), components(rotation)),
         flights.each("warp"),
-        flights.all(1.0 / (hand_off or HandOff()).warp_depth),
+        1.0 / (hand_off or HandOff()).warp_depth,
     )
 
 

@@ -114,7 +114,7 @@ def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequ
     parameters = ekf_parameters(settings, flights.environment.gravity, len(flights.draws))
     return LoopPart(
         EkfObserver(sensor.period, sensor.latency),
-        ObserverParameters(parameters, flights.all(1.0 / flights.rate)),
+        ObserverParameters(parameters, 1.0 / flights.rate),
         observer_source(sensor, flights.rate),
     )
 
@@ -128,7 +128,7 @@ def _controller(
 ) -> tuple[LoopPart, ...]:
     """The controller at its own period, its reference that of its commands' effect, and its delay."""
     nominal, environment, rate = flights.nominal, flights.environment, flights.rate
-    model = controller_model(settings, (nominal,), known, environment, len(flights.draws))
+    model = controller_model(settings, (nominal,), known, environment)
     period = whole_ticks(rate, config.control_rate, "control_rate")
     delay = round(conditions.computation_delay * rate)
     if delay > period:
@@ -140,14 +140,14 @@ def _controller(
     slowest = max(rotor.lag for rotor in nominal.rotors)
     if settings.disturbance_filter > 0.0 and conditions.imu is not None and slowest <= _SLOWEST_ANSWERED:
         # a filter faster than the rotors takes their lag's misfit for a disturbance, and unsettles the loop
-        times = flights.all(max(settings.disturbance_filter, slowest)), flights.all(delay / rate)
+        times = max(settings.disturbance_filter, slowest), delay / rate
         observer = (LoopPart(DisturbanceObserver(), DisturbanceParameters(model, *times), period=period),)
     source = None
     if period > 1 or delay > 0:
         source = ReferenceSource(
             flights.trajectory, nominal, environment, rate, every=period, delay=delay / rate
         ).chunk
-    parameters = ControllerParameters(model, flights.all(delay / rate) if delay else ())
+    parameters = ControllerParameters(model, delay / rate if delay else ())
     controller = LoopPart(flown_by(config.law, settings), parameters, source, period)
     takes_effect = partial(due_ticks, period, delay=delay)
     waiting = (LoopPart(ComputationDelay(), (), takes_effect),) if delay else ()
