@@ -74,8 +74,8 @@ def read_rows(path: PathName, rate: Positive = 100.0) -> PathRows:
 
 def _bare_rows(text: str, rate: float) -> PathRows:
     require_numbers(text)
-    asked = f"a path's have {CSV_COLUMNS}, or {CSV_COLUMNS + 1} with a time"
-    rows = number_table(text, 1, (CSV_COLUMNS, CSV_COLUMNS + 1), asked)
+    expected = f"a path's have {CSV_COLUMNS}, or {CSV_COLUMNS + 1} with a time"
+    rows = number_table(text, 1, (CSV_COLUMNS, CSV_COLUMNS + 1), expected)
     times = rows[:, CSV_COLUMNS] if rows.shape[1] > CSV_COLUMNS else np.arange(len(rows)) / rate
     steps = np.diff(times)
     if times[0] != 0 or not (steps > 0).all():

@@ -110,10 +110,10 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
     if not ((norms > 0.5) & (norms < 2.0)).all():
         raise SpecError("qw, qx, qy, qz must be unit quaternions in every row")
     q = so3.normalize(attitude)
-    asked = reference(plan, nominal, times=times)
-    _require_near(position, asked.setpoint.flat.position)
-    _require_aligned(q, asked.setpoint.q_world_body)
-    thrusts, commands = _of_rotors(columns, asked.rotor_thrusts[0], nominal)
+    planned = reference(plan, nominal, times=times)
+    _require_near(position, planned.setpoint.flat.position)
+    _require_aligned(q, planned.setpoint.q_world_body)
+    thrusts, commands = _of_rotors(columns, planned.rotor_thrusts[0], nominal)
     span = nominal.max_thrusts - nominal.min_thrusts
     margin = np.minimum(commands - nominal.min_thrusts, nominal.max_thrusts - commands)
     series = {
@@ -127,7 +127,7 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
         "min_thrusts": nominal.min_thrusts,
         "max_thrusts": nominal.max_thrusts,
         "ends": times[-1],
-        **setpoint_series(asked.setpoint),
+        **setpoint_series(planned.setpoint),
     }
     if all(name in columns for name in ESTIMATED):
         seen = _group(columns, ESTIMATED)
@@ -158,20 +158,20 @@ def _require_newtons(names: tuple[str, ...], thrusts: Array, nominal: Vehicle) -
             )
 
 
-def _require_near(position: Array, asked: Array) -> None:
+def _require_near(position: Array, planned: Array) -> None:
     """Refuse positions of another path, in other units or along other axes."""
-    off = float(np.median(np.linalg.norm(position - asked, axis=1)))
-    share, least = ELSEWHERE
-    if off > max(share * float(np.linalg.norm(np.ptp(asked, axis=0))), least):
+    off = float(np.median(np.linalg.norm(position - planned, axis=1)))
+    fraction, least = ELSEWHERE
+    if off > max(fraction * float(np.linalg.norm(np.ptp(planned, axis=0))), least):
         raise SpecError(
             f"x, y, z are {off:.3g} m from the plan's path half of the time; give metres, x east, y north, "
             "z up, of a flight of this plan"
         )
 
 
-def _require_aligned(q_world_body: Array, asked: Array) -> None:
+def _require_aligned(q_world_body: Array, planned: Array) -> None:
     """Refuse attitudes of other axes, or of another order of the quaternion."""
-    off = float(np.median(so3.angle_between(asked, q_world_body)))
+    off = float(np.median(so3.angle_between(planned, q_world_body)))
     if off > np.pi / 2.0:
         raise SpecError(
             f"qw, qx, qy, qz are {np.rad2deg(off):.3g}° from the plan's attitude half of the time; give qw "
@@ -217,10 +217,10 @@ def _of_rotors(columns: Mapping[str, Array], first: Array, nominal: Vehicle) -> 
 
 def _followed(times: Array, first: Array, commands: Array, lags: Array) -> Array:
     """Thrusts [N] of rotors that follow commands from row to row from the first ones on, by their lags."""
-    left = np.exp(-np.diff(times)[:, None] / np.maximum(lags, 1e-9))
+    decays = np.exp(-np.diff(times)[:, None] / np.maximum(lags, 1e-9))
     thrusts = [first]
-    for command, remains in zip(commands[:-1], left, strict=True):
-        thrusts.append(np.array(first_order_response(tuple(thrusts[-1]), command, remains)))
+    for command, decay in zip(commands[:-1], decays, strict=True):
+        thrusts.append(np.array(first_order_response(tuple(thrusts[-1]), command, decay)))
     return np.array(thrusts)
 
 

@@ -221,7 +221,7 @@ def _unused(columns: Mapping[str, Array]) -> Iterator[str]:
         yield f"column{'s' * (len(others) > 1)} {', '.join(others[:SEVERAL])}{more}"
 
 
-def named_columns(text: str, needed: Sequence[str], asked: str) -> dict[str, Array]:
+def named_columns(text: str, needed: Sequence[str], remedy: str) -> dict[str, Array]:
     """The columns of a table with a header by their names, small letters, synonyms by the usual name.
 
     Raises SpecError, naming the line or the column, for what is no such table.
@@ -229,7 +229,7 @@ def named_columns(text: str, needed: Sequence[str], asked: str) -> dict[str, Arr
     Args:
         text: The file's.
         needed: The names of columns that must be there.
-        asked: What messages say of that, without a full stop.
+        remedy: What messages say of that, without a full stop.
     """
     words = text.partition("\n")[0].strip().lstrip("#").split(",")
     header = [SYNONYMS.get(name, name) for name in (word.strip().strip('"').lower() for word in words)]
@@ -238,7 +238,7 @@ def named_columns(text: str, needed: Sequence[str], asked: str) -> dict[str, Arr
             raise SpecError(f"line 1: there are two columns {name}; rename one")
     for name in needed:
         if name not in header:
-            raise SpecError(f"line 1: there is no column {name}; {asked}")
+            raise SpecError(f"line 1: there is no column {name}; {remedy}")
     table = number_table(text, 2, (len(header),), f"line 1 names {len(header)} columns")
     return dict(zip(header, table.T, strict=True))
 
@@ -253,7 +253,7 @@ def _first_attitude(columns: Mapping[str, Array]) -> Array | None:
     return np.asarray(attitude / norm)
 
 
-def number_table(text: str, first: int, counts: Sequence[int], asked: str) -> Array:
+def number_table(text: str, first: int, counts: Sequence[int], expected: str) -> Array:
     """The numbers of a file's lines, (rows, columns), two rows or more, in each as many as in the first.
 
     Raises SpecError, naming the line, for what is no such table.
@@ -262,7 +262,7 @@ def number_table(text: str, first: int, counts: Sequence[int], asked: str) -> Ar
         text: The file's.
         first: The number of the first line that counts, from 1.
         counts: The numbers of columns that may be.
-        asked: What messages say of that, without a full stop.
+        expected: What messages say of that, without a full stop.
     """
     if text.count("\n") > MAX_ROWS:
         raise SpecError(f"it has more than {MAX_ROWS} lines; give the part that is a path's")
@@ -276,7 +276,7 @@ def number_table(text: str, first: int, counts: Sequence[int], asked: str) -> Ar
     for number, line in enumerate(lines, first):
         found = line.count(",") + 1
         if found not in counts:
-            raise SpecError(f"line {number} has {found} numbers, {asked}")
+            raise SpecError(f"line {number} has {found} numbers, {expected}")
         if found != width:
             raise SpecError(f"line {number} has {found} numbers, line {first} has {width}")
         values.extend(_numbers(line, number))

@@ -55,7 +55,7 @@ class Sticks:
         """
         self._scale = 500.0 / max_rate  # [µs/(rad/s)]
         self._protocol = protocol
-        self._left = [0.0] * 4
+        self._carried = [0.0] * 4
 
     def packet(self, omega: Vector, throttle: float) -> bytes:
         """Return the packet, armed, of body rates [rad/s] and a thrust, 0 to 1 of what all rotors give."""
@@ -73,10 +73,10 @@ class Sticks:
         return self._framed([*map(self._protocol.count, (_CENTRE, _CENTRE, _LOWEST, _CENTRE))], armed)
 
     def _rounded(self, channel: int, pulse: float) -> int:
-        step, asked = self._protocol.step, pulse + self._left[channel]
-        sent = self._protocol.count(min(max(asked, _LOWEST), _HIGHEST))
-        left = asked - (self._protocol.offset + step * sent)
-        self._left[channel] = min(max(left, -0.5 * step), 0.5 * step)
+        step, exact = self._protocol.step, pulse + self._carried[channel]
+        sent = self._protocol.count(min(max(exact, _LOWEST), _HIGHEST))
+        missing = exact - (self._protocol.offset + step * sent)
+        self._carried[channel] = min(max(missing, -0.5 * step), 0.5 * step)
         return sent
 
     def _framed(self, sticks: Sequence[int], armed: bool) -> bytes:

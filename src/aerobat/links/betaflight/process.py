@@ -37,11 +37,11 @@ class _Folder(tempfile.TemporaryDirectory[str]):
     """A temporary folder, locked while this process lives; folders that killed processes left are removed."""
 
     def __init__(self) -> None:
-        for left in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+        for abandoned in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
             with suppress(OSError):  # it is another's, or gone
-                if time.time() - left.stat().st_mtime > 60.0:  # a younger one may not be locked yet
-                    os.close(_locked(left))
-                    shutil.rmtree(left)
+                if time.time() - abandoned.stat().st_mtime > 60.0:  # a younger one may not be locked yet
+                    os.close(_locked(abandoned))
+                    shutil.rmtree(abandoned)
         super().__init__(prefix=_PREFIX)
         self._lock = _locked(self.name)
 

@@ -79,8 +79,8 @@ class Crazyflie:
     def _go(self, tick: Tick) -> None:
         """Order the route that begins."""
         assert tick.route is not None, "it is on a route"
-        end, left = tick.route.end, tick.route.began + tick.route.path.duration - tick.now
-        duration = self._duration(max(left, _SHORTEST))
+        end, remaining = tick.route.end, tick.route.began + tick.route.path.duration - tick.now
+        duration = self._duration(max(remaining, _SHORTEST))
         if tick.doing is Doing.CLIMBING:
             self._order("takeoff", height=float(end[2]), duration=duration)
         elif tick.doing is Doing.LANDING:

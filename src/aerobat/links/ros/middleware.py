@@ -139,9 +139,9 @@ class Calls:
         end = time.monotonic() + patience
         for _ in range(self._waiting.qsize()):
             self._waiting.get()()
-        while (left := (instant - clock()) / NANOSECONDS) > 0.0 and time.monotonic() < end:
+        while (remaining := (instant - clock()) / NANOSECONDS) > 0.0 and time.monotonic() < end:
             try:
-                call = self._waiting.get(timeout=min(max(left, _MIN_WAIT), _MAX_WAIT))
+                call = self._waiting.get(timeout=min(max(remaining, _MIN_WAIT), _MAX_WAIT))
             except Empty:
                 continue
             call()

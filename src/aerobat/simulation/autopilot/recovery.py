@@ -120,9 +120,9 @@ class Recoveries:
         if len(self.no_return) <= _FEW_SPANS:
             return " and ".join(f"{span.start:.2f} to {span.end:.2f} s" for span in self.no_return)
         first, last = self.no_return[0].start, self.no_return[-1].end
-        share = 100.0 * float(np.mean(~self.possible))
+        lost = 100.0 * float(np.mean(~self.possible))
         return (
-            f"{len(self.no_return)} spans between {first:.2f} and {last:.2f} s, {share:.0f} % of the instants"
+            f"{len(self.no_return)} spans between {first:.2f} and {last:.2f} s, {lost:.0f} % of the instants"
         )
 
 
@@ -153,18 +153,18 @@ def recoveries(
     path = as_trajectory(plan)
     rate = min(INSTANTS_RATE, (MOST_INSTANTS - 1) / path.duration)
     instants = path.sample(rate) if times is None else frozen(times, "times", (None,))
-    asked = reference(path, vehicle, instants, environment=environment)
-    if asked.undetermined:
+    required = reference(path, vehicle, instants, environment=environment)
+    if required.undetermined:
         raise UndeterminedAttitude(
             "the path's attitude is undetermined where its thrust vanishes; plan another"
         )
-    flock = _Flock(asked.setpoint, asked.rotor_thrusts, vehicle, environment)
-    flock.keep(asked.setpoint, reaction)
+    flock = _Flock(required.setpoint, required.rotor_thrusts, vehicle, environment)
+    flock.keep(required.setpoint, reaction)
     ground = environment.ground if ground is None else ground
     flock.brake(-inf if ground is None else ground + MIN_FLOOR)
     return Recoveries(
         times=instants,
-        heights=frozen(asked.setpoint.flat.position[:, 2], "heights"),
+        heights=frozen(required.setpoint.flat.position[:, 2], "heights"),
         lowest=flock.lowest,
         durations=flock.durations,
         reaction=reaction,
