@@ -33,7 +33,8 @@ def mujoco_scene(plan: Plan, rate: float) -> Content:
     assert plan.vehicle is not None, "exports are of plans with a vehicle"
     problem, vehicle = plan.problem, plan.vehicle
     airframe = first_numbers(airframe_parameters(Fleet.of([vehicle])))
-    scene = PlantScene.of(problem.surroundings, problem.gates, airframe, vehicle.bounding_ellipsoid)
+    place, body = problem.surroundings, vehicle.bounding_ellipsoid
+    scene = PlantScene(airframe, place.gravity, place.ground, body, problem.gates, place.obstacles)
     root = fromstring(mujoco_model(scene))
     found = reference(plan, rate=rate)
     flat, lagging = found.setpoint.flat, [rotor.lag > 0.0 for rotor in vehicle.rotors]

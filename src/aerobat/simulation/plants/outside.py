@@ -250,4 +250,5 @@ def _with_motion(inputs: LoopInput, motion: VehicleState) -> LoopInput:
 def _scene(setup: FlightSetup, gates: tuple[Gate, ...]) -> PlantScene:
     airframe = first_numbers(setup.parts[-1].parameters.airframe)
     body = Ellipsoid(setup.fleet.semi_axes[0], setup.fleet.body_centres[0])
-    return PlantScene.of(setup.environment, gates, airframe, body)
+    place = setup.environment
+    return PlantScene(airframe, place.gravity, place.ground, body, gates, place.obstacles)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Protocol
 
 from aerobat.declaration import Registry
-from aerobat.environment import Environment
 from aerobat.environment.obstacles import Obstacle
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.ops import PerRotor, Vector
@@ -26,20 +25,6 @@ class PlantScene:
     body: Ellipsoid  # that encloses the vehicle
     gates: tuple[Gate, ...]
     obstacles: tuple[Obstacle, ...] = ()  # the walls of gates among them
-
-    @classmethod
-    def of(
-        cls, environment: Environment, gates: tuple[Gate, ...], airframe: Airframe, body: Ellipsoid
-    ) -> PlantScene:
-        """Return the scene of a vehicle in an environment.
-
-        Args:
-            environment: Its gravity, ground and obstacles are taken.
-            gates: As for the field, and the others too.
-            airframe: What really flies.
-            body: That encloses it.
-        """
-        return cls(airframe, environment.gravity, environment.ground, body, gates, environment.obstacles)
 
 
 class Actuation(NamedTuple):
