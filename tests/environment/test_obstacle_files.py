@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from pathlib import Path
 from typing import Any
@@ -38,7 +39,7 @@ def refusal(folder: Path, obstacle: str) -> str:
 def box_mesh(path: Path, **moved: Any) -> None:
     made = trimesh.creation.box(SIZE)
     made.apply_translation(moved.get("to", (0.0, 0.0, 0.0)))
-    made.export(path)
+    made.export(path, file_type="stl_ascii" if moved.get("as_text") else None)
 
 
 def test_the_path_of_what_moves_is_read_from_a_csv_file(tmp_path: Path) -> None:
@@ -52,6 +53,24 @@ def test_the_path_of_what_moves_is_read_from_a_csv_file(tmp_path: Path) -> None:
     assert "has a row that is not four numbers" in refusal(tmp_path, kind + '"path.csv"')
     assert "there is no file" in refusal(tmp_path, kind + '"other.csv"')
     assert "the time rising" in refusal(tmp_path, kind + "[[1, 0, 0, 0], [1, 1, 0, 0]]")
+    assert "must be a CSV file's name or rows of t, x, y, z, got 3" in refusal(tmp_path, kind + "3")
+
+
+@pytest.mark.parametrize("start", ["", "\ufeff", "# by a spreadsheet\n"])
+def test_the_header_of_a_path_says_which_column_is_which(start: str, tmp_path: Path) -> None:
+    kind = 'kind = "sphere"\nposition = [9, 0, 0]\nradius = 0.5\npath = "path.csv"'
+    rows = {"t,x,y,z": "0,1,2,3\n2,1,4,3", '"t","z","y","x","yaw"': "0,3,2,1,0\n2,3,4,1,0"}
+    paths = []
+    for header, numbers in rows.items():
+        (tmp_path / "path.csv").write_text(f"{start}{header}\n{numbers}\n", encoding="utf-8")
+        paths += [obstacle.path.tolist() for obstacle in problem_with(tmp_path, kind).environment.obstacles]
+    assert paths == [[[0.0, 1.0, 2.0, 3.0], [2.0, 1.0, 4.0, 3.0]]] * 2
+    (tmp_path / "path.csv").write_text(f"{start}time,x,y,z\n0,1,2,3\n2,1,4,3\n", encoding="utf-8")
+    assert "path.csv must have the columns t, x, y, z, got 'time,x,y,z'" in refusal(tmp_path, kind)
+    (tmp_path / "path.csv").write_text(f"{start}t,x,y,z\n", encoding="utf-8")
+    assert "two rows or more" in refusal(tmp_path, kind)
+    (tmp_path / "path.csv").write_text(f"{start}0,1,2,3,4\n2,1,4,3,5\n", encoding="utf-8")
+    assert "path.csv has a row that is not four numbers" in refusal(tmp_path, kind)
 
 
 def directions() -> np.ndarray:
@@ -102,6 +121,17 @@ def test_a_box_as_a_mesh_reaches_as_far_as_the_box(suffix: str, tmp_path: Path) 
     box = ab.Box((2.0, 2.0, 2.0), size / 2.0, *np.deg2rad([30.0, 20.0, 10.0]))
     (found,), (piece,) = read.environment.obstacles[0].pieces, box.pieces
     assert found.support(directions()) == pytest.approx(piece.support(directions()), abs=1e-6)
+
+
+def test_a_reader_of_meshes_writes_nothing_to_standard_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(logging.root, "handlers", [])  # as in a process without pytest's own
+    box_mesh(tmp_path / "box.stl", as_text=True)
+    text = (tmp_path / "box.stl").read_text()
+    (tmp_path / "box.stl").write_text(text.replace("facet normal", "facet normal x", 1))
+    ab.mesh_parts(tmp_path / "box.stl")
+    assert capsys.readouterr().err == ""
 
 
 def test_what_is_up_in_a_gltf_file_is_up_in_the_world(tmp_path: Path) -> None:

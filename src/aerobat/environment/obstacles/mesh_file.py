@@ -6,6 +6,7 @@ parts together cover it but for its threshold, relative to the part's size.
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import numpy as np
@@ -83,4 +84,6 @@ def required_trimesh() -> Any:
         import trimesh
     except ImportError:
         raise FieldError("", ': this needs trimesh; pip install "aerobat[meshes]"') from None
+    if not (log := logging.getLogger("trimesh")).hasHandlers():
+        log.addHandler(logging.NullHandler())  # or its tracebacks go to standard error
     return trimesh
