@@ -212,7 +212,7 @@ STAR = [(np.cos(a), np.sin(a)) for a in np.arange(5) * 4 * np.pi / 5]
         ({"diameter": -0.8}, "diameter must be a positive number, got -0.8"),
         ({"polygon": TRIANGLE[:2]}, "polygon must have from 3 to 24 corners, got 2"),
         ({"polygon": 3}, "polygon must be a list of corners, two numbers each, got 3"),
-        ({"polygon": [1.0, 2.0, 3.0]}, "polygon must be 3 x 2 numbers"),
+        ({"polygon": [1.0, 2.0, 3.0]}, r"polygon\[0\] must be 2 numbers, got 1.0"),
         ({"polygon": [*TRIANGLE, (0.0, 0.3)]}, "polygon must be convex, at its corner"),
         ({"polygon": [*TRIANGLE, (0.0, -0.5)]}, r"polygon has its corner \[0, -0.5\] on a line"),
         ({"polygon": [*TRIANGLE, TRIANGLE[0]]}, r"polygon has the corner \[0.6, -0.5\] twice; drop one"),

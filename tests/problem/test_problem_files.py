@@ -132,6 +132,15 @@ def test_a_start_too_fast_for_the_limits_is_refused() -> None:
         replace(load_problem("line"), start=EndState((0, 0, 0), (11, 0, 0)))
 
 
+def test_a_ground_above_the_limits_is_refused() -> None:
+    with pytest.raises(SpecError, match=r"environment.ground must be below limits.upper, got 9 and 5 m"):
+        replace(
+            load_problem("line"),
+            environment=Environment(ground=9.0),
+            limits=Limits(upper=(np.inf, np.inf, 5)),
+        )
+
+
 def test_a_half_flip_without_a_gate_is_refused() -> None:
     with pytest.raises(SpecError, match=r"\[\[gates\]\]"):
         Problem("lost", at_rest((0, 0, 0)), at_rest((0, 0, 0)), HalfFlip())

@@ -19,6 +19,7 @@ from aerobat.declaration import (
     Vector3,
     declared,
     from_table,
+    number,
     shown,
     to_table,
     unit,
@@ -36,12 +37,24 @@ class Box:
 
 
 @declared
+class Item:
+    size: float = 1.0
+
+    SHORTHANDS: ClassVar = {"half": "half the size"}
+
+    @classmethod
+    def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
+        return {"size": 2.0 * number(table["half"], "half")} if "half" in table else table
+
+
+@declared
 class Scene:
     shape: Box
     scale: Positive = 1.0
     color: Literal["red", "green"] = "red"
     copies: Annotated[int, Field(ge=1, lt=10)] = 1
     extras: tuple[Box, ...] = ()
+    item: Item = Item()
     label: str | None = None
 
     SHORTHANDS: ClassVar = {"twice": "two copies"}
@@ -71,6 +84,8 @@ WRONG = [
     ({"shape": {"sides": [1.0, 1e300, 1.0]}}, "shape.sides[1] must be from -1e+15 to 1e+15, got 1e+300"),
     ({"shape": {"sides": [1.0, "x", 1.0]}}, "shape.sides[1] must be a number, got 'x'"),
     ({"shape": {"sides": [1.0, True, 1.0]}}, "shape.sides[1] must be a number, got True"),
+    ({"shape": {"sides": [1.0, [], 1.0]}}, "shape.sides[1] must be a number, got an empty list"),
+    ({"shape": {"sides": {"x": 1.0}}}, "shape.sides must be 3 numbers, got a table"),
     ({"shape": BOX | {"hollow": "very"}}, "shape.hollow must be true or false, got 'very'"),
     ({"shape": BOX | {"hollow": 1}}, "shape.hollow must be true or false, got 1"),
     ({"shape": BOX, "scale": "big"}, "scale must be a number, got 'big'"),
@@ -81,6 +96,8 @@ WRONG = [
     ({"shape": BOX, "copies": 1.5}, "copies must be a whole number, got 1.5"),
     ({"shape": BOX, "extras": [BOX, 7]}, "extras[1] must be a Box, in a file a table, got 7"),
     ({"shape": BOX, "extras": 7}, "extras must be a list, got 7"),
+    ({"shape": BOX, "item": 7}, "item must be an Item, in a file a table, got 7"),
+    ({"shape": BOX, "item": {"half": 1e18}}, "item.half must be from -1e+15 to 1e+15, got 1e+18"),
     ({"shape": BOX, "label": 7}, "label must be text, got 7"),
     ({"shape": BOX | {"hollow": True}, "color": "green"}, "color must be red for a hollow shape"),
 ]

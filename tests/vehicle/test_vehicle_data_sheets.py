@@ -100,7 +100,11 @@ def test_a_rotors_own_keys_win_over_whatever_the_defaults_say_by_other_keys() ->
             "rotors[0].max_thrust is given twice",
         ),
         ({"thrust_curve": 3}, {}, "rotor_defaults.thrust_curve must be two rows or more, got 3"),
-        ({"thrust_curve": [[0, 0], [1]]}, {}, "rotor_defaults.thrust_curve must be 2 x 2 numbers"),
+        (
+            {"thrust_curve": [[0, 0], [1]]},
+            {},
+            "rotor_defaults.thrust_curve[1] must be 2 numbers, got a list of 1",
+        ),
         ({"thrust_curve": [[0, 0], [1, "x"]]}, {}, "rotor_defaults.thrust_curve[1][1] must be a number"),
         (
             {"thrust_curve": [[0, 2], [1, 1]]},

@@ -196,7 +196,7 @@ MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
     "inertia a number": (put("inertia", value=1e-3), "inertia must be 3 numbers, got 0.001"),
     "inertia ragged": (
         put("inertia", value=[[1], [1], [1]]),
-        "inertia must be 3 x 3 numbers, got a list of 3",
+        "inertia[0] must be 3 numbers, got a list of 1",
     ),
     "inertia of text": (put("inertia", value=[1e-3, "x", 1e-3]), "inertia[1] must be a number, got 'x'"),
     "inertia no body's": (put("inertia", value=[1e-3, 1e-3, 3e-3]), "inertia belongs to no rigid body"),

@@ -15,7 +15,15 @@ from pydantic_core import CoreSchema, core_schema
 
 from aerobat.arrays import Array
 from aerobat.declaration.field_types import in_degrees, in_radians
-from aerobat.declaration.sentences import FieldError, UnknownKey, first_complaint, one_of, shown, unknown_key
+from aerobat.declaration.sentences import (
+    FieldError,
+    UnknownKey,
+    first_complaint,
+    one_of,
+    shown,
+    unknown_key,
+    with_article,
+)
 from aerobat.declaration.values import by_value, is_default
 from aerobat.errors import SpecError
 
@@ -179,7 +187,8 @@ def _field_schema(cls: Any, source: Any, handler: Any) -> CoreSchema:
         if isinstance(value, Mapping):
             return from_table(cls, value)
         if not isinstance(value, cls):
-            raise FieldError("", f"must be a {cls.__name__}, in a file a table, got {shown(value)}")
+            one = with_article(cls.__name__)
+            raise FieldError("", f"must be {one}, in a file a table, got {shown(value)}")
         return value
 
     return core_schema.no_info_plain_validator_function(read)

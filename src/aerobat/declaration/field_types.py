@@ -62,33 +62,39 @@ def unit(direction: ArrayLike) -> Array:
 
 def array(value: Any, *shape: int) -> Array:
     """A read-only array of exactly this shape, of numbers that may be infinite. Raises FieldError."""
-    return _shaped(_numbers(value, "", infinite=True), value, shape)
+    return _shaped(value, shape, infinite=True)
 
 
 def finite(value: Any, *shape: int) -> Array:
     """A read-only array of exactly this shape, of finite numbers. Raises FieldError."""
-    return _shaped([] if isinstance(value, str) else _numbers(value, "", infinite=False), value, shape)
+    return _shaped(value, shape, infinite=False)
 
 
-def _shaped(numbers: Any, value: Any, shape: tuple[int, ...]) -> Array:
+def _shaped(value: Any, shape: tuple[int, ...], infinite: bool) -> Array:
+    holds_numbers = isinstance(value, int | float | list | tuple) or hasattr(value, "__array__")
+    numbers = _numbers(value, "", infinite) if holds_numbers else []
     try:
         made = np.array(numbers, dtype=np.float64)
     except ValueError:  # ragged
         made = np.empty(0)
     if made.shape != shape:
-        wanted = " x ".join(map(str, shape)) + " numbers"
+        if isinstance(numbers, list) and shape[:1] == (len(numbers),):
+            for i, each in enumerate(numbers):
+                with within_field(f"[{i}]"):
+                    _shaped(each, shape[1:], infinite)
+        wanted = " x ".join(map(str, shape)) + " numbers" if shape else "a number"
         raise FieldError("", f"must be {wanted}, got {shown(value)}")
     made.flags.writeable = False
     return made
 
 
 def number(value: Any, name: str) -> float:
-    """A finite number that a file gives under `name`. Raises FieldError for anything else."""
+    """A finite number within reason that a file gives under `name`. Raises FieldError for anything else."""
     with within_field(name):
         made = _numbers(value, "", infinite=False)
         if not isinstance(made, float):
             raise FieldError("", f"must be a number, got {shown(value)}")
-    return made
+        return _bounded(made)
 
 
 def _numbers(value: Any, place: str, infinite: bool) -> Any:

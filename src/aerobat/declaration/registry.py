@@ -95,7 +95,7 @@ class Registry(Generic[T]):
         if isinstance(value, self._base):
             return value
         if not isinstance(value, Mapping):
-            complaint = f"must be a {self._base.__name__}, in a file a table, got {shown(value)}"
+            complaint = f"must be {with_article(self._base.__name__)}, in a file a table, got {shown(value)}"
             raise FieldError("", complaint)
         if "kind" not in value:
             raise FieldError("kind", "is missing; add it")

@@ -154,6 +154,11 @@ class Problem:
             )
 
     def _check_within_limits(self) -> None:
+        ground, top = self.environment.ground, self.limits.upper[2]
+        if ground is not None and ground >= top:
+            raise FieldError(
+                "environment.ground", f"must be below limits.upper, got {ground:g} and {top:g} m"
+            )
         for derivative, quantity in enumerate(DERIVATIVES[:3]):
             for end, state in self.ends.items():
                 self._check_point(f"{end}.{quantity}", state.derivatives(3)[derivative], derivative)
