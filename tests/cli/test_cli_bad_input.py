@@ -182,6 +182,14 @@ ARGUMENT_FAULTS = {
     "a vehicle to check with that is none": (["check", "taken", "--vehicle", "agile-qad"], "agile-quad"),
     "a limit below zero": (["check", "taken", "--max-speed", "-1"], "max-speed"),
     "rows at no rate": (["check", "taken", "--rate", "0"], "rate"),
+    "a heading of degrees without end": (["check", "taken", "--heading", "1e9"], "--heading"),
+    "a heading that is no number": (["fly", "taken.csv", "--heading", "nan"], "--heading"),
+    "a problem to check": (["check", "flip-roll"], "`aerobat fly PROBLEM` writes one"),
+    "a picture over another file": (["inspect", "taken", "--figure", "plan.csv"], "--figure"),
+    "the paper's columns beside others": (
+        ["plan", "line", "--columns", "paper,time"],
+        "leave the others out",
+    ),
     "conditions of a plan that need not pass": (["plan", "line", "--conditions", "lab"], "--pass"),
     "an autopilot of a plan that need not pass": (["plan", "line", "--autopilot", "betaflight"], "--pass"),
     "a controller that gives no rates": (

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerobat.errors import SpecError
-from aerobat.interchange import read_csv, read_rows, write_csv
+from aerobat.interchange import read_csv, read_plan, read_rows, write_csv
 from aerobat.interchange.rows import SHORT
 from aerobat.trajectory import Trajectory
 from suites import examples
@@ -180,6 +180,12 @@ def test_files_that_are_not_there_or_not_text_are_refused(tmp_path):
     for rate in (0.0, -1.0, np.nan):
         with pytest.raises(SpecError, match="rate"):
             read_csv(tmp_path / "nowhere.csv", rate)
+
+
+def test_a_problem_that_is_taken_for_a_plan_is_refused_with_the_command_that_plans_it(tmp_path):
+    (tmp_path / "mine.toml").write_text("name = 'mine'")
+    with pytest.raises(SpecError, match=r"mine.toml holds no plan; `aerobat fly .*mine.toml` makes that"):
+        read_plan(tmp_path / "mine.toml")
 
 
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):

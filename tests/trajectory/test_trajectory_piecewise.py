@@ -234,6 +234,11 @@ def test_wrong_inputs_are_refused(initial, inputs, dt):
         Trajectory.from_inputs(initial, inputs, dt)
 
 
+def test_inputs_that_last_too_long_are_refused_with_how_long():
+    with pytest.raises(SpecError, match=r"inputs must last 1e\+06 s at most, got 2e\+08 s"):
+        Trajectory.from_inputs(np.zeros((3, 3)), np.zeros((2, 3)), 1e8)
+
+
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
 def test_wrong_rates_are_refused(rate):
     with pytest.raises(SpecError, match="rate"):

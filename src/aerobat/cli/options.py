@@ -26,6 +26,7 @@ output = Group("Output", sort_key=3)
 
 Seed = Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))]
 POSITIVE = validators.Number(gt=0)
+HEADING = validators.Number(gte=-720, lte=720)  # [deg]
 
 
 def _require_workers(type_: Any, value: str | None) -> None:
@@ -195,7 +196,7 @@ class PlanningOptions(PlannerOptions):
     rate: Annotated[float | None, Parameter(group=planning, validator=POSITIVE)] = None
     """Rows a second of a CSV file without times. Default: 100."""
 
-    heading: Annotated[float | None, Parameter(group=planning)] = None
+    heading: Annotated[float | None, Parameter(group=planning, validator=HEADING)] = None
     """The heading at the start of a CSV file's path in degrees. Default: that of its first attitude, or 0."""
 
     paper: Annotated[bool, Parameter(group=planning, show_default=False)] = False

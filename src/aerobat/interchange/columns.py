@@ -31,6 +31,8 @@ def column_groups(text: str) -> tuple[str, ...]:
     groups = tuple(name.strip() for name in text.split(","))
     if groups == PAPER:
         return PAPER
+    if set(PAPER) & set(groups):
+        raise SpecError(f"columns: paper is a whole layout; leave the others out, got {text}")
     for name in groups:
         if name not in NAMES:
             raise unknown_name("group of columns", name, [*NAMES, *PAPER])

@@ -22,6 +22,8 @@ def read_plan(path: PathName, rate: Positive = 100.0) -> Plan | Trajectory:
     none, when there are several, or when the file is malformed.
     """
     path = plan_file(Path(path))
+    if path.suffix == ".toml":
+        raise SpecError(f"{path} holds no plan; `aerobat fly {path}` makes that of a problem")
     if path.suffix == ".plan":
         return load_plan(path)
     return load_trajectory(path) if path.suffix == ".npz" else read_csv(path, rate)
@@ -37,9 +39,11 @@ def read_trajectory(path: PathName, rate: Positive = 100.0) -> Trajectory:
 def plan_file(path: Path) -> Path:
     """Return the file that holds a plan: the path itself, or the only one in a folder.
 
-    Raises SpecError where the folder holds none, or several.
+    Raises SpecError where nothing is there, and where the folder holds none, or several.
     """
-    if not os.path.isdir(path):  # Path.is_dir raises for a name that is too long
+    if not os.path.exists(path):  # Path.exists raises for a name that is too long, and Path.is_dir
+        raise SpecError(f"{path}: there is no such file or folder; `aerobat fly PROBLEM` writes one")
+    if not os.path.isdir(path):
         return path
     for pattern in PATTERNS:
         found = sorted(path.glob(pattern))

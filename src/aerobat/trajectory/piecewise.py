@@ -120,8 +120,8 @@ class Trajectory:
         steps = np.broadcast_to(steps, len(inputs))
         if not steps.sum() <= MAX_DURATION or not np.abs(inputs).max() <= MAX_MAGNITUDE:
             raise SpecError(
-                f"from_inputs needs {MAX_DURATION:g} s at most, and inputs below {MAX_MAGNITUDE:g} m/s^k; "
-                "check their units"
+                f"inputs must last {MAX_DURATION:g} s at most, got {steps.sum():g} s, and stay below "
+                f"{MAX_MAGNITUDE:g} m/s^k; check distances, limits and their units"
             )
         # scaled by dt^k/k! the derivatives at an interval's start are its coefficients, and
         # those at its end are the same polynomial expanded about s = 1

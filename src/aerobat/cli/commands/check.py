@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from aerobat.certification import Certificate, Envelope, certify
 from aerobat.cli.failures import ExitCode
-from aerobat.cli.options import POSITIVE, VehicleOptions, limiting
+from aerobat.cli.options import HEADING, POSITIVE, VehicleOptions, limiting
 from aerobat.cli.runs.record import default_vehicle
 from aerobat.cli.runs.saved_plans import assumed_of_path, named_vehicle, read_source
 from aerobat.cli.terminal import print_json
@@ -31,7 +31,7 @@ from aerobat.vehicle import Vehicle, load_vehicle
 class CheckOptions(VehicleOptions):
     """Limits that a trajectory is checked for, beyond those of its vehicle's rotors and its problem."""
 
-    heading: Annotated[float | None, Parameter(group=limiting)] = None
+    heading: Annotated[float | None, Parameter(group=limiting, validator=HEADING)] = None
     """The heading at the start in degrees, carried along the path without spin. Default: the plan's
     own, of a CSV file that of its first attitude, or 0."""
 

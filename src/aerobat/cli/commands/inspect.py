@@ -13,6 +13,7 @@ from aerobat.cli.options import VehicleOptions, output
 from aerobat.cli.runs.folder import FLIGHT, INSPECTION
 from aerobat.cli.runs.saved_plans import named_vehicle, whole_plan
 from aerobat.cli.terminal import print_json
+from aerobat.errors import SpecError
 from aerobat.interchange import read_flight_log
 from aerobat.reporting.inspection import inspection_figure
 from aerobat.reporting.page import png
@@ -31,7 +32,7 @@ class InspectOptions(VehicleOptions):
     """The flight's plan, a .plan file or its folder. Default: the one beside the log."""
 
     figure: Annotated[Path | None, Parameter(group=output)] = None
-    """The picture's file. Default: inspect.png in the log's folder."""
+    """The picture's .png file. Default: inspect.png in the log's folder."""
 
 
 def inspect(log: Path, options: InspectOptions = InspectOptions()) -> None:
@@ -48,6 +49,8 @@ def inspect(log: Path, options: InspectOptions = InspectOptions()) -> None:
         columns t, x, y, z, qw, qx, qy, qz and f0, f1, ..., the rotors' thrusts, or u0, u1, ..., commands;
         see docs/how-to/inspect.md.
     """
+    if options.figure is not None and options.figure.suffix.lower() != ".png":
+        raise SpecError(f"--figure must end in .png, got {options.figure}; name another file")
     file = log / FLIGHT if os.path.isdir(log) else log
     flight = None if file.suffix.lower() == ".csv" else load_flight(file)
     plan = whole_plan(options.plan or file.parent, "give the flight's .plan file as --plan")

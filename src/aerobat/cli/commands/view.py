@@ -172,8 +172,6 @@ def _read(source: Path) -> tuple[Plan | Flight, Plan | None]:
     if source.suffix == ".npz" and _holds_flight(source):
         flight = load_flight(source)
         return flight, _plan_beside(source, flight)
-    if not os.path.exists(source):  # of a name that is too long, Path raises
-        raise SpecError(f"{source}: there is no such file or folder; `aerobat fly PROBLEM` writes one")
     found = whole_plan(source, "give it to `aerobat fly`, and view what that writes")
     if os.path.isdir(source) and (source / FLIGHT).exists():
         return load_flight(source / FLIGHT), found
