@@ -209,6 +209,9 @@ def test_what_is_not_installed_is_named_with_its_remedy(
         ('kind = "grid"\nboxes = [[0, 0, 0, 1, 1, 0]]\ncell = 1', "boxes must be boxes of six whole"),
         ('kind = "box"\nposition = [9, 0, 0]\nsize = [1, 0, 1]', "size must be three positive numbers"),
         ('kind = "polytope"\npoints = [[0, 0, 0]]', "points must be four points or more"),
+        ('kind = "polytope"\npoints = []', "points must be four points or more"),
+        ('kind = "mesh"\nparts = [[]]', "parts[0] must be four points or more"),
+        ('kind = "grid"\nfile = "free.npy"\ncell = 1', "file: free.npy has no occupied cell"),
         ('kind = "bos"', "kind must be one of your own"),
         ('kind = "sphere"\nposition = [9, 0, 0]\nradius = -1', "radius"),
     ],
@@ -219,6 +222,7 @@ def test_a_bad_obstacle_is_refused_in_a_sentence_that_names_the_field(
     (tmp_path / "bad.stl").write_text("nothing")
     (tmp_path / "bad.npy").write_bytes(b"nothing")
     np.save(tmp_path / "flat.npy", np.zeros((3, 4)))
+    np.save(tmp_path / "free.npy", np.zeros((3, 4, 5)))
     assert refusal(tmp_path, obstacle).startswith(said)
 
 

@@ -135,7 +135,10 @@ class Grid(Obstacle):
             with within_field("origin"):
                 origin = finite(table.get("origin", (0.0, 0.0, 0.0)), 3)
             with within_field("file"):
-                table["boxes"] = occupied_boxes(read_values(file_name(table.pop("file"))), cell, origin)
+                file = file_name(table.pop("file"))
+                table["boxes"] = occupied_boxes(read_values(file), cell, origin)
+                if not len(table["boxes"]):
+                    raise FieldError("", f": {file} has no occupied cell; leave the obstacle out")
         elif "boxes" not in table:
             raise FieldError("file", "is missing; add it, or boxes")
         return table

@@ -30,7 +30,8 @@ def _size(value: Any) -> Array:
 
 def corners_of_solid(value: Any) -> Array:
     """Return points (n, 3) that span a solid. Raises FieldError for others."""
-    points = finite(value, len(value) if hasattr(value, "__len__") else 0, 3)
+    count = len(value) if hasattr(value, "__len__") else 0
+    points = finite(value, count, 3) if count else np.zeros((0, 3))
     if len(points) < 4 or np.linalg.matrix_rank(points - points[0], 1e-9) < 3:
         raise FieldError("", "must be four points or more that do not lie in one plane")
     return points
