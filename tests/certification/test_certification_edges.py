@@ -235,6 +235,15 @@ def test_a_finding_is_nearer_than_can_be_told_only_where_its_bound_is_beyond_the
     assert ("within its limit" in said) == (bound <= limit)
 
 
+@pytest.mark.parametrize(
+    ("value", "unit", "said"),
+    [(233.71, "N", "234 N"), (99.64, "N", "99.6 N"), (12345.6, "N·m", "12346 N·m"), (3e7, "m", "3e+07 m"),
+     (np.pi, "rad", "180°"), (5.84, "N", "5.8 N"), (0.0123, "N", "0.012 N")],
+)  # fmt: skip
+def test_a_value_is_told_in_two_digits_or_to_whole_units(value: float, unit: str, said: str) -> None:
+    assert Finding("thrust", unit, Side.MAX, value, value, 0.0, None, Verdict.HOLDS).shown(value, 2) == said
+
+
 def test_what_all_but_reaches_its_limit_is_named_beside_the_rotors():
     slow = ab.Problem(
         "slow", ab.at_rest((0, 0, 1.0)), ab.at_rest((4.0, 0, 1.0)), ab.Line(), limits=ab.Limits(velocity=1.0)

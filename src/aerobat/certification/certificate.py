@@ -12,6 +12,7 @@ from aerobat.errors import Reason
 from aerobat.flatness import TimeInterval
 from aerobat.limits.limit import quantity_name
 
+WHOLE_DIGITS = 6  # of a number that is told without a power of ten
 BINDING = 0.01  # of a limit's size: a quantity that comes so near is limited by it
 
 
@@ -101,10 +102,11 @@ class Finding:
         return f"{reached}, {self.shown(margin, 2)} within its limit"
 
     def shown(self, value: float, digits: int = 4) -> str:
-        """A value of this quantity with its unit, angles in degrees."""
-        number = degrees(value) if self.unit == "rad" else value
+        """A value of this quantity with its unit, angles in degrees; no power of ten below a million."""
+        number = round(degrees(value) if self.unit == "rad" else value, 9) + 0.0  # zero but for rounding: 0
         unit = "°" if self.unit == "rad" else f" {self.unit}"
-        return f"{round(number, 9) + 0.0:.{digits}g}{unit}"  # what is zero but for rounding reads as zero
+        whole = len(f"{abs(number):.0f}")
+        return f"{number:.{max(digits, whole) if whole <= WHOLE_DIGITS else digits}g}{unit}"
 
     @property
     def _of_limit(self) -> str:
