@@ -462,7 +462,7 @@ def test_a_reader_that_has_enough_ends_a_command_without_a_word(command: list[st
     )
     process.stdout.close()
     assert process.stderr.read() == b""
-    assert process.wait() != 0
+    assert process.wait() == 141
 
 
 def test_check_says_commands_rates_and_gates_in_words_and_in_numbers(capsys) -> None:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from aerobat.cli.failures import TRACEBACK_FLAG, ExitCode, foreseen, of_plugins, stopped_by
 from aerobat.cli.interrupts import REPORTED, interrupted_by, interruptible, is_interrupted
 from aerobat.cli.terminal import discard, is_broken, provide_streams, say
-from aerobat.errors import AerobatError, Infeasible
+from aerobat.errors import AerobatError, Infeasible, chain_of
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -57,6 +57,8 @@ def _run(arguments: Sequence[str]) -> ExitCode:
 
 def _unforeseen(error: BaseException, arguments: Sequence[str]) -> ExitCode:
     """Say why a plugin failed, or what the operating system refused; raise what is a defect of ours."""
+    if isinstance(error, SystemExit) and any(isinstance(each, BrokenPipeError) for each in chain_of(error)):
+        return ExitCode.BROKEN_PIPE  # of rich's tables and help, for which it is no error of the system
     if isinstance(error, OSError) and error.filename is None and is_broken(sys.stdout):
         discard(sys.stdout)
         if isinstance(error, BrokenPipeError):  # whoever read has enough
