@@ -119,6 +119,14 @@ def test_the_course_of_the_record_has_19_waypoints_in_three_laps() -> None:
             "maneuver.elements[0].position or gate says where the figure is entered; give one of them",
         ),
         (
+            {"elements": [{"kind": "gate", "gate": "red"}], "laps": 10**6},
+            "maneuver.laps must be 1000 or less, got 1000000",
+        ),
+        (
+            {"elements": [{"kind": "barrel-roll", "position": [5, 0, 1], "count": 10**6}]},
+            "maneuver.elements[0].count must be 1000 or less, got 1000000",
+        ),
+        (
             {"elements": [{"kind": "loop"}]},
             "maneuver.elements[0].kind must be one of",
         ),

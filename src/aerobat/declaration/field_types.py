@@ -244,6 +244,7 @@ Limit = Annotated[
     Field(description="positive number, `inf` for no limit"),
 ]
 Count = Annotated[int, Field(ge=1, description="whole number, 1 or more")]
+Repeats = Annotated[int, Field(ge=1, le=1000, description="whole number from 1 to 1000")]  # in one problem
 Seed = Annotated[int, Field(ge=0, description="whole number, 0 or more")]
 AS_IT_IS = _Instance()  # Annotated[BodyState, AS_IT_IS]: an instance of a class that is not declared
 Finite = Annotated[float, AfterValidator(lambda number: _bounded(number)), Field(description="number")]

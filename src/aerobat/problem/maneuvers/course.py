@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field, PlainValidator
 
-from aerobat.declaration import Count, FieldError, within_field
+from aerobat.declaration import Count, FieldError, Repeats, within_field
 from aerobat.errors import SpecError
 from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.maneuvers.custom import CustomManeuver
@@ -32,7 +32,7 @@ class Course(Maneuver):
     """
 
     elements: Annotated[tuple[Element, ...], Field(min_length=1)]  # in order
-    laps: Count = 1  # how often they are flown
+    laps: Repeats = 1  # how often they are flown
     last_lap: Count | None = None  # elements of the last lap; left out, all
     closed: bool = False  # it ends as it begins, in flight; `start` and `goal` are left out
 

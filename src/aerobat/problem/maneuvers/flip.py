@@ -11,7 +11,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.declaration import Count, PartialVector, Positive, validated
+from aerobat.declaration import PartialVector, Positive, Repeats, validated
 from aerobat.errors import SpecError
 from aerobat.problem.condition import (
     THRUST_FRACTION,
@@ -59,7 +59,7 @@ class Flip(Maneuver):
     passage: GatePassage = GatePassage()  # how the gate is passed
     gate: str | None = None  # name of the gate; left out, the only one, or none
     position: PartialVector = field(default_factory=free)  # [m] world, upside down, where there is no gate
-    count: Count = 1  # full turns
+    count: Repeats = 1  # full turns
     mirrored: bool = False  # turns the other way
 
     ANGLES_DEG: ClassVar[tuple[float, ...]] = (45.0, 90.0, 180.0, 270.0, 315.0)  # of the turn

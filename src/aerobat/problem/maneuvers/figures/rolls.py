@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import cos, radians, sin
 from typing import ClassVar
 
-from aerobat.declaration import Count, Positive
+from aerobat.declaration import Positive, Repeats
 from aerobat.problem.gate import Gate
 from aerobat.problem.maneuvers.figures.figure import Figure
 from aerobat.problem.maneuvers.maneuver import maneuver
@@ -17,7 +17,7 @@ from aerobat.problem.stage import StageSequence
 class BarrelRoll(Figure):
     """Full rolls to the right about the direction of flight, never slower along it [DDA, FAI]."""
 
-    count: Count = 1  # rolls
+    count: Repeats = 1  # rolls
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return the entry, upright, and the quarters of every roll."""
@@ -37,7 +37,7 @@ class Corkscrew(Figure):
 
     radius: Positive = 1.0  # [m] of the helix, whose axis lies so far above the entry
     lead: Positive = 3.0  # [m] along the axis, of one turn
-    count: Count = 2  # turns
+    count: Repeats = 2  # turns
 
     MARGIN: ClassVar[float] = 0.25  # of the radius, by which the path may miss the helix
 
