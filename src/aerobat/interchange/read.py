@@ -22,7 +22,7 @@ def read_plan(path: PathName, rate: Positive = 100.0) -> Plan | Trajectory:
     none, when there are several, or when the file is malformed.
     """
     path = plan_file(Path(path))
-    if path.suffix == ".toml":
+    if path.suffix == ".toml" and path.is_file():
         raise SpecError(f"{path} holds no plan; `aerobat fly {path}` makes that of a problem")
     if path.suffix == ".plan":
         return load_plan(path)
