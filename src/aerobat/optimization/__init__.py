@@ -1,4 +1,4 @@
-"""Numerical optimization that knows no robots: convex QPs with stages, each assigned to one slot."""
+"""Numerical optimization without robotics: convex QPs with stages, each assigned to one slot."""
 
 from aerobat.optimization.assignment import AssignmentProgram, SlottedStage
 from aerobat.optimization.backends import BACKENDS, Solver, available_backends, solver

@@ -1,11 +1,12 @@
-"""A convex QP plus stages, each assigned to one slot: the problem as data.
+"""An assignment program: a convex QP plus stages, each assigned to one slot.
 
     minimize    ½ xᵀ H x + fᵀ x + c
     subject to  E x = target                   (equality rows)
                 lower <= A x <= upper          (range rows; infinite bounds never bind)
-                every stage sits in one of its slots, no two in the same slot, some in order.
+                every stage has one of its slots, no two stages the same slot, some stages in order.
 
-A stage that sits in a slot tightens the bounds of a few range rows. Nothing here knows robots or solvers.
+A stage in a slot tightens the bounds of a few range rows. This module is data only: it does not depend on
+robots or solvers.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ from aerobat.errors import SpecError
 class SlottedStage:
     """Bounds that hold at exactly one slot: slots[i] tightens range rows rows[i] to [lower[i], upper[i]].
 
-    A stage with one slot is fixed. `lower` and `upper` may be anything that broadcasts to the shape of
-    `rows`. Raises SpecError for what does not fit together.
+    A stage with one slot is fixed. `lower` and `upper` are broadcast to the shape of `rows`. Inconsistent
+    arguments raise SpecError.
     """
 
     name: str
@@ -52,13 +53,13 @@ class SlottedStage:
             _set(self, **{side: _broadcast(_bounds(getattr(self, side), name, side), rows.shape, name)})
 
     def index(self, slot: int) -> int:
-        """Return the place of `slot` among `slots`; raises SpecError where the stage cannot sit there."""
+        """Return the index of `slot` in `slots`; raise SpecError where the slot is not one of them."""
         if slot not in self.slots:
             raise SpecError(f"stage '{self.name}' cannot sit in slot {slot}; its slots are {self.slots}")
         return self.slots.index(slot)
 
     def restricted(self, places: Sequence[int]) -> SlottedStage:
-        """The stage with those of its slots that stand at some places among them."""
+        """Return the stage with only the slots at some indices of `slots`."""
         at = list(places)
         slots = tuple(self.slots[k] for k in at)
         return SlottedStage(self.name, slots, self.rows[at], self.lower[at], self.upper[at])
@@ -66,10 +67,10 @@ class SlottedStage:
 
 @dataclass(frozen=True, eq=False)
 class AssignmentProgram:
-    """The whole problem.
+    """A convex QP with slotted stages.
 
-    Programs that share their write-protected matrices, as those made by `dataclasses.replace` do, share a
-    solver's factorizations too. Raises SpecError for what does not fit together.
+    Programs that share their write-protected matrices, e.g. copies made by `dataclasses.replace`, also share
+    a solver's factorizations. Inconsistent arguments raise SpecError.
     """
 
     equality: Array  # E (p, n)
@@ -78,7 +79,7 @@ class AssignmentProgram:
     lower: Array  # (m,)
     upper: Array  # (m,)
     stages: tuple[SlottedStage, ...] = ()
-    precedence: tuple[tuple[int, int], ...] = ()  # (i, j): the slot of stage i is below that of stage j
+    precedence: tuple[tuple[int, int], ...] = ()  # (i, j): stage i has a smaller slot than stage j
     hessian: Array | None = None  # H (n, n) symmetric positive definite; None is 2 I: xᵀx is minimized
     gradient: Array | None = None  # f (n,); None is 0
     constant: float = 0.0  # c
@@ -128,7 +129,7 @@ class AssignmentProgram:
 
     @property
     def is_totally_ordered(self) -> bool:
-        """True if the stages come in the order in which they are listed."""
+        """True if `precedence` orders all stages as they are listed."""
         return all(self.precedes[i, i + 1] for i in range(len(self.stages) - 1))
 
     def cost(self, x: Array) -> float:
@@ -139,26 +140,26 @@ class AssignmentProgram:
 
     @cached_property
     def _unconstrained_norm(self) -> float:
-        """|x| at the minimum of the cost without any constraint."""
+        """|x| at the minimum of the cost without constraints."""
         if self.gradient is None:
             return 0.0
         step = self.gradient / 2.0 if self.hessian is None else np.linalg.solve(self.hessian, self.gradient)
         return float(np.linalg.norm(step))
 
     def is_assignment(self, slots: Sequence[int]) -> bool:
-        """Tell if `slots`, one a stage, are the stages' own, distinct and in order."""
+        """Tell if `slots`, one for each stage, are allowed slots, distinct and in order."""
         own = all(slot in stage.slots for stage, slot in zip(self.stages, slots, strict=True))
         return own and len(set(slots)) == len(slots) and all(slots[i] < slots[j] for i, j in self.precedence)
 
     def check_start(self, start: Sequence[int] | None) -> None:
-        """Raise SpecError unless `start` is None or has one slot a stage."""
+        """Raise SpecError unless `start` is None or has one slot for each stage."""
         if start is not None and len(start) != len(self.stages):
             raise SpecError(
                 f"start must have one slot for each of the {len(self.stages)} stages, got {start}"
             )
 
     def bounds_for(self, slots: Sequence[int | None]) -> tuple[Array, Array]:
-        """Return the range rows' bounds (lower, upper) with stage i in slots[i]; None leaves a stage out."""
+        """Return the bounds (lower, upper) of the range rows with stage i in slots[i]; None omits a stage."""
         lower = self.lower.copy()
         upper = self.upper.copy()
         for stage, slot in zip(self.stages, slots, strict=True):
@@ -170,13 +171,14 @@ class AssignmentProgram:
 
     @property
     def root_bounds(self) -> tuple[Array, Array]:
-        """The range rows' bounds (lower, upper) with the stages of a single slot in place."""
+        """The bounds (lower, upper) of the range rows with all stages of a single slot in place."""
         return self.bounds_for([stage.slots[0] if len(stage.slots) == 1 else None for stage in self.stages])
 
     def violation(self, x: Array, slots: Sequence[int]) -> float:
         """Return the largest residual of any row a x <= b, relative to |a| |x| + |b|, for stages in `slots`.
 
-        |x| is taken no smaller than where the cost alone would lead. Infinite when `slots` are no assignment.
+        |x| is at least its value at the minimum of the cost without constraints. The result is infinite where
+        `slots` are not a valid assignment.
         """
         if not self.is_assignment(slots):
             return inf
@@ -198,7 +200,7 @@ def row_norms(rows: Array) -> Array:
 
 
 def unit_rows(matrix: Array) -> tuple[Array, Array]:
-    """Return the norm of each row, 1 for those that are zero, and the rows divided by it."""
+    """Return the norm of each row (1 for zero rows), and the rows divided by their norms."""
     norms = row_norms(matrix)
     norms = np.where(norms > 0.0, norms, 1.0)
     return norms, matrix / norms[:, None]
@@ -217,7 +219,10 @@ def _set(value: object, **fields: object) -> None:
 
 
 def _shared(value: ArrayLike, name: str, shape: Sequence[int | None]) -> Array:
-    """As `frozen`, but an array that is already write-protected is shared: solvers cache by its identity."""
+    """Return a read-only array as `frozen` does, without copying arrays that are already write-protected.
+
+    Solvers cache factorizations by the identity of these arrays.
+    """
     if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.base is None:
         fits = value.ndim == len(shape) and all(
             n in (None, m) for n, m in zip(shape, value.shape, strict=True)

@@ -1,4 +1,4 @@
-"""The solvers by name, each loaded when it is first needed."""
+"""The solvers by name, each imported when it is first needed."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from aerobat.optimization.result import AssignmentResult
 
 
 class Solver(Protocol):
-    """Solves assignment programs; not for several threads at once.
+    """A solver of assignment programs; not thread-safe.
 
-    A back-end is one file with one such class, which declares what it needs and what it makes use of, and
-    one line in BACKENDS. Its package is imported when it solves, not before.
+    A back-end is one file with one such class, which declares its package and its capabilities, and one line
+    in BACKENDS. The package is imported when `solve` is called.
     """
 
     name: ClassVar[str]
-    package: ClassVar[str]  # that it imports
-    extra: ClassVar[str | None]  # of aerobat, which installs the package; None where aerobat itself does
+    package: ClassVar[str]  # the package that it imports
+    # the extra of aerobat that installs the package; None where aerobat itself does
+    extra: ClassVar[str | None]
 
     def solve(
         self,
@@ -59,10 +60,10 @@ def available_backends() -> tuple[str, ...]:
 
 
 def solver(name: str = "builtin") -> Solver:
-    """Return a solver; keep it for programs with the same matrices, the built-in one is then faster.
+    """Return a solver. The built-in one is faster if it is kept for programs with the same matrices.
 
-    Raises SpecError for a name that is not in BACKENDS and BackendMissing, with the command that installs it,
-    for one whose package is not there.
+    SpecError is raised for a name that is not in BACKENDS. BackendMissing, with the command that installs the
+    package, is raised where the package is missing.
     """
     if name not in BACKENDS:
         near = get_close_matches(name, BACKENDS, n=1)

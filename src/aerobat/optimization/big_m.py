@@ -1,4 +1,4 @@
-"""An assignment program as solvers with binary variables see it: one binary for each stage and slot."""
+"""An assignment program as a mixed-integer program, with one binary for each pair of stage and slot."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ StageSlot = tuple[int, int]  # (stage, slot), the key of a binary
 
 
 class Model(Protocol):
-    """A general solver's model. Its variables can be added, multiplied and compared to make constraints."""
+    """A model of a general solver; its variables are added, multiplied and compared as numbers are."""
 
     def variable(self, is_binary: bool = False) -> Any:
-        """Add a variable that is 0 or 1, or one without bounds."""
+        """Add a binary variable, or a continuous one without bounds."""
         ...
 
     def total(self, terms: Iterable[Any]) -> Any:
@@ -50,25 +50,25 @@ class Variables:
     def values(self, value: Callable[[Any], float]) -> tuple[Array, tuple[int, ...]]:
         """Return x and the slot of each stage, from the values that a solver gives the variables."""
         rising = sorted((value(binary), slot, stage) for (stage, slot), binary in self.binaries.items())
-        chosen = {stage: slot for _, slot, stage in rising}  # the last one, whose binary is the largest
+        chosen = {stage: slot for _, slot, stage in rising}  # the last slot has the largest binary
         return np.array([value(each) for each in self.x]), tuple(chosen[stage] for stage in sorted(chosen))
 
 
 @dataclass(frozen=True, eq=False)
 class ScaledProgram:
-    """A program with unit rows and variables of order one, since general solvers' tolerances are absolute."""
+    """A program with unit rows and variables of order one, for solvers whose tolerances are absolute."""
 
     program: AssignmentProgram
     unit: float  # of the variables
 
     def unscaled(self, claim: AssignmentResult) -> AssignmentResult:
-        """Return a claim on the scaled program as one on the program itself."""
+        """Return a claim on the scaled program as a claim on the program itself."""
         x = None if claim.x is None else self.unit * claim.x
         return replace(claim, x=x, bound=self.unit**2 * claim.bound)
 
 
 def scaled(program: AssignmentProgram) -> ScaledProgram:
-    """Return the program for solvers whose tolerances are absolute."""
+    """Return the program with unit rows and variables of order one."""
     norms, rows = unit_rows(program.rows)
     equality_norms, equality = unit_rows(program.equality)
     target = program.target / equality_norms
@@ -96,11 +96,11 @@ def scaled(program: AssignmentProgram) -> ScaledProgram:
 
 
 def build(model: Model, program: AssignmentProgram) -> Variables:
-    """Put a program into an empty model: its rows, its binaries, the bounds that they switch on, its cost."""
+    """Add a program to an empty model: its rows, its binaries, the bounds that they enable, and its cost."""
     x = [model.variable() for _ in range(program.num_variables)]
 
     def product(row: Array) -> Any:
-        """The expression row · x."""
+        """Return the expression row · x."""
         terms = [weight * each for weight, each in zip(row.tolist(), x, strict=True) if weight]
         return model.total(terms) if terms else 0.0 * x[0]
 
@@ -112,7 +112,7 @@ def build(model: Model, program: AssignmentProgram) -> Variables:
                 model.add(product(sign * row) <= sign * bound)
     binaries = _add_binaries(model, program)
     for key, row, bound, root_bound in _stage_bounds(program):
-        if root_bound < inf:  # the smallest big-M there is without further knowledge
+        if root_bound < inf:  # the smallest big-M without further knowledge
             model.add(product(row) <= root_bound + (bound - root_bound) * binaries[key])
         else:
             model.add_indicator(binaries[key], product(row) <= bound)
@@ -127,7 +127,7 @@ def build(model: Model, program: AssignmentProgram) -> Variables:
 
 
 def _add_binaries(model: Model, program: AssignmentProgram) -> dict[StageSlot, Any]:
-    """Add what makes binaries an assignment: one slot a stage, one stage a slot, stages in order."""
+    """Add the binaries: one slot for each stage, at most one stage for each slot, stages in order."""
     stages = program.stages
     keys = ((i, slot) for i, stage in enumerate(stages) for slot in stage.slots)
     binaries = {key: model.variable(is_binary=True) for key in keys}
@@ -147,7 +147,7 @@ def _add_binaries(model: Model, program: AssignmentProgram) -> dict[StageSlot, A
 
 
 def _stage_bounds(program: AssignmentProgram) -> Iterator[tuple[StageSlot, Array, float, float]]:
-    """Yield what stages tighten: row · x <= bound where the binary is 1, <= root_bound where it is 0."""
+    """Yield the tightened bounds: row · x <= bound where the binary is 1, <= root_bound where it is 0."""
     lower, upper = (bound.tolist() for bound in program.root_bounds)
     for i, stage in enumerate(program.stages):
         for slot, rows, lows, highs in zip(stage.slots, stage.rows, stage.lower, stage.upper, strict=True):

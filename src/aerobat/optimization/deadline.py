@@ -1,4 +1,4 @@
-"""A limit of time for all that is solved within a block, however deep."""
+"""Time limits for everything that is computed within a block."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ Clock = Callable[[], float]
 
 
 def wall() -> float:
-    """The time as people wait [s]."""
+    """Return the wall-clock time [s]."""
     return clock()
 
 
 def processor() -> float:
-    """The processor's time for this thread [s], which passes with work alone, however busy the machine is."""
+    """Return the processor time of this thread [s], which does not depend on how busy the machine is."""
     return thread_time()
 
 
@@ -26,9 +26,9 @@ _deadlines: ContextVar[tuple[tuple[Clock, float], ...]] = ContextVar("deadlines"
 
 @contextmanager
 def within_time(limit: float | None, by: Clock = wall) -> Iterator[None]:
-    """Give all that runs in the block so much time [s], or what an outer block has left; None adds no limit.
+    """Limit the time [s] of everything that runs in the block; outer limits still hold, None adds no limit.
 
-    Solvers end early by themselves; what calls them again and again asks `out_of_time`.
+    Solvers stop by themselves; loops that call them should check `out_of_time`.
     """
     added = () if limit is None else ((by, by() + limit),)
     with _within((*_deadlines.get(), *added)):
@@ -37,7 +37,7 @@ def within_time(limit: float | None, by: Clock = wall) -> Iterator[None]:
 
 @contextmanager
 def within_share(fraction: float) -> Iterator[None]:
-    """Give all that runs in the block a fraction of the time that is left; without a limit there is none."""
+    """Limit the block to a fraction of the time that is left; without an outer limit there is none."""
     begun = ((by, by(), end) for by, end in _deadlines.get())
     with _within(tuple((by, now + fraction * max(end - now, 0.0)) for by, now, end in begun)):
         yield
@@ -53,18 +53,18 @@ def _within(deadlines: tuple[tuple[Clock, float], ...]) -> Iterator[None]:
 
 
 def time_left(*clocks: Clock) -> float | None:
-    """The time left [s] by some clocks, by default all; zero where it is over, None without a limit."""
+    """Return the time left [s] by some clocks (default: all), at least 0; None without a limit."""
     lefts = (end - by() for by, end in _deadlines.get() if by in clocks or not clocks)
     left = min(lefts, default=None)
     return None if left is None else max(left, 0.0)
 
 
 def out_of_time() -> bool:
-    """True where a limit is over."""
+    """Return True after a deadline."""
     return time_left() == 0.0
 
 
 def shorter(limit: float | None, *clocks: Clock) -> float | None:
-    """The shorter of a solver's own limit [s] and the time that is left; None where there is neither."""
+    """Return the shorter of a solver's own limit [s] and the time left; None where there is neither."""
     limits = [each for each in (limit, time_left(*clocks)) if each is not None]
     return min(limits, default=None)

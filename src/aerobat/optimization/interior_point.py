@@ -1,19 +1,21 @@
-"""A linear cost under smooth constraints, by a primal-dual interior point method.
+"""Minimize a linear cost under smooth constraints, by a primal-dual interior point method.
 
     minimize    gᵀ x   subject to   c(x) ≤ 0,   e(x) = 0,   lower < x < upper
 
-Slacks s = −c(x) > 0 and multipliers z satisfy s z = μ, and μ falls towards zero. Each step solves
+Slacks s = −c(x) > 0 and multipliers z satisfy s z = μ, and the barrier parameter μ falls towards zero. Each
+step solves
 
     (H + Cᵀ Σ C + B + δ I) dx + Eᵀ dy = −r,     E dx = −e,     Σ = z/s.
 
-H holds the second derivatives of the Lagrangian, and B is what the box adds on the diagonal. The damping δ is
-as large as makes the matrix positive definite and a step acceptable, as in a trust region: it grows where
-steps are shortened, falls where they are not, and never vanishes. A step is taken if it lowers the barrier
-function plus the weighted violation; where the constraints' curvature speaks against it, a second-order
-correction is tried. This is the merit function of Byrd, Hribar and Nocedal, "An interior point algorithm for
-large-scale nonlinear programming", 1999. Each slack stops by itself short of zero, and is as large as the
-room that a step leaves. The matrix of some hundred to a thousand unknowns is factorized as a dense one, in a
-millisecond or two: what a step costs is second derivatives.
+H holds the second derivatives of the Lagrangian, and B is the diagonal that the box bounds add. The damping δ
+(Levenberg-Marquardt) makes the matrix positive definite and the step acceptable, as in a trust region. δ
+grows where steps are shortened, falls where they are not, and never reaches zero. A step is accepted if the
+line search finds a decrease of the merit function: the barrier function plus the weighted constraint
+violation. Where the first trial increases the violation, a second-order correction is tried. The merit
+function is the one of Byrd, Hribar and Nocedal, "An interior point algorithm for large-scale nonlinear
+programming", 1999. Each slack is limited by its own fraction-to-the-boundary rule, and is raised to −c(x)
+after a step where that is larger. The dense matrix of some hundred to a thousand unknowns is factorized in
+one or two milliseconds. Most of the time of a step goes into second derivatives.
 """
 
 from __future__ import annotations
@@ -27,100 +29,100 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 from aerobat.arrays import Array
 from aerobat.optimization.deadline import out_of_time
 
-_BOUND_PUSH = 1e-2  # of the box's width: how far the start is moved from its edges
-_NEARLY = 0.99  # of the way to where a multiplier vanishes, or to the edge of the box: the longest step
-_LEAST_SLACK = 0.1  # of a slack: what a step leaves of it at least
-_BARRIER_SOLVED = 10.0  # times μ: an error of the barrier problem that lets μ fall,
-_BARRIER_FALL = 0.2  # to this fraction,
-_BARRIER_POWER = 1.5  # or this power of it
-_GROWTH = 4.0  # of δ, until the matrix is positive definite, and where a step is shortened
-_SHRINK = 3.0  # of δ, where a whole step is taken
-_JUMP = 10.0  # of δ, where no part of a step is taken
-_MOST_DAMPING = 1.0  # that a short step leads to
-_LARGEST_DAMPING = 1e10
-_SHORT = 0.2  # of a step: what leaves its box earlier is damped more
-_JAMMED = 1e-3  # of a step: where no more is taken, slacks and multipliers begin anew
-_BACKTRACKS = 10  # parts of a step that are tried, each half the one before
-_CORRECTIONS = 3  # of second order, in a row
-_SLOW_CORRECTION = 0.99  # of the violation: a correction that leaves more ends them
-_ARMIJO = 1e-4  # of the promised fall
-_LEAST_WEIGHT = 1e-3  # of the violation beside the barrier function
-_SHARE = 0.5  # of the fall of the weighted violation, which the barrier function may rise by
-_ROUNDING = 1e-12  # of the merit
-_CORRIDOR = 1e10  # the factor by which s z may differ from μ
-_EQUALITY_WEIGHT = 1e-2  # of the matrix's largest entry, by which equalities are added to it
-_ITERATIONS_FLAT = 3  # over which the cost has to stand still
-_LARGE_MULTIPLIER = 100.0  # on average: larger ones make the dual error count less
+_BOUND_PUSH = 1e-2  # distance of the start from the bounds of the box, as a fraction of its width
+_NEARLY = 0.99  # fraction to the boundary: longest step towards a zero multiplier or the edge of the box
+_LEAST_SLACK = 0.1  # smallest fraction of a slack that a step leaves
+_BARRIER_SOLVED = 10.0  # μ falls when the error of the barrier problem is below this multiple of μ,
+_BARRIER_FALL = 0.2  # to this fraction of μ,
+_BARRIER_POWER = 1.5  # or to this power of μ, whichever is smaller
+_GROWTH = 4.0  # factor of δ where the matrix is not positive definite or a step is shortened
+_SHRINK = 3.0  # divisor of δ after a whole step
+_JUMP = 10.0  # factor of δ where no length of a step is accepted
+_MOST_DAMPING = 1.0  # largest δ that shortened steps lead to
+_LARGEST_DAMPING = 1e10  # δ at which the method gives up a step
+_SHORT = 0.2  # step length to the edge of the box below which δ is raised first
+_JAMMED = 1e-3  # step length below which slacks and multipliers are initialized anew
+_BACKTRACKS = 10  # step lengths tried by the line search, each half the previous one
+_CORRECTIONS = 3  # second-order corrections in a row
+_SLOW_CORRECTION = 0.99  # a correction that leaves a larger fraction of the violation is the last one
+_ARMIJO = 1e-4  # sufficient decrease (Armijo), as a fraction of the predicted decrease
+_LEAST_WEIGHT = 1e-3  # smallest weight of the violation in the merit function
+_SHARE = 0.5  # fraction of the decrease of the weighted violation by which the barrier function may rise
+_ROUNDING = 1e-12  # increase of the merit function that counts as rounding
+_CORRIDOR = 1e10  # largest factor between s z and μ
+_EQUALITY_WEIGHT = 1e-2  # weight of EᵀE added to the matrix, relative to its largest entry
+_ITERATIONS_FLAT = 3  # iterations over which the cost must not change
+_LARGE_MULTIPLIER = 100.0  # average multiplier above which the dual error is scaled down
 
 
 class ConstraintRows(Protocol):
-    """The slopes C (q, n) of inequalities, whichever way they are kept."""
+    """The Jacobian C (q, n) of the inequalities, in any storage format."""
 
     def times(self, step: Array) -> Array:
-        """C d, (q,)."""
+        """Return C d, (q,)."""
 
     def transposed(self, weights: Array) -> Array:
-        """Cᵀ w, (n,)."""
+        """Return Cᵀ w, (n,)."""
 
 
 class ConstrainedPoint(Protocol):
-    """A program's constraints at a point."""
+    """The constraints of a program, evaluated at a point."""
 
     @property
     def inequalities(self) -> Array:
-        """c, (q,); infinite where the point makes no sense."""
+        """The values c, (q,); infinite where the point is outside the domain of the constraints."""
 
     @property
     def equalities(self) -> Array:
-        """e, (p,)."""
+        """The values e, (p,)."""
 
     @property
     def rows(self) -> ConstraintRows:
-        """The slopes of the inequalities."""
+        """The Jacobian of the inequalities."""
 
     @property
     def equality_rows(self) -> Array:
-        """The slopes of the equalities, (p, n)."""
+        """The Jacobian E of the equalities, (p, n)."""
 
     def curvature(self, inequality_weights: Array, equality_weights: Array, squares: Array) -> Array:
-        """The second derivatives of their weighted sum, and Cᵀ diag(squares) C, (n, n)."""
+        """Return the second derivatives of the weighted constraints plus Cᵀ diag(squares) C, (n, n)."""
 
 
 class ConstrainedProgram(Protocol):
-    """A linear cost to be minimized under constraints; variables are scaled to a size of about one."""
+    """A linear cost to be minimized under constraints. Variables are scaled to a size of about one."""
 
     @property
     def cost(self) -> Array:
-        """g, (n,)."""
+        """The gradient g, (n,)."""
 
     @property
     def box(self) -> tuple[Array, Array]:
-        """The least and the most that variables may be, (n,) each."""
+        """The lower and upper bounds of the variables, (n,) each."""
 
     def at(self, x: Array) -> ConstrainedPoint:
-        """The constraints at a point."""
+        """Return the constraints at a point."""
 
 
 @dataclass(frozen=True)
 class Settings:
     """Settings of the method: accuracy, number of iterations and barrier parameters."""
 
-    barrier: float = 1e-5  # μ at first: a thousand limits times it are little beside a cost of one
-    least_barrier: float = 1e-6  # μ in the end
-    least_slack: float = 1e-2  # at first
-    damping: float = 1e-4  # the least δ
+    barrier: float = 1e-5  # initial μ: the barrier of a thousand limits stays small beside a cost of one
+    least_barrier: float = 1e-6  # final μ
+    least_slack: float = 1e-2  # smallest initial slack
+    damping: float = 1e-4  # smallest δ
     iterations: int = 60
     tolerance: float = 1e-4  # of all optimality conditions
-    violation: float = 1e-3  # with which a cost that stands still is an end
-    gain: float = 1e-3  # of the cost, over some iterations: less is standing still
+    violation: float = 1e-3  # largest violation at which a cost that no longer changes counts as converged
+    gain: float = 1e-3  # change of the cost, over some iterations, below which the cost counts as unchanged
 
 
 @dataclass(frozen=True, eq=False)
 class InteriorPointResult:
-    """The point at which the method ended, with its multipliers."""
+    """The last iterate of the method, with its multipliers."""
 
     x: Array
-    converged: bool  # all conditions hold, or the cost stands still at a small violation
+    converged: bool  # all conditions hold, or the cost no longer changes and the violation is small
     iterations: int
     z: Array  # the multipliers of inequalities
 
@@ -138,7 +140,7 @@ class _Iterate:
     z_upper: Array
 
     def dual_residual(self, cost: Array) -> Array:
-        """The gradient of the Lagrangian, (n,)."""
+        """Return the gradient of the Lagrangian, (n,)."""
         if self._residual is None:
             rows = self.point.rows.transposed(self.z) + self.point.equality_rows.T @ self.y
             self._residual = np.asarray(cost + rows - self.z_lower + self.z_upper)
@@ -158,14 +160,14 @@ class _Step:
 
 
 class _Value(NamedTuple):
-    """What a step has to lower."""
+    """The two terms of the merit function."""
 
     violation: float
     barrier: float  # the barrier function
 
 
 class _Trial(NamedTuple):
-    """The end of a step."""
+    """A trial point of the line search."""
 
     x: Array
     slacks: Array
@@ -179,9 +181,9 @@ def interior_point(
     settings: Settings,
     multipliers: Array | None = None,
 ) -> InteriorPointResult:
-    """Return a local minimum near a start, feasible or not, or where iterations or time end.
+    """Return a local minimum near a start, or the last iterate when iterations or time end.
 
-    What makes no sense on the way, or lies at the edge of the box, is infinite.
+    The result may be infeasible. Points outside the domain, or on the edge of the box, count as infinite.
 
     Args:
         program: What is minimized.
@@ -205,10 +207,10 @@ class _InteriorPoint:
         self._violation_weight = _LEAST_WEIGHT
 
     def run(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
-        """Descend from a start until the end."""
+        """Iterate from a start until convergence or a limit."""
         iterate, costs, jammed = self._begun(start, multipliers), [], False
         if not np.isfinite(iterate.point.inequalities).all():
-            return InteriorPointResult(iterate.x, False, 0, iterate.z)  # no step leads on from there
+            return InteriorPointResult(iterate.x, False, 0, iterate.z)  # no step can be computed from here
         for iteration in range(self._settings.iterations):
             costs.append(float(self._cost @ iterate.x))
             if self._error(iterate, 0.0) < self._settings.tolerance or self._stands_still(iterate, costs):
@@ -226,7 +228,7 @@ class _InteriorPoint:
         return InteriorPointResult(iterate.x, False, self._settings.iterations, iterate.z)
 
     def _begun(self, start: Array, multipliers: Array | None) -> _Iterate:
-        """The start within the box, with slacks and multipliers that fit the barrier."""
+        """Return the first iterate: the start inside the box, with slacks and multipliers that match μ."""
         push = _BOUND_PUSH * (self._upper - self._lower)
         x = np.clip(start, self._lower + push, self._upper - push)
         point, barrier = self._program.at(x), self._barrier
@@ -246,7 +248,7 @@ class _InteriorPoint:
         )
 
     def _error(self, at: _Iterate, barrier: float) -> float:
-        """The largest error in the conditions of optimality for a barrier parameter."""
+        """Return the largest error of the optimality conditions for a barrier parameter."""
         multipliers = np.abs(at.z).sum() + np.abs(at.y).sum()
         size = max(_LARGE_MULTIPLIER, multipliers / (len(at.z) + len(at.y))) / _LARGE_MULTIPLIER
         products = (
@@ -263,7 +265,7 @@ class _InteriorPoint:
         return float(max(errors))
 
     def _stands_still(self, at: _Iterate, costs: list[float]) -> bool:
-        """True where the cost has not changed for a while, at a small violation and the last barrier."""
+        """Return True where the cost no longer changes, at a small violation and the final μ."""
         recent = costs[-_ITERATIONS_FLAT:]
         still = len(costs) > _ITERATIONS_FLAT and max(recent) - min(recent) < self._settings.gain
         at_end = self._barrier <= self._settings.least_barrier
@@ -276,7 +278,7 @@ class _InteriorPoint:
             self._barrier = max(least, min(_BARRIER_FALL * self._barrier, self._barrier**_BARRIER_POWER))
 
     def _advance(self, at: _Iterate) -> bool:
-        """Take one step; False where none is accepted, however damped."""
+        """Take one step. Return False where no step is accepted, even with the largest damping."""
         equations = _Equations(at, self)
         before = self._value(at.x, at.slacks, at.point)
         while self._damping < _LARGEST_DAMPING:
@@ -293,7 +295,7 @@ class _InteriorPoint:
         return False
 
     def _begin_anew(self, at: _Iterate) -> None:
-        """Move slacks away from zero where steps hardly lead on, and choose multipliers that fit."""
+        """Move slacks away from zero, and reset multipliers to match μ, where steps have become too short."""
         at.slacks = np.maximum(at.slacks, self._settings.least_slack)
         at.z, at._residual = self._barrier / at.slacks, None
         self._damping = self._settings.damping
@@ -301,7 +303,7 @@ class _InteriorPoint:
     def _accepted(
         self, at: _Iterate, equations: _Equations, before: _Value
     ) -> tuple[_Step, float, _Trial] | None:
-        """A step, its length and its end, corrected or shortened; None if it is not taken."""
+        """Return a step, its length and its trial point, corrected or shortened; None if it is rejected."""
         missed = at.point.inequalities + at.slacks
         step = equations.step(missed, at.point.equalities)
         promised, length = self._promised(at, step), self._longest(at, step)
@@ -321,7 +323,9 @@ class _InteriorPoint:
         return None
 
     def _accepts(self, before: _Value, after: _Value, promised: float, length: float) -> bool:
-        """True where a step lowers the merit: the barrier function plus the weighted violation.
+        """Return True where a step lowers the merit function enough (Armijo condition).
+
+        The weight of the violation is raised first where the predicted decrease needs it.
 
         Args:
             before: Where it begins.
@@ -337,7 +341,7 @@ class _InteriorPoint:
         return merits[1] <= merits[0] + _ARMIJO * length * fall + _ROUNDING
 
     def _adapt(self, is_whole: bool) -> None:
-        """Damp the next step less after a whole one, more after one that was shortened."""
+        """Decrease the damping after a whole step, increase it after a shortened one."""
         if is_whole:
             self._damping = max(self._damping / _SHRINK, self._settings.damping)
         else:
@@ -352,7 +356,7 @@ class _InteriorPoint:
         step: _Step,
         promised: float,
     ) -> tuple[_Step, float, _Trial] | None:
-        """A step that counts the curvature of the constraints too, if it is accepted.
+        """Return a step with second-order correction if it is accepted, else None.
 
         Args:
             at: Where the step begins.
@@ -381,7 +385,10 @@ class _InteriorPoint:
         return None
 
     def _tried(self, at: _Iterate, step: _Step, length: float) -> _Trial:
-        """The end of a step: no slack falls too far, and all have the room that there is."""
+        """Return the trial point of a step, with slacks of at least −c(x).
+
+        No slack falls below a fraction of its value (fraction to the boundary).
+        """
         x = at.x + length * step.x
         point = self._program.at(x)
         falling = np.maximum(at.slacks + length * step.slacks, _LEAST_SLACK * at.slacks)
@@ -389,7 +396,7 @@ class _InteriorPoint:
         return _Trial(x, slacks, point, self._value(x, slacks, point))
 
     def _value(self, x: Array, slacks: Array, point: ConstrainedPoint) -> _Value:
-        """Violation and barrier function; the violation is infinite where there is no number."""
+        """Return the violation (infinite where it is not a number) and the barrier function."""
         missed = float(np.abs(point.inequalities + slacks).sum() + np.abs(point.equalities).sum())
         logarithms = np.log(slacks).sum() + np.log((x - self._lower) * (self._upper - x)).sum()
         barrier = float(self._cost @ x - self._barrier * logarithms)
@@ -401,11 +408,11 @@ class _InteriorPoint:
         return float(self._cost @ step.x - self._barrier * along)
 
     def _longest(self, at: _Iterate, step: _Step) -> float:
-        """The longest step that keeps the point in its box."""
+        """Return the longest step that keeps the point inside the box."""
         return min(_to_zero(at.x - self._lower, step.x), _to_zero(self._upper - at.x, -step.x))
 
     def _move(self, at: _Iterate, step: _Step, length: float, trial: _Trial) -> None:
-        """Change the iterate by a step; multipliers go as far as they stay positive."""
+        """Apply an accepted step. Multipliers move by their own step length, which keeps them positive."""
         lower, upper = at.x - self._lower, self._upper - at.x
         by_lower = self._barrier / lower - at.z_lower - at.z_lower / lower * step.x
         by_upper = self._barrier / upper - at.z_upper + at.z_upper / upper * step.x
@@ -417,13 +424,13 @@ class _InteriorPoint:
         at.z_upper = self._near_path(at.z_upper + dual * by_upper, self._upper - at.x)
 
     def _near_path(self, multipliers: Array, distances: Array) -> Array:
-        """Multipliers whose products with distances are not too far from the barrier parameter."""
+        """Return the multipliers, clipped so that their products with `distances` stay near μ."""
         fitting = self._barrier / distances
         return np.clip(multipliers, fitting / _CORRIDOR, fitting * _CORRIDOR)
 
 
 class _Equations:
-    """The linear equations of one iterate's steps."""
+    """The linear equations (KKT system) of the steps from one iterate."""
 
     def __init__(self, at: _Iterate, method: _InteriorPoint) -> None:
         lower, upper = at.x - method._lower, method._upper - at.x
@@ -438,7 +445,7 @@ class _Equations:
         self._at = at
 
     def factorize(self, damping: float) -> bool:
-        """Factorize the damped matrix; False where it is not positive definite."""
+        """Factorize the damped matrix. Return False where it is not positive definite."""
         damped = self._matrix.copy()
         _diagonal(damped)[:] += damping
         self._factor, failed = dpotrf(damped.T, clean=False, overwrite_a=True)
@@ -450,7 +457,7 @@ class _Equations:
         return True
 
     def step(self, missed: Array, equal: Array) -> _Step:
-        """The step that removes what inequalities and their slacks (q,) and equalities (p,) are missed by."""
+        """Return the step that removes the residuals `missed` of c + s (q,) and `equal` of e (p,)."""
         at = self._at
         sigma, fitting = at.z / at.slacks, self._barrier / at.slacks
         right = -self._residual - at.point.rows.transposed(fitting + sigma * missed)
@@ -467,11 +474,11 @@ def _largest(values: Array) -> float:
 
 
 def _to_zero(values: Array, changes: Array) -> float:
-    """How much of the changes positive values stand, at most all of it."""
+    """Return the step length, at most 1, that keeps positive values positive."""
     fall = float((-changes / values).max(initial=0.0))
     return _NEARLY / fall if fall > _NEARLY else 1.0
 
 
 def _diagonal(matrix: Array) -> Array:
-    """The diagonal (n,) of a square matrix, in place."""
+    """Return a writable view of the diagonal (n,) of a square matrix."""
     return matrix.reshape(-1)[:: len(matrix) + 1]

@@ -1,8 +1,8 @@
-"""Stages placed a few at a time: a window of consecutive ones is searched exactly, and moves along.
+"""Improve an assignment of many stages by an exact search over a moving window of consecutive stages.
 
-All other stages stay where they are meanwhile, so that every solution is one of the whole program, cheaper
-than the last. Windows overlap, and move along until none finds anything better. Nothing of that is a proof
-for all stages together: the bound is that of the search whose answer is improved.
+All stages outside the window keep their slots, so every solution is feasible for the whole program and
+cheaper than the previous one. Windows overlap, and move until no window improves the solution. This proves
+nothing for all stages together: the bound is the one of the search whose answer is improved.
 """
 
 from __future__ import annotations
@@ -18,19 +18,20 @@ from aerobat.optimization.backends import solver
 from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.result import AssignmentResult, Status
 
-WIDTH = 3  # stages of a window: two place a course worse, four take twice as long and place none better
-STEP = 2  # stages by which it moves along
-WINDOW_NODES = 2000  # of a window's search: some are flat in all their slots
-IMPROVEMENT = 1e-9  # of the cost, at least: less is rounding
+WIDTH = 3  # stages of a window: 2 give worse assignments; 4 take twice as long and give none better
+STEP = 2  # stages by which the window moves
+WINDOW_NODES = 2000  # node limit of a window's search: some windows cost almost the same in all slots
+IMPROVEMENT = 1e-9  # smallest relative decrease of the cost that counts; less is rounding
 
 
 def improved_in_windows(
     program: AssignmentProgram, answer: AssignmentResult, start: Sequence[int] | None = None
 ) -> AssignmentResult:
-    """Return a search's answer with stages placed better; without any, one from `start` or evenly spread.
+    """Return a search's answer, improved window by window.
 
-    It is "locally optimal" where no window can be placed better, with the answer's bound on the optimum.
-    Answers that are proven are returned as they are, as are those of programs whose stages have no order.
+    The windows begin at the answer's slots, else at `start`, else at evenly spread slots. The status is
+    "locally optimal" where no window can be improved; the bound is that of the answer. Answers that are
+    optimal or infeasible, and those of programs without a total order of stages, are returned unchanged.
     """
     slots = answer.slots or start or evenly_spread(program)
     if answer.status in ("optimal", "infeasible") or slots is None or not program.is_totally_ordered:
@@ -47,7 +48,7 @@ def improved_in_windows(
 
 
 def evenly_spread(program: AssignmentProgram) -> tuple[int, ...] | None:
-    """Return slots in the stages' order, as far apart as they allow; None where there are too few."""
+    """Return slots in the stages' order, as evenly spread as possible; None where there are too few."""
     slots: list[int] = []
     last = max((slot for stage in program.stages for slot in stage.slots), default=0)
     latest = _latest(program)
@@ -62,7 +63,7 @@ def evenly_spread(program: AssignmentProgram) -> tuple[int, ...] | None:
 
 
 def _latest(program: AssignmentProgram) -> list[int] | None:
-    """The latest slot of each stage that leaves one to all behind it; None where some stage has none."""
+    """Return the latest slot of each stage that leaves slots for all later stages, or None."""
     latest: list[int] = []
     for stage in reversed(program.stages):
         free = [slot for slot in stage.slots if not latest or slot < latest[-1]]
@@ -74,7 +75,7 @@ def _latest(program: AssignmentProgram) -> list[int] | None:
 
 
 class _Windows:
-    """Windows that move along one program, and the best that they found."""
+    """Windows that move along one program, and the best result so far."""
 
     def __init__(self, program: AssignmentProgram, slots: Sequence[int]) -> None:
         self._program = program
@@ -86,9 +87,10 @@ class _Windows:
         self.time = 0.0
 
     def run(self) -> None:
-        """Move the windows along until a whole round finds nothing better, or no time is left."""
+        """Move the windows until a whole round finds no improvement, or time is over."""
         last = max(len(self._slots) - WIDTH, 0)
-        firsts = [*range(0, last, STEP), last]  # stages of the windows, the last of which ends with all
+        # first stages of the windows; the last window ends with the last stage
+        firsts = [*range(0, last, STEP), last]
         unchanged, proven = 0, True
         for first in cycle(firsts):
             if out_of_time():
@@ -115,7 +117,7 @@ class _Windows:
         return result
 
     def _improves(self, result: AssignmentResult) -> bool:
-        """Take a result that costs less, or the first; tell if it did."""
+        """Keep a result that costs less than the best one, or is the first. Return True if it was kept."""
         if result.x is None:
             return False
         assert result.slots is not None
@@ -126,7 +128,7 @@ class _Windows:
         return True
 
     def _between(self, i: int, window: range) -> SlottedStage:
-        """A stage in the slots that the neighbours of its window leave to it."""
+        """Return a stage with only the slots between the neighbours of its window."""
         after = self._slots[window.start - 1] if window.start > 0 else -1
         before = self._slots[window.stop] if window.stop < len(self._slots) else np.inf
         stage = self._program.stages[i]

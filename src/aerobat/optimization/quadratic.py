@@ -21,7 +21,7 @@ def quadratic_minimum(
         rows: A, (m, n).
         upper: (m,).
     """
-    import daqp  # takes as long to import as it takes to solve
+    import daqp  # importing takes as long as solving
 
     below = np.full(len(rows), -np.inf)
     ends = np.append(reach, upper), np.append(-reach, below)

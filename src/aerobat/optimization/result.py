@@ -1,4 +1,4 @@
-"""Answers of solvers, and their verification against the program."""
+"""Results of solvers, and their verification against the program."""
 
 from __future__ import annotations
 
@@ -11,23 +11,25 @@ from aerobat.optimization.assignment import AssignmentProgram
 
 Status = Literal["optimal", "locally optimal", "time_limit", "infeasible", "unknown"]
 
-VIOLATION_TOLERANCE = 1e-6  # of a row a x <= b, relative to |a| |x| + |b|, that a solution may have
+# largest residual of a row a x <= b, relative to |a| |x| + |b|, of a valid solution
+VIOLATION_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AssignmentResult:
     """The outcome of a solve. Cost and violation are recomputed from the program, not taken from the solver.
 
-    "optimal": x is feasible and no other costs less. "locally optimal": no few consecutive stages can be
-    placed better while the others stay. "time_limit": the search ended early, x is the best found; both are
-    within `gap` of the bound. "infeasible": there is no x. "unknown": none was found, which proves nothing.
+    "optimal": x is feasible and no other solution costs less. "locally optimal": no window of consecutive
+    stages can be improved while the other stages keep their slots. "time_limit": the search ended early, x is
+    the best solution found. In these cases the cost is within `gap` of the bound. "infeasible": there is no
+    x. "unknown": no x was found, which proves nothing.
     """
 
     status: Status
     backend: str
-    bound: float  # no solution costs less
+    bound: float  # lower bound of the cost
     x: Array | None = None  # (n,)
-    slots: tuple[int, ...] | None = None  # one a stage
+    slots: tuple[int, ...] | None = None  # one for each stage
     cost: float = inf  # infinite without x
     nodes: int = 0  # relaxations solved
     time: float = 0.0  # [s], as the solver itself reports it
@@ -35,14 +37,14 @@ class AssignmentResult:
 
     @property
     def gap(self) -> float:
-        """The fraction of the cost that may still be saved, (cost − bound) / |cost|; infinite without x."""
+        """The optimality gap: the fraction (cost − bound) / |cost| of the cost; infinite without x."""
         return inf if self.x is None else max(0.0, self.cost - self.bound) / max(abs(self.cost), 1e-12)
 
 
 def verified(program: AssignmentProgram, claim: AssignmentResult) -> AssignmentResult:
     """Return a solver's claim with cost and violation recomputed from the program.
 
-    An x that violates a row by more than VIOLATION_TOLERANCE is dropped, and "optimal" with it.
+    An x that violates a row by more than VIOLATION_TOLERANCE is dropped, and the status becomes "unknown".
     """
     if claim.x is None or claim.slots is None:
         if claim.status == "infeasible":

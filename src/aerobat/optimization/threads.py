@@ -1,4 +1,4 @@
-"""One thread for linear algebra: on matrices of some hundred rows more of them cost more than they give."""
+"""One thread for linear algebra: for matrices of some hundred rows, more threads are slower."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 
-import scipy.linalg  # noqa: F401  (its library is among those that are found)
+import scipy.linalg  # noqa: F401 (loaded so that threadpoolctl finds its library)
 from threadpoolctl import ThreadpoolController
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Run a block's products and factorizations, NumPy's and SciPy's, on the thread that it is called on."""
+    """Run the matrix products and factorizations of a block, of NumPy and SciPy, on the calling thread."""
     with _libraries().limit(limits=1):
         yield
 
 
 @cache
 def _libraries() -> ThreadpoolController:
-    """The libraries that are loaded, which takes some milliseconds to find out."""
+    """Return the linear algebra libraries that are loaded; finding them takes some milliseconds."""
     return ThreadpoolController()

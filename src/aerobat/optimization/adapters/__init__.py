@@ -1,1 +1,1 @@
-"""Solvers of others behind the interface of ours, their answers confirmed."""
+"""General solvers behind the interface of the built-in one, with infeasibility confirmed."""

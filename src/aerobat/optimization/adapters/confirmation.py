@@ -1,4 +1,4 @@
-"""No "infeasible" on one solver's word."""
+"""A check of "infeasible" results by the exact search."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from aerobat.optimization.result import AssignmentResult
 
 
 def confirmed(program: AssignmentProgram, result: AssignmentResult) -> AssignmentResult:
-    """Return a general solver's result, "infeasible" only where the exact search has no solution either.
+    """Return a general solver's result, where "infeasible" is confirmed by the exact search.
 
-    A solution is verified by its residuals; that there is none would be believed on the solver's word, whose
-    presolve and tolerances are sometimes wrong (SCIP 10 calls feasible flips infeasible). Where the exact
-    search finds a solution its result is returned, as that of the built-in solver.
+    A solution can be verified by its residuals, but infeasibility cannot. Presolve and tolerances of general
+    solvers are sometimes wrong (SCIP 10 reports feasible flips as infeasible). Where the exact search finds a
+    solution, the result of the built-in solver is returned.
     """
     if result.status != "infeasible":
         return result

@@ -17,10 +17,10 @@ _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the l
 
 
 class Gurobi:
-    """One binary for each stage and slot, its bounds switched on by big-M or by indicator constraints.
+    """Solve with one binary for each stage and slot; big-M or indicator constraints enable its bounds.
 
-    Big-M takes less time than indicator constraints. The licence that comes with the package takes
-    `free_variables` variables, a full one any number.
+    Big-M constraints take less time than indicator constraints. The licence in the package allows
+    `free_variables` variables, a full licence any number.
     """
 
     name: ClassVar[str] = "gurobi"
@@ -36,10 +36,10 @@ class Gurobi:
         node_limit: int | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
-        """As `Solver.solve`; the result's time is Gurobi's own Runtime.
+        """Solve as `Solver.solve` does. The result's time is Gurobi's own Runtime.
 
-        Raises AerobatError where the licence is missing or too small for the program, KeyboardInterrupt
-        where Gurobi was stopped by one.
+        AerobatError is raised where the licence is missing or too small for the program, KeyboardInterrupt
+        where the user interrupted Gurobi.
         """
         import gurobipy
 
@@ -47,7 +47,8 @@ class Gurobi:
         scaling = big_m.scaled(program)
         try:
             with gurobipy.Env(empty=True) as env:
-                env.setParam("OutputFlag", 0)  # before it starts, or it prints the licence's banner
+                # set before the environment starts, or Gurobi prints the licence's banner
+                env.setParam("OutputFlag", 0)
                 env.setParam("Threads", 1)
                 env.start()
                 with gurobipy.Model(env=env) as model:
@@ -84,7 +85,7 @@ class _GurobiModel:
 def _claim(
     gurobipy: Any, model: Any, program: AssignmentProgram, start: Sequence[int] | None
 ) -> AssignmentResult:
-    """Build, solve, read."""
+    """Build the model, solve it, and return the result."""
     variables, grb = big_m.build(_GurobiModel(gurobipy, model), program), gurobipy.GRB
     if start is not None:
         for (stage, slot), binary in variables.binaries.items():
@@ -95,7 +96,7 @@ def _claim(
     meaning: dict[int, Status] = {
         grb.OPTIMAL: "optimal",
         grb.INFEASIBLE: "infeasible",
-        grb.INF_OR_UNBD: "infeasible",  # the cost has a minimum
+        grb.INF_OR_UNBD: "infeasible",  # not unbounded: the cost has a minimum
     }
     x, slots = variables.values(lambda each: float(each.X)) if model.SolCount else (None, None)
     return AssignmentResult(

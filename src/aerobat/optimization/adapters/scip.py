@@ -16,7 +16,7 @@ _MEANING: dict[str, Status] = {"optimal": "optimal", "infeasible": "infeasible"}
 
 
 class Scip:
-    """One binary for each stage and slot, its bounds switched on by big-M or by indicator constraints."""
+    """Solve with one binary for each stage and slot; big-M or indicator constraints enable its bounds."""
 
     name: ClassVar[str] = "scip"
     package: ClassVar[str] = "pyscipopt"
@@ -30,9 +30,9 @@ class Scip:
         node_limit: int | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
-        """As `Solver.solve`; the result's time is SCIP's own.
+        """Solve as `Solver.solve` does. The result's time is SCIP's own.
 
-        Raises KeyboardInterrupt where SCIP was stopped by one.
+        KeyboardInterrupt is raised where the user interrupted SCIP.
         """
         import pyscipopt
 
@@ -65,7 +65,7 @@ class _ScipModel:
         self._model.addConsIndicator(constraint, binary)
 
     def minimize(self, quadratic: Any, linear: Any, constant: float) -> None:
-        """Minimize a variable that is above the cost: SCIP's objective is linear."""
+        """Minimize an extra variable that is at least the quadratic cost: SCIP's objective is linear."""
         cost = self.variable()
         self.add(quadratic <= cost)
         self._model.setObjective(cost + linear)
@@ -73,7 +73,7 @@ class _ScipModel:
 
 
 def _claim(pyscipopt: Any, model: Any, program: AssignmentProgram) -> AssignmentResult:
-    """Build, solve, read."""
+    """Build the model, solve it, and return the result."""
     variables = big_m.build(_ScipModel(pyscipopt, model), program)
     model.optimize()
     if model.getStatus() == "userinterrupt":

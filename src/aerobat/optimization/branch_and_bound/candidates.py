@@ -1,4 +1,4 @@
-"""All candidates, each one slot for one stage that has several, and which of them can stand together."""
+"""The candidates, each a pair of a stage with several slots and one of its slots, and their compatibility."""
 
 from __future__ import annotations
 
@@ -18,14 +18,17 @@ FEASIBILITY_TOLERANCE = 1e-9  # on rows of unit norm, in units of the solution's
 
 @dataclass(frozen=True, eq=False)
 class CandidateBounds:
-    """The bounds that each candidate sets, on rows of unit norm."""
+    """The bounds of each candidate, on rows of unit norm."""
 
     lower: Array  # (k, P)
     upper: Array  # (k, P)
     possible: Mask  # (P,) False where a candidate contradicts constant rows or a fixed stage
 
     def in_units(self, unit: float) -> CandidateBounds:
-        """Return the same for y in units of `unit`, without candidates that contradict the root's bounds."""
+        """Return the bounds for y in units of `unit`.
+
+        Candidates that contradict the root's bounds are marked as not possible.
+        """
         lower = in_units(self.lower, unit)
         upper = in_units(self.upper, unit)
         consistent = np.all(lower <= upper + FEASIBILITY_TOLERANCE, axis=0)
@@ -35,17 +38,18 @@ class CandidateBounds:
 class Candidates:
     """Every slot of every stage that has several: P candidates of k rows each, sorted by stage.
 
-    The candidates of one stage are a group, of which exactly one is chosen. Depends on the matrices and on
-    the stages' rows alone; `bounds` brings the bounds in. Where a stage has fewer rows than another, its
-    candidates are padded with the all-zero row.
+    The candidates of one stage are a group, of which exactly one is chosen. They depend only on the matrices
+    and on the stages' rows; `bounds` adds the bounds. Candidates of stages with fewer rows than others are
+    padded with the all-zero row.
     """
 
     def __init__(self, program: AssignmentProgram, null_space: NullSpace) -> None:
-        """`null_space` has all rows of those stages."""
+        """`null_space` contains all rows of the stages that have several slots."""
         self.free_stages = tuple(i for i, stage in enumerate(program.stages) if len(stage.slots) > 1)
         stages = [program.stages[i] for i in self.free_stages]
         counts = [len(stage.slots) for stage in stages]
         self.stage = np.repeat(np.array(self.free_stages, dtype=np.intp), counts)
+        # the index of the stage in free_stages
         self.slot = np.array([slot for stage in stages for slot in stage.slots], dtype=np.intp)
         self.group = np.repeat(np.arange(len(stages)), counts)  # the place of the stage among free_stages
         self._group_starts = np.cumsum([0, *counts])
@@ -61,7 +65,7 @@ class Candidates:
     def bounds(
         self, program: AssignmentProgram, null_space: NullSpace, root: ReducedBounds
     ) -> CandidateBounds:
-        """Return the candidates' bounds for the program's stages, within the root's."""
+        """Return the candidates' bounds for the program's stages, intersected with the root's."""
         lower = self._padded([stage.lower for stage in program.stages if len(stage.slots) > 1], -inf)
         upper = self._padded([stage.upper for stage in program.stages if len(stage.slots) > 1], inf)
         lower = np.maximum(null_space.normalized(lower, root.row_offset, self.rows), root.lower[self.rows])
@@ -75,14 +79,17 @@ class Candidates:
         return CandidateBounds(np.where(constant, -inf, lower), np.where(constant, inf, upper), possible)
 
     def _padded(self, blocks: Sequence[Array | Indices], filler: float) -> Array:
-        """Return the groups' blocks (slots, rows) side by side, (k, P)."""
+        """Return the groups' blocks (slots, rows) side by side, padded with `filler`, (k, P)."""
         padded = np.full((int(self.widths.max(initial=0)), len(self.stage)), filler)
         for block, (start, end) in zip(blocks, pairwise(self._group_starts), strict=True):
             padded[: block.shape[1], start:end] = block.T
         return padded
 
     def min_norm(self, bounds: CandidateBounds) -> float:
-        """Return what |y| is at least: at y = 0 each candidate of some group violates a row by this much."""
+        """Return a lower bound of |y|.
+
+        All candidates of some group violate a row at y = 0 by at least this value.
+        """
         violation = np.maximum(bounds.lower, -bounds.upper).max(axis=0, initial=0.0)
         norms = [
             violation[start:end][bounds.possible[start:end]].min(initial=inf)
@@ -91,14 +98,14 @@ class Candidates:
         return max((float(norm) for norm in norms if norm < inf), default=0.0)
 
     def slots_with(self, program: AssignmentProgram, chosen: Sequence[int]) -> tuple[int, ...]:
-        """Return the slot of each stage of the program, with one candidate of each group `chosen`."""
+        """Return the slot of each stage of the program, given one chosen candidate of each group."""
         slots = [stage.slots[0] for stage in program.stages]
         for candidate in chosen:
             slots[self.stage[candidate]] = int(self.slot[candidate])
         return tuple(slots)
 
     def compatible_with(self, chosen: Sequence[int], excluded: Sequence[int] = ()) -> Mask:
-        """Return the candidates that may join those `chosen`, without those `excluded`, (P,)."""
+        """Return the candidates that are compatible with all `chosen` and not `excluded`, (P,)."""
         joining: Mask = self.compatible[chosen[0]]
         for candidate in chosen[1:]:
             joining = joining & self.compatible[candidate]
@@ -115,7 +122,7 @@ def _compatible(
     other_stage: Indices | int,
     other_slot: Indices | int,
 ) -> Mask:
-    """Tell which stages may have their slots beside others: other stages, other slots, in order."""
+    """Tell which stages and slots are compatible with others: another stage, another slot, in order."""
     result: Mask = (stage != other_stage) & (slot != other_slot)
     if program.precedence:
         result &= (slot < other_slot) | ~program.precedes[stage, other_stage]

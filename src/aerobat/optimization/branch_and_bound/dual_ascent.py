@@ -1,4 +1,4 @@
-"""A few steps of the dual active-set method, for many candidates beside one solved QP at once."""
+"""A few steps of the dual active-set method, for many candidates of one solved QP at once."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
 
-MIN_DIVISOR = 1e-300  # in place of a divisor that may be zero where the dividend is then zero too
-_MAX_STEPS = 3  # more hardly raise the bounds
+MIN_DIVISOR = 1e-300  # divisor in place of zero, where the dividend is zero too
+_MAX_STEPS = 3  # dual active-set steps; more hardly raise the bounds
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DualDirections:
     """Search directions in the space of the multipliers, one for each of q candidates.
 
-    By a step t along it the dual objective rises by slope · t − ½ curvature · t², while the multipliers of
+    A step t along a direction raises the dual objective by slope · t − ½ curvature · t². The multipliers of
     the w active rows change by −multiplier_rate · t.
     """
 
@@ -29,10 +29,11 @@ class DualDirections:
 def dual_ascent(
     inverse_gram: Array, multipliers: Array, is_equality: Mask, directions: DualDirections
 ) -> tuple[Array, Array, Indices]:
-    """Return the multipliers (w, q), the summed steps (q,) and which candidates are blocked, after ascent.
+    """Return the multipliers (w, q) after ascent, the summed steps (q,), and the blocked candidates.
 
-    A step ends at the maximum, or where a multiplier is zero; its row is then dropped and the next step goes
-    on without it [GI]. Blocked are those that another step might raise further.
+    A step ends at the maximum, or where a multiplier reaches zero. The row of that multiplier is then dropped
+    and the next step continues without it [GI]. Candidates are blocked if another step might raise their
+    bounds.
 
     Args:
         inverse_gram: the inverse of the active rows' Gram matrix, (w, w).
@@ -40,7 +41,8 @@ def dual_ascent(
         is_equality: which of the rows have multipliers of either sign and never drop, (w,).
         directions: of the candidates.
     """
-    remaining = np.where(is_equality, inf, multipliers)[:, None]  # multipliers, until the row drops
+    # multipliers, infinite once a row is dropped
+    remaining = np.where(is_equality, inf, multipliers)[:, None]
     steps, blocked = _step(remaining, directions)
     result = multipliers[:, None] - steps * directions.multiplier_rate
     if not blocked.size:
@@ -53,7 +55,7 @@ def dual_ascent(
         remaining = (remaining - step * directions.multiplier_rate)[:, blocked]
         row = rate.argmax(axis=0)
         remaining[row, np.arange(len(blocked))] = inf
-        remaining[remaining == 0.0] = inf  # a tie: the sign is mended below
+        remaining[remaining == 0.0] = inf  # a tie of two rows: the sign is corrected below
         moving = moving[blocked]
         dropped = [(column[:, blocked], earlier[blocked]) for column, earlier in dropped]
         slope = (directions.slope - step * directions.curvature)[blocked]
@@ -71,7 +73,7 @@ def dual_ascent(
 
 
 def _step(remaining: Array, directions: DualDirections) -> tuple[Array, Indices]:
-    """Return the steps, and which of them end at a multiplier that is zero."""
+    """Return the steps, and the candidates whose steps end where a multiplier reaches zero."""
     to_maximum = directions.slope / directions.curvature
     fastest = (directions.multiplier_rate / remaining).max(axis=0, initial=MIN_DIVISOR)
     step = np.minimum(to_maximum, 1.0 / fastest)
@@ -81,9 +83,9 @@ def _step(remaining: Array, directions: DualDirections) -> tuple[Array, Indices]
 def _without(
     inverse_gram: Array, row: Indices, dropped: list[tuple[Array, Indices]], directions: DualDirections
 ) -> DualDirections:
-    """Return the directions once `row` is dropped, beside those `dropped` before, to which it is added.
+    """Return the directions once `row` is dropped, after the rows `dropped` before; `row` is added to them.
 
-    Each dropped row goes with its column of the inverse, less what the earlier ones took of it.
+    Each dropped row removes its column of the inverse, which is first reduced by the rows dropped before.
     """
     each = np.arange(len(row))
     column = inverse_gram[:, row]

@@ -1,4 +1,4 @@
-"""The children of one node, made as they are needed, those of the smallest lower bound first."""
+"""The children of one node, created on demand, those of the smallest lower bound first."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from aerobat.optimization.branch_and_bound.least_distance import QPSolution
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds, LowerBounds
 
 _NONE = np.zeros(0, dtype=np.intp)
-_FIRST_BATCH = 4  # candidates that are paired at once; twice as many the next time
-_MAX_PAIR_BRANCHES = 2  # of one candidate; with more pairs below the cutoff, the candidate alone is a branch
+_FIRST_BATCH = 4  # candidates paired in the first batch; each later batch is twice as large
+# of one candidate; with more pairs below the cutoff, the candidate alone is one branch
+_MAX_PAIR_BRANCHES = 2
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Branch:
-    """All ways to complete a node with the candidates `chosen` and without those `excluded`."""
+    """All completions of a node that contain the candidates `chosen` and none of those `excluded`."""
 
     bound: float
     chosen: tuple[int, ...]
@@ -29,32 +30,32 @@ class Branch:
 
 @dataclass(eq=False, slots=True)
 class _Pairing:
-    """A candidate with any one of its partner group's; alone where it has no partner."""
+    """A candidate with all candidates of its partner group, or alone where it has none."""
 
     candidate: int
     partners: Indices
     bounds: Array  # of the pairs
-    num_branched: int = 0  # of the partners, which are in the order of their bounds from the first on
+    num_branched: int = 0  # number of partners already branched on, in the order of their bounds
 
 
 class LazyChildren:
-    """Branches that cover all ways to complete a node.
+    """Branches that cover all completions of a node.
 
-    They choose for the group whose lower bounds are the largest on the average and, where that leaves few
-    choices, also for the group whose smallest bound would be the largest then: pairwise bounds come from the
-    node's own solution, so that most QPs in between need not be solved. Candidates are paired when their turn
-    comes.
+    Branches choose a candidate of the group with the largest average lower bound. Where few pairs remain,
+    they also choose one of a second group: the one whose smallest pairwise bound is the largest. Pairwise
+    bounds come from the node's own solution, so most of the QPs in between need not be solved. Candidates are
+    paired on demand.
     """
 
     def __init__(self, dual_bounds: DualBounds, solution: QPSolution, lower_bounds: LowerBounds) -> None:
-        """`solution` is the node's; `lower_bounds` have candidates of every group that is left."""
+        """`solution` is the node's; `lower_bounds` have candidates of every pending group."""
         self.lower_bounds = lower_bounds
         self._dual_bounds = dual_bounds
         self._solution = solution
         group, value = lower_bounds.group, lower_bounds.value
         self._starts = np.concatenate([[0], (group[1:] != group[:-1]).nonzero()[0] + 1])
         self._spans = [slice(a, b) for a, b in pairwise((*self._starts.tolist(), len(group)))]
-        self._floor = float(np.minimum.reduceat(value, self._starts).max())  # any completion costs as much
+        self._floor = float(np.minimum.reduceat(value, self._starts).max())  # lower bound of every completion
         sizes = np.diff([*self._starts, len(group)])
         average = np.add.reduceat(value, self._starts) / sizes
         self._branching_group = int(average.argmax())
@@ -66,7 +67,7 @@ class LazyChildren:
 
     @property
     def bound(self) -> float:
-        """The lower bound of all branches that are left."""
+        """The lower bound of all remaining branches."""
         evaluated = self._evaluated[0][0] if self._evaluated else inf
         if not self._waiting:
             return evaluated
@@ -82,7 +83,11 @@ class LazyChildren:
         return self.bound
 
     def pop(self, cutoff: float, in_pairs: bool) -> Branch:
-        """Return the best branch, once evaluated: a pair, if wanted or where few pairs are below `cutoff`."""
+        """Return the best branch, once evaluated.
+
+        The branch is a pair if `in_pairs`, or where few pairs are below `cutoff`; else it is a candidate
+        alone.
+        """
         bound, _, pairing = heappop(self._evaluated)
         if not pairing.partners.size:
             return Branch(bound, (pairing.candidate,))

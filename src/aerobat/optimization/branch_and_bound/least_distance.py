@@ -1,4 +1,4 @@
-"""The shortest vector within bounds, by DAQP's dual active-set method, warm-started."""
+"""The shortest vector within bounds, by DAQP's dual active-set method with warm start."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED
 # DAQP's marks on a row, and its exit flags
 _AT_UPPER, _AT_LOWER, _IGNORED = 1, 3, 4
 _SOLVED, _INFEASIBLE, _OVERDETERMINED = 1, -1, -6
-_EQUAL = 1e-11  # bounds as near as that make an equality, in units of the larger
-_CONTRADICTION = 1e-7  # beside the largest of all equalities' bounds: by which they contradict each other
-_INDEPENDENT = 1e-8  # of a row of unit norm: what is left of it where it is no combination of others
-_TOLERANCE = 1e-9  # on rows of unit norm
+_EQUAL = 1e-11  # bounds closer than this, relative to the larger one or to 1, make an equality
+# residual, relative to the largest target, above which equalities contradict each other
+_CONTRADICTION = 1e-7
+_INDEPENDENT = 1e-8  # a unit row whose part orthogonal to other rows is shorter depends on them
+_TOLERANCE = 1e-9  # constraint tolerance on rows of unit norm
 _SETTINGS = {"primal_tol": _TOLERANCE}
-_CAREFUL_SETTINGS = {"pivot_tol": 1e-4, "sing_tol": 1e-13, "dual_tol": 1e-10}  # where the usual ones fail
+# for QPs at which the usual settings fail
+_CAREFUL_SETTINGS = {"pivot_tol": 1e-4, "sing_tol": 1e-13, "dual_tol": 1e-10}
 
 
 class NotConverged(Exception):
@@ -33,14 +35,14 @@ class QPSolution:
 
     y: Array
     value: float  # ½|y|²
-    lower: Array  # the bounds it was found for
+    lower: Array  # the bounds for which the solution was computed
     upper: Array
-    active: Indices  # rows that hold it
+    active: Indices  # the rows at their bounds
     multipliers: Array  # of the active rows: positive at an upper bound, negative at a lower
 
 
 class LeastDistanceQP:
-    """Minimize ½|y|² subject to lower <= M y <= upper, for rows M of unit norm or zero, many times over."""
+    """Minimize ½|y|² subject to lower <= M y <= upper, for fixed rows M of unit norm or zero."""
 
     def __init__(self, rows: Array) -> None:
         """Keep the rows."""
@@ -52,7 +54,8 @@ class LeastDistanceQP:
 
         model = daqp.Model()
         unbounded = np.full(len(self._rows), UNBOUNDED)
-        # no linear term, not a zero one: DAQP would multiply it by all rows at every change of bounds
+        # The linear term is None, not zero: DAQP would multiply a zero one by all rows at every change of
+        # bounds.
         model.setup(np.eye(self._rows.shape[1]), None, self._rows, unbounded, -unbounded)
         model.settings = _SETTINGS
         return model
@@ -83,7 +86,7 @@ class LeastDistanceQP:
         y, flag, multipliers = self._run(lower, upper, warm, cutoff)
         if flag not in (_SOLVED, _INFEASIBLE):
             y, flag, multipliers = self._run(lower, upper, cold, cutoff)
-        if flag in (_INFEASIBLE, _OVERDETERMINED):  # it may be that equalities depend on each other
+        if flag in (_INFEASIBLE, _OVERDETERMINED):  # dependent equalities may be the cause
             redundant = self._redundant(lower, upper)
             if redundant is None:
                 return None
@@ -103,10 +106,10 @@ class LeastDistanceQP:
         return QPSolution(y, 0.5 * float(y @ y), lower, upper, active, multipliers[active])
 
     def _redundant(self, lower: Array, upper: Array) -> Indices | None:
-        """Equalities that follow from others; None where no y satisfies all.
+        """Return the equalities that follow from others; None where no y satisfies all of them.
 
-        DAQP overlooks less than `_TOLERANCE` and sees dependence where more is missed, but what is missed by
-        about as much it takes for infeasible, however large the bounds are.
+        DAQP ignores residuals below `_TOLERANCE` and detects dependence where they are larger. Dependent
+        equalities with residuals near the tolerance it reports as infeasible, however large the bounds are.
         """
         larger = np.maximum(np.abs(lower), np.abs(upper))
         equal = np.flatnonzero(upper - lower <= _EQUAL * np.maximum(larger, 1.0))
@@ -135,7 +138,7 @@ class LeastDistanceQP:
     ) -> tuple[Array, int, Array]:
         self._model.settings = {"fval_bound": cutoff}
         flag = self._model.update(bupper=upper, blower=lower, sense=sense)
-        if flag < 0:  # infeasible at once: a lower bound is above its upper bound
+        if flag < 0:  # infeasible at once: a lower bound exceeds its upper bound
             return lower, flag, lower
         y, _, flag, details = self._model.solve()
         return y, flag, details["lam"]

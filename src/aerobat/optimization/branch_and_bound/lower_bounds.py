@@ -1,4 +1,4 @@
-"""Lower bounds on the cost of a node with one more candidate, or two, from the node's own multipliers."""
+"""Lower bounds on the cost of a node with one or two more candidates, from the node's own multipliers."""
 
 from __future__ import annotations
 
@@ -16,77 +16,78 @@ from aerobat.optimization.branch_and_bound.candidates import (
 from aerobat.optimization.branch_and_bound.dual_ascent import MIN_DIVISOR, DualDirections, dual_ascent
 from aerobat.optimization.branch_and_bound.least_distance import QPSolution
 
-_CANCELLATION = 1e-13  # of the largest term of a dual objective, by which its terms may cancel wrongly
-_MIN_SQUARE = 1e-9  # a unit row's square off the active rows is taken no smaller
+_CANCELLATION = 1e-13  # rounding error of a dual objective, relative to its largest term
+_MIN_SQUARE = 1e-9  # smallest value of a unit row's squared norm after projection off the active rows
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DualSteps:
-    """By how much dual ascent moved the multipliers: the w active ones, and those of q candidates' k rows.
+    """Changes of the multipliers by dual ascent: of the w active rows, and of the k rows of q candidates.
 
-    By a fraction θ of its step the dual objective rises by slope · θ − ½ curvature · θ².
+    A fraction θ of the step raises the dual objective by slope · θ − ½ curvature · θ².
     """
 
     active_rows: Array  # (w, n)
     multiplier_change: Array  # (w, q) of the active rows
     fraction_lost: Array  # (w, q) of the active multipliers, zero for equalities
-    row_index: Indices  # (k, q) the candidates' rows, among those that candidates have
+    row_index: Indices  # (k, q) the candidates' rows, as indices into the rows that candidates use
     own_multipliers: Array  # (k, q) of these rows
     slope: Array  # (q,)
     curvature: Array  # (q,)
-    blocked: frozenset[int]  # of the q, which further steps might raise
-    satisfied: Mask  # (q,) the node's solution satisfies the candidate as it is
+    blocked: frozenset[int]  # those of the q candidates whose bounds further steps might raise
+    satisfied: Mask  # (q,) True where the node's solution already satisfies the candidate
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LowerBounds:
-    """Lower bounds on the cost of a node with one more candidate, for q of them, sorted by group."""
+    """Lower bounds on the cost of a node with one more candidate, for q candidates sorted by group."""
 
     candidates: Indices  # (q,)
     group: Indices  # (q,)
-    value: Array  # (q,) no y of the node that satisfies the candidate too has a smaller ½|y|²
-    steps: DualSteps | None = None  # that prove them; None where they are inherited from another node
+    value: Array  # (q,) lower bound of ½|y|² over all y of the node that also satisfy the candidate
+    # the steps that prove them; None where they are inherited from another node
+    steps: DualSteps | None = None
 
     def restricted(self, allowed: Mask, cutoff: float) -> LowerBounds:
-        """Return those of candidates `allowed` (P,) that may be below `cutoff`, for nodes further down."""
+        """Return the bounds of `allowed` (P,) candidates that are below `cutoff`, for descendant nodes."""
         keep = allowed[self.candidates] & (self.value < cutoff)
         return LowerBounds(self.candidates[keep], self.group[keep], self.value[keep])
 
     def covers_all_stages(self, groups: Sequence[int]) -> bool:
-        """Tell if each of `groups`, which are all that occur, has a candidate."""
+        """Tell if each of `groups` has a candidate. No other groups occur."""
         return len(set(self.group.tolist())) == len(groups)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _ActiveSet:
-    """The w active rows of a solution, and their products with the u rows that candidates have."""
+    """The w active rows of a solution, and their products with the u rows that candidates use."""
 
     rows: Array  # (w, n)
     gram: Array  # (w, w)
     inverse_gram: Array  # (w, w)
     cross_gram: Array  # (w, u)
-    squares: Array  # (u,) of the candidates' rows, projected off the active rows
-    bound: Array  # (w, 1) that is active
+    squares: Array  # (u,) squared norms of the candidates' rows, projected off the active rows
+    bound: Array  # (w, 1) the bound at which each row is active
     is_equality: Mask  # (w,)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Violations:
-    """By how much a solution violates q candidates of k rows, and the dual directions that follow."""
+    """Violations of q candidates of k rows by a solution, and the resulting dual directions."""
 
     row_index: Indices  # (k, q)
-    nearest: Array  # (k, q) to the solution's row values, within the bounds
-    violation: Array  # (k, q) of them, positive above the upper bound
+    nearest: Array  # (k, q) the point within the bounds that is nearest to the solution's row values
+    violation: Array  # (k, q) distance to `nearest`, positive above the upper bound
     direction: Array  # (k, q) of the rows' multipliers
-    coupling: Array  # (w, q) products of that direction with the active rows
-    square: Array  # (q,) of that direction
+    coupling: Array  # (w, q) products of `direction` with the active rows
+    square: Array  # (q,) squared norm of `direction`
 
 
 class DualBounds:
-    """Lower bounds by dual ascent. Depends on the matrices and on the stages' rows alone."""
+    """Lower bounds by dual ascent. They depend only on the matrices and on the rows of the stages."""
 
     def __init__(self, candidates: Candidates, rows: Array) -> None:
-        """`rows` are M, those of the null space."""
+        """`rows` are the rows M of the null space."""
         self._candidates = candidates
         self._rows = rows
         is_used = np.zeros(len(rows), dtype=bool)
@@ -99,18 +100,19 @@ class DualBounds:
         self._candidate_grams = gram[self._row_index[:, None], self._row_index]  # (k, k, P)
 
     def root_bounds(self, bounds: CandidateBounds) -> LowerBounds:
-        """Return zero for all possible candidates."""
+        """Return bounds of zero for all possible candidates."""
         possible = np.flatnonzero(bounds.possible)
         return LowerBounds(possible, self._candidates.group[possible], np.zeros(len(possible)))
 
     def single_bounds(
         self, solution: QPSolution, bounds: CandidateBounds, inherited: LowerBounds
     ) -> LowerBounds:
-        """Return the lower bounds for the node of `solution` with any one of the candidates inherited.
+        """Return the lower bounds for the node of `solution` with any one of the inherited candidates added.
 
-        The multipliers of a candidate's violated rows rise, each by its violation over its square off the
-        active rows, and those of the active rows follow. The bound is the dual objective −½|Mᵀλ|² − λᵀb at
-        the multipliers so reached: they are dual feasible, hence it is a bound whatever the steps were.
+        The multiplier of each violated row of a candidate rises by the violation, divided by the squared norm
+        of the row off the active rows. The multipliers of the active rows follow. The bound is the dual
+        objective −½|Mᵀλ|² − λᵀb at the resulting multipliers. They are dual feasible, so the bound is valid
+        for any steps.
         """
         active = self._active_set(solution)
         violations = self._violations(solution, bounds, inherited, active)
@@ -145,10 +147,10 @@ class DualBounds:
     def pairwise_bounds(
         self, solution: QPSolution, lower_bounds: LowerBounds, steps: DualSteps, some: Indices
     ) -> Array:
-        """Return the lower bounds for one of `some` and another of the q candidates together, (c, q).
+        """Return the lower bounds for one of `some` and any of the q candidates added together, (c, q).
 
-        Both candidates' steps are taken by the same fraction θ: the best that keeps the signs of the active
-        multipliers. Infinite where the two are not compatible.
+        Both candidates' steps are scaled by one fraction θ: the best one that keeps the signs of the active
+        multipliers. The bound is infinite where the two are not compatible.
 
         Args:
             solution: of the node.

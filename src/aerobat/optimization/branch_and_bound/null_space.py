@@ -1,7 +1,7 @@
-"""Equalities eliminated: what is left is the shortest vector that satisfies the range rows.
+"""Elimination of the equalities: the QP becomes the shortest vector that satisfies the range rows.
 
-With H = L Lᵀ and w = Lᵀ x + L⁻¹ f the cost is ½|w|² plus a constant. The equalities G w = d leave
-w = G⁺ d + Z y, Z an orthonormal basis of the null space of G, so that
+With H = L Lᵀ and w = Lᵀ x + L⁻¹ f the cost is ½|w|² plus a constant. The solutions of the equalities G w = d
+are w = G⁺ d + Z y, where Z is an orthonormal basis of the null space of G, so that
 
     cost = ½|y|² + ½|G⁺ d|² + constant,      rows:  lower <= M y <= upper,   |M_i| = 1.
 """
@@ -16,28 +16,29 @@ import numpy as np
 from aerobat.arrays import Array, Indices, Mask
 from aerobat.optimization.assignment import AssignmentProgram, row_norms
 
-UNBOUNDED = 1e30  # an infinite bound, as DAQP writes it
-_RANK_TOLERANCE = 1e-11  # singular values below this fraction of the largest are zero
-_CONSTANT_ROW_TOLERANCE = 1e-9  # a row whose projection is below this fraction of its norm cannot change
-_CONSISTENCY_TOLERANCE = 1e-7  # residual of redundant equalities and of constant rows, relative to scale
+UNBOUNDED = 1e30  # DAQP's value of an infinite bound
+_RANK_TOLERANCE = 1e-11  # singular values below this fraction of the largest count as zero
+_CONSTANT_ROW_TOLERANCE = 1e-9  # rows whose projection is below this fraction of their norm count as constant
+# largest residual of redundant equalities and of constant rows, relative to their scale
+_CONSISTENCY_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedBounds:
-    """lower <= M y <= upper, y in units of `unit`: what a program's right-hand sides become."""
+    """The bounds lower <= M y <= upper of a program in its null space, with y in units of `unit`."""
 
     lower: Array  # (m + 1,)
     upper: Array  # (m + 1,)
     base_cost: float  # the cost at y = 0, in units of unit²
     row_offset: Array  # (m + 1,) the program's rows at y = 0
-    slack: Array  # (m + 1,) how far constant rows may miss their bounds
+    slack: Array  # (m + 1,) allowed violation of constant rows
     x_offset: Array  # (n,) x at y = 0
-    min_norm: float  # no solution has a shorter w
-    consistent: bool  # False where equalities, or constant rows, contradict each other
+    min_norm: float  # lower bound of the norm of w
+    consistent: bool  # False where equalities or constant rows contradict each other
     unit: float = 1.0
 
     def in_units(self, unit: float) -> ReducedBounds:
-        """Return the same in units of `unit`, infinities as DAQP writes them: its tolerances are absolute."""
+        """Return the bounds in units of `unit`, with DAQP's infinities. DAQP's tolerances are absolute."""
         lower = in_units(self.lower, unit)
         upper = in_units(self.upper, unit)
         return replace(self, lower=lower, upper=upper, base_cost=self.base_cost / unit**2, unit=unit)
@@ -47,13 +48,13 @@ class ReducedBounds:
         return self.unit**2 * (self.base_cost + value)
 
     def value(self, cost: float) -> float:
-        """Return the ½|y|² of a cost, as DAQP writes it: the inverse of `cost`."""
+        """Return ½|y|² for a cost, at most UNBOUNDED: the inverse of `cost`."""
         return min(cost / self.unit**2 - self.base_cost, UNBOUNDED)
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Some variables, and the rows that involve them and no others."""
+    """Variables of a program, and the rows that involve only these variables."""
 
     columns: Mask  # (n,)
     equalities: Mask  # (p,)
@@ -61,10 +62,10 @@ class Block:
 
 
 class NullSpace:
-    """One block of a program in the null space of its equalities.
+    """One block of a program, in the null space of its equalities.
 
-    Depends on the program's matrices alone; `bounds` brings the right-hand sides in. One all-zero row,
-    `zero_row`, is appended to the range rows: stages with fewer rows than others are padded with it.
+    It depends only on the program's matrices; `bounds` adds the right-hand sides. One all-zero row,
+    `zero_row`, is appended to the range rows. Stages with fewer rows than others are padded with it.
     """
 
     def __init__(self, program: AssignmentProgram, block: Block, implicit_equalities: Mask) -> None:
@@ -111,7 +112,7 @@ class NullSpace:
         self._unconstrained_rows = rows @ self._unconstrained_x
 
     def bounds(self, program: AssignmentProgram, lower: Array, upper: Array) -> ReducedBounds:
-        """Return what is left of the program's targets and of bounds (m,) of its range rows."""
+        """Return the program's targets and the bounds (m,) of its range rows, reduced to the null space."""
         target = np.concatenate([program.target[self._equalities], lower[self._implicit_equalities]])
         target = (target - self._unconstrained_equality) * self._equality_scale
         missed = np.abs(self._residual_projector @ target)
@@ -137,7 +138,7 @@ class NullSpace:
         )
 
     def normalized(self, bound: Array, row_offset: Array, rows: Indices | slice = slice(None)) -> Array:
-        """Return `bound`, of the program's rows, which are `row_offset` at y = 0, as a bound of M y."""
+        """Return bounds of the program's rows, which are `row_offset` at y = 0, as bounds of M y."""
         normalized: Array = (bound - row_offset[rows]) / self._projected_norms[rows]
         return normalized
 
@@ -148,13 +149,13 @@ class NullSpace:
 
 
 def in_units(bound: Array, unit: float) -> Array:
-    """Return `bound` / `unit`, infinities as DAQP writes them."""
+    """Return `bound` / `unit`, with DAQP's infinities."""
     scaled: Array = np.clip(bound / unit, -UNBOUNDED, UNBOUNDED)
     return scaled
 
 
 def split_coupled(program: AssignmentProgram, rows: Indices) -> tuple[Block, Block]:
-    """Split a program in two blocks that share nothing: all that range rows `rows` couple, and the rest."""
+    """Split a program in two independent blocks: everything coupled to range rows `rows`, and the rest."""
     couplings = [np.abs(program.equality), np.abs(program.rows)]
     if program.hessian is not None:
         couplings.append(np.abs(program.hessian))
@@ -174,7 +175,7 @@ def split_coupled(program: AssignmentProgram, rows: Indices) -> tuple[Block, Blo
 
 
 class _CholeskyScaling:
-    """x = L⁻ᵀ (w − offset), with L = √2 where the program has no hessian."""
+    """The change of variables x = L⁻ᵀ (w − offset), with L = √2 where the program has no hessian."""
 
     def __init__(self, program: AssignmentProgram, columns: Indices) -> None:
         gradient = np.zeros(len(columns)) if program.gradient is None else program.gradient[columns]
@@ -189,5 +190,5 @@ class _CholeskyScaling:
         return matrix / sqrt(2.0) if self._inverse is None else matrix @ self._inverse.T
 
     def unscale(self, vectors: Array) -> Array:
-        """Return L⁻ᵀ times vectors w, its columns."""
+        """Return L⁻ᵀ times the columns of `vectors`."""
         return vectors / sqrt(2.0) if self._inverse is None else self._inverse.T @ vectors

@@ -1,8 +1,8 @@
 """Best-first branch and bound over the candidates of stages.
 
-A node chooses candidates for some stages and drops the others, which can only lower the cost; its relaxation
-is a convex QP. Few children reach the QP solver: lower bounds for all of them at once, and for pairs, show
-that most cost too much, and each waits in line behind cheaper siblings.
+A node chooses candidates for some stages and drops the other stages, which can only lower the cost. Its
+relaxation is a convex QP. Few children reach the QP solver: cheap lower bounds for single candidates and for
+pairs prune most of them, and the others wait in the queue behind cheaper siblings.
 """
 
 from __future__ import annotations
@@ -24,32 +24,32 @@ from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds, Lower
 from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED, ReducedBounds
 from aerobat.optimization.result import Status
 
-_OPTIMALITY_GAP = 1e-10  # relative, at which the search ends
-_MAX_INHERITED = 4  # candidates of the last stage, whose bounds are not computed anew
-_DIVE_GROWTH = 2  # a dive whenever the number of QPs has grown by this factor
-_FAILURE_COST = 20  # of a QP that does not converge, beside one that does, as it is tried three times
+_OPTIMALITY_GAP = 1e-10  # relative optimality gap at which the search ends
+_MAX_INHERITED = 4  # with at most so many candidates of the last stage, the parent's bounds are reused
+_DIVE_GROWTH = 2  # the search dives whenever the number of solved QPs has grown by this factor
+_FAILURE_COST = 20  # cost of a QP that does not converge, in converging QPs, because it is tried three times
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Node:
-    """A relaxation that is solved."""
+    """A node of the search with its solved relaxation."""
 
     solution: QPSolution
     chosen: tuple[int, ...]  # candidates
     pending: tuple[int, ...]  # groups without a chosen candidate
-    inherited: LowerBounds  # of its parent, for the candidates that may join those chosen
+    inherited: LowerBounds  # bounds of its parent, for the candidates compatible with those chosen
 
 
 @dataclass(frozen=True)
 class SearchLimits:
-    """The limits at which a search ends though nothing is proven."""
+    """Limits at which a search ends without a proof of optimality."""
 
-    deadline: float = inf  # [s] as `perf_counter` counts
-    nodes: float = inf  # QPs solved, those that fail counted as often as they cost
+    deadline: float = inf  # [s] on the clock of `perf_counter`
+    nodes: float = inf  # solved QPs, where a QP that fails counts with its higher cost
 
 
 class BestFirstSearch:
-    """One search: `best` is the cheapest solution found, with its candidates, and `bound` bounds all."""
+    """One search: `best` is the cheapest solution with its candidates, `bound` a global lower bound."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class BestFirstSearch:
         bounds: CandidateBounds,
         root: ReducedBounds,
     ) -> None:
-        """`bounds` are those of the candidates, `root` those of the rows with no stage assigned."""
+        """`bounds` are those of the candidates, `root` those of the rows without any stage assigned."""
         self._candidates = candidates
         self._dual_bounds = dual_bounds
         self._qp = qp
@@ -81,13 +81,13 @@ class BestFirstSearch:
 
     @property
     def status(self) -> Status:
-        """The status of the best solution, as far as it is proven."""
-        if self.best is not None:  # a limit, or a relaxation without answer, may leave something below it
+        """The status of the best solution: "optimal" only where the bound proves it."""
+        if self.best is not None:  # after a limit or a failed QP a cheaper solution may exist
             return "time_limit" if self._improves(self.bound) else "optimal"
         return "infeasible" if self.bound == inf else "unknown"
 
     def try_start(self, slots: Mapping[int, int]) -> None:
-        """Take an assignment (stage: slot) for the best so far, where it is feasible."""
+        """Use an assignment (stage: slot) as the best solution so far, where it is feasible."""
         chosen: list[int] = []
         possible = self._bounds.possible
         for stage, slot in slots.items():
@@ -103,7 +103,7 @@ class BestFirstSearch:
             self.best = (solution, tuple(chosen))
 
     def run(self, limits: SearchLimits) -> None:
-        """Search until the best is proven optimal, or nothing is left, or a limit is reached."""
+        """Search until the best solution is proven optimal, no node is left, or a limit is reached."""
         self._limits = limits
         if self._is_over:
             self._unresolved = 0.0
@@ -123,14 +123,14 @@ class BestFirstSearch:
                 self._dive(node)
                 next_dive = _DIVE_GROWTH * self.nodes
             elif self._heap and node.solution.value > self._heap[0][0]:
-                self._push(node.solution.value, node)  # others may cost less
+                self._push(node.solution.value, node)  # other nodes have smaller bounds
             else:
                 children = self._children(node)
                 if children is not None:
                     self._push(children.bound, node, children)
 
     def _next(self) -> _Node | None:
-        """Return the best node; None where the best branch has no solution, or costs more than the next."""
+        """Return the best node; None where its best branch is infeasible or costs more than the next node."""
         _, _, node, children = heappop(self._heap)
         if children is None:
             return node
@@ -143,9 +143,9 @@ class BestFirstSearch:
         return None
 
     def _dive(self, node: _Node | None) -> None:
-        """Go down to some assignment, by the best child at every turn; all others are left in the heap.
+        """Dive to a complete assignment along the best child of every node; other children stay queued.
 
-        What costs more is not searched any more, and should time run out there is something to show.
+        An early solution prunes nodes that cost more, and is the answer if time runs out.
         """
         while node is not None and not self._is_over:
             children = self._children(node)
@@ -155,19 +155,20 @@ class BestFirstSearch:
             while child is None and self._improves(children.evaluate_best()) and not self._is_over:
                 branch = children.pop(self._cutoff, in_pairs)
                 child = self._child(node, children.lower_bounds, branch)
-                in_pairs = False  # where a pair fails, a candidate alone may: that excludes all its pairs
+                # where a pair fails, try its candidate alone, which can exclude all its pairs
+                in_pairs = False
             self._push(children.bound, node, children)
             node = child
         if node is not None:
             self._push(node.solution.value, node)
 
     def _children(self, node: _Node) -> LazyChildren | None:
-        """Return the node's children; None where its solution is an assignment's, the best so far."""
+        """Return the node's children; None where its solution is complete and becomes the best."""
         if not node.pending:
             self.best = (node.solution, node.chosen)
             return None
         lower_bounds = node.inherited
-        # else a few QPs cost less than their bounds
+        # bounds are computed anew unless solving the few remaining QPs is cheaper
         if not node.chosen or len(node.pending) > 1 or len(lower_bounds.candidates) > _MAX_INHERITED:
             lower_bounds = self._dual_bounds.single_bounds(node.solution, self._bounds, node.inherited)
         complete = self._completed(node, lower_bounds)
@@ -177,7 +178,7 @@ class BestFirstSearch:
         return LazyChildren(self._dual_bounds, node.solution, lower_bounds)
 
     def _child(self, node: _Node, lower_bounds: LowerBounds, branch: Branch) -> _Node | None:
-        """Return one child of a node; None where it cannot beat the best."""
+        """Return one child of a node; None where it cannot improve on the best solution."""
         groups = self._candidates.group[list(branch.chosen)].tolist()
         pending = tuple(group for group in node.pending if group not in groups)
         allowed = self._candidates.compatible_with(branch.chosen, branch.excluded)
@@ -189,7 +190,7 @@ class BestFirstSearch:
         return None if solution is None else _Node(solution, node.chosen + branch.chosen, pending, inherited)
 
     def _completed(self, node: _Node, lower_bounds: LowerBounds) -> tuple[int, ...] | None:
-        """Return candidates, one a group, that the node's solution satisfies as it is; None without."""
+        """Return one candidate for each group that the node's solution already satisfies, or None."""
         if lower_bounds.steps is None:
             return None
         satisfied = lower_bounds.candidates[lower_bounds.steps.satisfied]
@@ -200,7 +201,7 @@ class BestFirstSearch:
     def _matched(
         self, chosen: tuple[int, ...], pending: tuple[int, ...], satisfied: Indices
     ) -> tuple[int, ...] | None:
-        """Return `chosen` with one compatible candidate of `satisfied` for each group; None without."""
+        """Return `chosen` with one compatible candidate of `satisfied` for each pending group, or None."""
         if not pending:
             return chosen
         for candidate in satisfied[self._candidates.group[satisfied] == pending[0]]:
@@ -215,7 +216,7 @@ class BestFirstSearch:
         upper = upper.copy()
         for candidate in chosen:
             rows = self._candidates.rows[:, candidate]
-            np.maximum.at(lower, rows, self._bounds.lower[:, candidate])  # a row may be there twice
+            np.maximum.at(lower, rows, self._bounds.lower[:, candidate])  # a row may occur twice
             np.minimum.at(upper, rows, self._bounds.upper[:, candidate])
         return lower, upper
 

@@ -1,4 +1,4 @@
-"""The built-in solver: a QP for what no choice touches, an exact search over slots for the rest, verified."""
+"""The built-in solver: a QP for the part without choices, exact search over slots for the rest, verified."""
 
 from __future__ import annotations
 
@@ -21,15 +21,16 @@ from aerobat.optimization.deadline import shorter
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _MATRICES = ("rows", "equality", "hessian", "gradient")
-_EQUALITY_TOLERANCE = 1e-12  # bounds closer than this, relative to the larger, make an equality
-_CONTRADICTION_TOLERANCE = 1e-9  # on the same scale, by which a lower bound must exceed the upper one
+_EQUALITY_TOLERANCE = 1e-12  # bounds closer than this fraction of the larger one make an equality
+# a lower bound contradicts the upper one where it exceeds it by this fraction of the larger one
+_CONTRADICTION_TOLERANCE = 1e-9
 
 
 class BranchAndBound:
-    """Solves assignment programs exactly, and keeps factorizations for the next with the same matrices.
+    """Solve assignment programs exactly, and keep factorizations for the next program with the same matrices.
 
-    Not for several threads at once: give each its own. DERIVATION.md beside this file says how it works and
-    why it is right.
+    The solver is not thread-safe: use one for each thread. DERIVATION.md beside this file derives the method
+    and proves it.
     """
 
     name: ClassVar[str] = "builtin"
@@ -46,7 +47,7 @@ class BranchAndBound:
         node_limit: int | None = None,
         start: Sequence[int] | None = None,
     ) -> AssignmentResult:
-        """As `Solver.solve`; the result's time is that of the whole call."""
+        """Solve as `Solver.solve` does. The result's time is the time of the whole call."""
         program.check_start(start)
         began = perf_counter()
         limit = shorter(time_limit)
@@ -58,7 +59,7 @@ class BranchAndBound:
     def _claim(
         self, program: AssignmentProgram, limits: SearchLimits, start: Sequence[int] | None
     ) -> AssignmentResult:
-        """The assignment of minimum cost, or what was found within the limits, not yet verified."""
+        """Return the assignment of minimum cost, or the best one within the limits, not yet verified."""
         try:
             prepared = self._prepared(program)
         except NotConverged:
@@ -69,10 +70,10 @@ class BranchAndBound:
         return factorization.claim(program, blocks, limits, start)
 
     def _prepared(self, program: AssignmentProgram) -> tuple[_Factorization, _Blocks] | None:
-        """The factorization, kept from the last program where it fits, and what is to be searched.
+        """Return the factorization (the last one where it still fits) and the two blocks of the program.
 
-        None where there is no solution. Raises NotConverged for the independent block's QP; the search deals
-        with its own.
+        Return None where there is no solution. NotConverged is raised for the independent block's QP; the
+        search handles its own failures.
         """
         lower, upper = program.root_bounds
         larger = np.maximum(np.abs(lower), np.abs(upper))
@@ -90,17 +91,17 @@ class BranchAndBound:
 
 @dataclass(frozen=True, eq=False)
 class _Blocks:
-    """One program in the null space: the block to be searched, and the other, solved."""
+    """One program in the null space: the block to be searched, and the independent block, solved."""
 
     root: ReducedBounds
     bounds: CandidateBounds
     independent: ReducedBounds
     y: Array  # the independent block's solution
-    elsewhere: float  # the cost of all but the block that is searched
+    elsewhere: float  # the cost of everything but the searched block
 
 
 class _Factorization:
-    """All that depends on the matrices, on which rows are equalities and on the rows of the stages alone."""
+    """Everything that depends only on the matrices, the implicit equalities and the rows of the stages."""
 
     def __init__(self, program: AssignmentProgram, implicit_equalities: Mask) -> None:
         self._program = program
@@ -117,7 +118,7 @@ class _Factorization:
         self.independent_qp = LeastDistanceQP(self.independent.rows)
 
     def fits(self, program: AssignmentProgram, implicit_equalities: Mask) -> bool:
-        """Tell if another program has the same matrices, and the same rows in the same roles."""
+        """Tell if another program has the same matrices and the same rows in the same roles."""
         own = self._program
         if own.precedence != program.precedence or len(own.stages) != len(program.stages):
             return False
@@ -135,7 +136,7 @@ class _Factorization:
         limits: SearchLimits,
         start: Sequence[int] | None,
     ) -> AssignmentResult:
-        """Search the coupled block, and put its solution and the independent block's together."""
+        """Search the coupled block, and combine its solution with that of the independent block."""
         search = BestFirstSearch(
             self.candidates, self.dual_bounds, self.coupled_qp, blocks.bounds, blocks.root
         )
@@ -159,9 +160,9 @@ class _Factorization:
         )
 
     def blocks(self, program: AssignmentProgram, lower: Array, upper: Array) -> _Blocks | None:
-        """Return a program's right-hand sides, the independent block solved; None where it has no solution.
+        """Return a program's right-hand sides, with the independent block solved; None if infeasible.
 
-        `lower` and `upper` (m,) are the root's bounds. Raises NotConverged for the independent block's QP.
+        `lower` and `upper` (m,) are the root's bounds. NotConverged is raised for the independent block's QP.
         """
         root = self.coupled.bounds(program, lower, upper)
         independent = self.independent.bounds(program, lower, upper)
@@ -182,7 +183,7 @@ def _without_solution(status: Status, bound: float) -> AssignmentResult:
 
 
 def _is_ordered(program: AssignmentProgram) -> bool:
-    """Tell if the precedence has no cycle and the fixed stages have distinct slots, in order."""
+    """Tell if the precedence has no cycle, and the fixed stages have distinct slots in order."""
     fixed = {i: stage.slots[0] for i, stage in enumerate(program.stages) if len(stage.slots) == 1}
     in_order = all(fixed[i] < fixed[j] for i in fixed for j in fixed if program.precedes[i, j])
     is_distinct = len(set(fixed.values())) == len(fixed)
