@@ -1,4 +1,4 @@
-"""Proof, over continuous time, that a vehicle flies a trajectory within its limits; knows no planner."""
+"""Proofs over continuous time that a vehicle flies a trajectory within its limits, without any planner."""
 
 from aerobat.certification.certificate import Certificate, Discontinuity, Finding, Side, Verdict
 from aerobat.certification.certify import certify

@@ -1,13 +1,13 @@
 """Body rates along pieces, in a frame that is carried along the thrust direction without spin.
 
-On a piece take any fixed axes e1, e2, e3 with e3 near the thrust, and let f = (u, v, w) in them, n = |f|,
+Choose fixed axes e1, e2, e3 on a piece, with e3 near the thrust. Let f = (u, v, w) in these axes, n = |f| and
 b3 = f/n. The smallest rotation from e3 to b3 turns e1 and e2 into
 
     x~ = e1 − b3_x g,   y~ = e2 − b3_y g,   g = (e3 + b3)/(1 + b3_z).
 
-The frame without spin lies at an angle φ from x~ and y~ about b3, with φ' = ω_z / (1 + b3_z) for the rates of
-`kernels.flatness` in these axes (Hanson and Ma, 1995). Rates lie across b3 and are complex numbers x + i y in
-x~, y~, times exp(−i φ). e3 is near b3: nothing here comes near 1 + b3_z = 0.
+The frame without spin is rotated by an angle φ about b3 from x~ and y~. With the rates of `kernels.flatness`
+in these axes, φ' = ω_z / (1 + b3_z) (Hanson and Ma, 1995). Body rates across b3 are written as complex
+numbers x + i y in x~, y~, times exp(−i φ). As e3 is near b3, 1 + b3_z is never near 0.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ComplexArray = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class ThrustDirectionRates:
-    """Body rates along P pieces, at N nodes each, in a frame of its own on each piece."""
+    """Body rates along P pieces at N nodes each, in separate axes on each piece."""
 
     axes: Array  # e1, e2, e3 as columns, (P, 3, 3)
     direction: Array  # b3, world, (P, N, 3)
@@ -40,7 +40,7 @@ class ThrustDirectionRates:
     def along(
         cls, thrust: Array, mean: Array, seconds: Array, basis: chebyshev.Basis
     ) -> ThrustDirectionRates:
-        """Turn f, f', f'' (P, N, 3, 3) at the basis's nodes into rates.
+        """Compute the rates from f, f', f'' (P, N, 3, 3) at the basis's nodes.
 
         Args:
             thrust: f, f', f'', world.
@@ -59,10 +59,10 @@ class ThrustDirectionRates:
         return cls(axes, thrust[..., 0, :] / n[..., None], omega, omega_dot, twist)
 
     def carried(self, heading: float) -> Array:
-        """φ at all nodes (P, N) of a frame that each piece takes over from the one before it.
+        """Return φ at all nodes (P, N) of a frame that is carried over from piece to piece.
 
-        It starts as the smallest rotation from the vertical to b3, turned by `heading`; where directions of
-        neighbours differ it takes the smallest rotation.
+        The initial frame is the smallest rotation from the vertical to b3, turned by `heading`. Where
+        directions of neighbouring pieces differ, the frame is turned by the smallest rotation between them.
         """
         first, last = (_frames(self.axes, self.direction[:, node]) for node in (0, -1))
         turned = so3.about_axis(UP, np.array(heading))
@@ -75,19 +75,19 @@ class ThrustDirectionRates:
         return np.asarray(np.cumsum(step)[:, None] + self.twist)
 
     def body(self, angle: Array) -> tuple[Array, Array]:
-        """ω and ω' in the axes of a body whose frame is at these angles φ (P, N), each (P, N, 3)."""
+        """Return ω and ω' in the axes of a frame at the angles φ (P, N), each (P, N, 3)."""
         back = np.exp(-1j * angle)
         return _flat(back * self.omega), _flat(back * self.omega_dot)
 
     def turning(self, angle: Array, yaw: Array) -> tuple[Array, Array]:
-        """ω and ω' of a body that is turned from that frame by a yaw, with two derivatives, (P, N, 3)."""
+        """Return ω and ω' of a body turned from that frame by a yaw with two derivatives, (P, N, 3)."""
         still, still_dot = map(xyz, self.body(angle + yaw[..., 0]))
         omega, omega_dot = flatness.spun(still, still_dot, tuple(np.moveaxis(yaw[..., 1:], -1, 0)))
         return np.stack(omega, axis=-1), np.stack(omega_dot, axis=-1)
 
 
 def _axes_about(direction: Array) -> Array:
-    """Right-handed axes as columns with e3 along each vector (P, 3), (P, 3, 3)."""
+    """Return right-handed axes as columns with e3 along each vector (P, 3), (P, 3, 3)."""
     e3 = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
     seed = np.eye(3)[np.abs(e3).argmin(axis=-1)]
     e1 = seed - np.sum(seed * e3, axis=-1, keepdims=True) * e3
@@ -96,7 +96,7 @@ def _axes_about(direction: Array) -> Array:
 
 
 def _frames(axes: Array, direction: Array) -> Array:
-    """The axes (P, 3, 3), turned by the smallest rotation that takes e3 to each direction (P, 3)."""
+    """Return the axes (P, 3, 3), turned by the smallest rotation that takes e3 to each direction (P, 3)."""
     turn = so3.smallest_rotation(axes[..., 2], direction)
     return np.asarray(so3.axes(turn) @ axes)
 

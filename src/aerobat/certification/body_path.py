@@ -1,7 +1,7 @@
 """A vehicle's body along a trajectory: its centre of mass and its thrust axis as Chebyshev series.
 
-The body is the ellipsoid of revolution about the thrust axis that encloses it however it is turned about that
-axis. Where no attitude is determined it is the ball that encloses it in every attitude.
+The body is the ellipsoid of revolution about the thrust axis that contains the vehicle at every angle about
+that axis. Where no attitude is determined, the body is the ball that contains the vehicle in every attitude.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle.ellipsoid import Revolved
 
-INSTANT = 1e-3  # [s] from one sample to the next, at most
+INSTANT = 1e-3  # [s] largest interval between samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,16 +30,16 @@ class BodyPath:
     body: Revolved
     pieces: Subintervals
     series: Array  # centre of mass [m] and thrust axis, world, (P, K + 1, 6)
-    error: Array  # between both and their series, at most [m], [-], (P, 2)
+    error: Array  # largest error of both series [m], [-], (P, 2)
 
     @property
     def balls(self) -> tuple[Array, Array]:
-        """Balls that hold the body all along each piece: their centres [m], (P, 3), and radii [m], (P,)."""
+        """The balls that contain the body along each piece: centres [m], (P, 3), and radii [m], (P,)."""
         moved = np.linalg.norm(self.series[:, 1:, :3], axis=-1).sum(axis=1)
         return self.series[:, 0, :3], moved + self.error[:, 0] + self.body.reach
 
     def during(self, begin: float, end: float) -> BodyPath:
-        """Return the part of it between two times [s]."""
+        """Return the part between two times [s]."""
         first, last = self.pieces.spans(self.trajectory)
         rows = np.flatnonzero((first < end) & (begin < last))
         pieces, duration = self.pieces[rows], (last - first)[rows]
@@ -50,7 +50,7 @@ class BodyPath:
 
     @cached_property
     def sampled(self) -> tuple[Array, Array, Array]:
-        """Instants [s], (n,), one each INSTANT or more, with centres [m] and thrust axes, (n, 3) each."""
+        """Instants [s] at most INSTANT apart, (n,), with centres [m] and thrust axes, (n, 3) each."""
         count = np.ceil(self.pieces.seconds(self.trajectory) / INSTANT).astype(np.intp)
         rows = np.repeat(np.arange(len(count)), count)
         along = (2 * (np.arange(len(rows)) - (np.cumsum(count) - count)[rows]) + 1) / count[rows] - 1
@@ -59,7 +59,7 @@ class BodyPath:
 
     @classmethod
     def in_attitude(cls, found: ChebyshevSeries, body: Revolved) -> BodyPath:
-        """The body in the attitude that thrust gives it.
+        """Return the body in the attitude given by the thrust direction.
 
         Args:
             found: Series whose last three columns are the components of the thrust axis.
@@ -72,7 +72,7 @@ class BodyPath:
 
     @classmethod
     def in_every_attitude(cls, trajectory: Trajectory, pieces: Subintervals, body: Revolved) -> BodyPath:
-        """The ball around the body, for all attitudes."""
+        """Return the ball around the body, for all attitudes."""
         centre, off = _centre(trajectory, pieces, max(trajectory.degree, 1))
         axis = np.zeros_like(centre)
         axis[:, 0] = UP
@@ -81,7 +81,7 @@ class BodyPath:
 
 
 def _centre(trajectory: Trajectory, pieces: Subintervals, degree: int) -> tuple[Array, Array]:
-    """The series of the position [m], (P, K + 1, 3), and what rounding leaves open of it, (P,)."""
+    """Return the series of the position [m], (P, K + 1, 3), and its rounding error [m], (P,)."""
     basis = chebyshev.basis(degree)
     coefficients = trajectory.coefficients[pieces.interval]
     summed = np.linalg.norm(np.abs(coefficients).sum(axis=1), axis=-1)

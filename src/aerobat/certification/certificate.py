@@ -1,4 +1,4 @@
-"""Certificate: what is proven about a trajectory, and what refutes it."""
+"""The certificate of a trajectory: proven extrema, and violations that refute it."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from aerobat.errors import Reason
 from aerobat.flatness import TimeInterval
 from aerobat.limits.limit import quantity_name
 
-WHOLE_DIGITS = 6  # of a number that is told without a power of ten
-BINDING = 0.01  # of a limit's size: a quantity that comes so near is limited by it
+WHOLE_DIGITS = 6  # digits of a number, up to which it is shown without a power of ten
+BINDING = 0.01  # margin, as a fraction of the limit's size, below which a limit is active (binding)
 
 
 class Verdict(StrEnum):
-    """Knowledge about a limit over continuous time."""
+    """What is known about a limit over continuous time."""
 
     HOLDS = "holds"  # proven, or there is no limit
     VIOLATED = "violated"  # at the time given
-    UNDECIDED = "undecided"  # nearer to its limit than can be told, or attitude undetermined on the way
+    # nearer to its limit than the enclosure can resolve, or attitude undetermined on the way
+    UNDECIDED = "undecided"
 
 
 class Side(StrEnum):
-    """Minimum or maximum of a quantity."""
+    """The side of an extremum: minimum or maximum."""
 
     MIN = "min"
     MAX = "max"
@@ -35,25 +36,25 @@ class Side(StrEnum):
 class Finding:
     """The minimum or the maximum of one quantity, enclosed between `value` and `bound`.
 
-    Where it names a `gate`, a `waypoint` or an `end`, it is about that instant alone, and `value` and `bound`
-    are the same.
+    A finding with a `gate`, a `waypoint` or an `end` is about that instant only; its `value` and `bound` are
+    equal.
     """
 
     quantity: str  # "thrust" or "command" of a rotor, "collective thrust", "tilt", "velocity x", ...
     unit: str
     side: Side
     value: float  # reached at `time`
-    bound: float  # proven: nowhere beyond
+    bound: float  # proven: the quantity is nowhere beyond it
     time: float  # [s]
     limit: float | None
     verdict: Verdict
     gate: str | None = None  # passed at that time
     waypoint: str | None = None  # met at that time
-    rotor: int | None = None  # whose thrust or command it is about
-    field: str = ""  # of the vehicle or the problem, that the limit comes from: "max_thrust", "limits.jerk"
-    size: float | None = None  # of the range between its limits, of which reserves are fractions
-    room: float = inf  # of that range, beside the limit, of which reserves keep a part
-    end: Literal["start", "goal"] | None = None  # of the path, at that time
+    rotor: int | None = None  # the rotor whose thrust or command this is
+    field: str = ""  # the field of the vehicle or problem that sets the limit: "max_thrust", "limits.jerk"
+    size: float | None = None  # size of the range between the limits; reserves are fractions of it
+    room: float = inf  # distance of the limit from the range's end; reserves keep a part of it
+    end: Literal["start", "goal"] | None = None  # the end of the path at that time
     obstacle: str | None = None  # nearest to the body at that time
 
     @property
@@ -64,19 +65,19 @@ class Finding:
 
     @property
     def place(self) -> str | None:
-        """The gate, waypoint or end that it is about, in words; None where it is about the whole path."""
+        """The gate, waypoint or end of this finding, in words; None for findings about the whole path."""
         if self.gate is not None:
             return f"gate '{self.gate}'"
         return self.end if self.waypoint is None else f"'{self.waypoint}'"
 
     @property
     def reason(self) -> Reason:
-        """The finding in one sentence, with its limit: a field, or the place that it is about."""
+        """The finding in one sentence, with the field of its limit, or its place."""
         return Reason(str(self), (self.field or self.place or "",))
 
     @property
     def margin(self) -> float | None:
-        """The proven distance to the limit; where it is violated how far beyond, negative."""
+        """The proven distance to the limit; negative where the limit is violated."""
         if self.limit is None:
             return None
         extreme = self.value if self.verdict is Verdict.VIOLATED else self.bound
@@ -84,7 +85,7 @@ class Finding:
         return max(margin, 0.0) if self.verdict is Verdict.HOLDS else margin
 
     def __str__(self) -> str:
-        """One sentence without its full stop."""
+        """Return the finding as one sentence without its full stop."""
         change = "rises" if self.side is Side.MAX else "falls"
         reached = f"{self.name} {change} to {self.shown(self.value)} at {self.time:.3f} s"
         if self.place is not None:
@@ -102,15 +103,15 @@ class Finding:
         return f"{reached}, {self.shown(margin, 2)} within its limit"
 
     def shown(self, value: float, digits: int = 4) -> str:
-        """A value of this quantity with its unit, angles in degrees; no power of ten below a million."""
-        number = round(degrees(value) if self.unit == "rad" else value, 9) + 0.0  # zero but for rounding: 0
+        """Return a value of this quantity with its unit, angles in degrees; no power of ten below a million."""
+        number = round(degrees(value) if self.unit == "rad" else value, 9) + 0.0  # rounds tiny values to zero
         unit = "°" if self.unit == "rad" else f" {self.unit}"
         whole = len(f"{abs(number):.0f}")
         return f"{number:.{max(digits, whole) if whole <= WHOLE_DIGITS else digits}g}{unit}"
 
     @property
     def _of_limit(self) -> str:
-        """The value beside the limit."""
+        """The value beside its limit."""
         if self.limit is None:
             return self.shown(self.value)
         word = "of" if self.side is Side.MAX else "of at least"
@@ -119,15 +120,15 @@ class Finding:
 
 @dataclass(frozen=True)
 class Discontinuity:
-    """A jump between two segments that no finite forces and moments can make, or no rotor with lag."""
+    """A jump between two segments that needs infinite forces or moments, or rotors without lag."""
 
     quantity: str  # "position", "velocity", "thrust direction", "body rate" or "rotor thrusts"
     unit: str
-    norm: float  # of rotor thrusts the largest
+    norm: float  # the largest jump of any rotor where the quantity is "rotor thrusts"
     time: float  # [s]
 
     def __str__(self) -> str:
-        """One sentence without its full stop."""
+        """Return the jump as one sentence without its full stop."""
         means = "force" if self.quantity in ("position", "velocity") else "moment"
         jump = f"{self.norm:.2g} {self.unit}"
         if self.quantity == "rotor thrusts":
@@ -142,9 +143,9 @@ class Discontinuity:
 @in_notebooks
 @by_value
 class Certificate:
-    """Findings along the whole of a trajectory, between samples and knots too.
+    """Findings along a whole trajectory, at every instant.
 
-    A rotor with lag τ has its command f + τ f' among them beside its thrust f, each within its limits.
+    A rotor with lag τ has findings about its command f + τ f' in addition to its thrust f.
     """
 
     findings: tuple[Finding, ...]
@@ -154,7 +155,7 @@ class Certificate:
 
     @property
     def certified(self) -> bool:
-        """True if all limits are proven to hold, attitude determined throughout and moments finite."""
+        """True if all limits are proven to hold, the attitude is determined throughout and nothing jumps."""
         holds = all(finding.verdict is Verdict.HOLDS for finding in self.findings)
         return holds and not self.undetermined and not self.discontinuities
 
@@ -165,9 +166,9 @@ class Certificate:
 
     @property
     def worst(self) -> Finding | None:
-        """The rotor's thrust or command with the smallest margin; None if no attitude is ever determined.
+        """The rotor thrust or command with the smallest margin; None if no attitude is determined anywhere.
 
-        Of those that are violated if any is.
+        Violated findings come first, if there are any.
         """
         rotors = [finding for finding in self.findings if finding.rotor is not None]
         violated = [finding for finding in rotors if finding.verdict is Verdict.VIOLATED]
@@ -175,9 +176,9 @@ class Certificate:
 
     @property
     def binding(self) -> Finding | None:
-        """The finding about the whole path, of no rotor, that all but reaches its limit; None if none does.
+        """The finding whose limit is active (almost reached), about the whole path and not a rotor, or None.
 
-        Of several that which is nearest, as a fraction of its size.
+        Of several active limits, the one with the smallest margin as a fraction of its size is returned.
         """
         sized = ((f, f.margin / f.size) for f in self.findings if f.margin is not None and f.size)
         near = [(f, left) for f, left in sized if f.rotor is None and f.place is None and left < BINDING]
@@ -185,16 +186,15 @@ class Certificate:
 
     @property
     def margin(self) -> float | None:
-        """By how much [N] the rotors are proven to stay within their limits; negative: beyond by so much.
+        """The smallest proven margin [N] of the rotors' thrusts and commands; negative where violated.
 
-        Of thrusts and, where rotors lag, of commands, at the times at which attitude is determined; None if
-        there are none.
+        Only times with a determined attitude count; None if there are none.
         """
         return self.worst.margin if self.worst else None
 
     @property
     def why(self) -> str:
-        """The deciding finding, in one sentence without its full stop."""
+        """The finding that decides, in one sentence without its full stop."""
         violated = [f for f in self.findings if f.verdict is Verdict.VIOLATED]
         if self.discontinuities:
             return str(self.discontinuities[0])

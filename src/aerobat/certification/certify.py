@@ -1,8 +1,8 @@
-"""certify(): a trajectory, a vehicle and its environment in, a proof or its refutation out.
+"""Certification: prove or refute that a vehicle can fly a trajectory in its environment.
 
-Three steps: `subdivision` cuts the trajectory into pieces on which interpolation is proven to be accurate,
-`attitude` carries the frame along them, and `enclosure` bounds the extrema of the interpolants. DERIVATION.md
-beside this file says why that is a proof.
+`subdivision` cuts the trajectory into pieces on which interpolation is proven to be accurate, `attitude`
+carries the frame along them, and `enclosure` bounds the extrema of the interpolants. DERIVATION.md beside
+this file has the proof.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.ellipsoid import Revolved
 
-INTERPOLATION_DEGREE = 20  # of interpolation
+INTERPOLATION_DEGREE = 20  # smallest degree of interpolation
 
 
 @validated
@@ -63,26 +63,28 @@ def certify(
 ) -> Certificate:
     """Prove that a vehicle can fly a trajectory within its limits at every instant, or refute it.
 
-    Quantities are those of `flatness.reference`: the thrust of every rotor and their
-    sum, tilt, body rate, moment and speed, per axis what `envelope.limits` bounds, and what
-    `envelope.conditions` do; of a rotor with lag the command too, and what `envelope.passages` ask at their
-    instants; among obstacles the clearance of the whole body, in all angles about its thrust axis at once.
-    Bounds are proven over continuous time, rounding included. A limit nearer than about 1e-7 of a rotor's
-    range (1e-5 after tens of seconds, and of a command) stays undecided, and of clearance one nearer than
-    1e-6 m. So does all that needs an attitude where thrust, and with it the attitude, is undetermined. Speed
-    and what `envelope.limits` and `envelope.conditions` bound may meet their limits exactly
-    (`path.kinematics.LIMIT_TOLERANCE`).
-    Dead rotors are left out, and the others counted without them. Raises SpecError for derivatives beyond all
-    reason, and for a vehicle that its dead rotors leave without control.
+    The quantities are those of `flatness.reference`: the thrust of every rotor and their sum, tilt, body
+    rate, moment, speed, and everything that `envelope.limits` and `envelope.conditions` bound. For a rotor
+    with lag the command is bounded too. What `envelope.passages` require is checked at their instants. Among
+    obstacles the clearance of the whole body is bounded, for all angles about its thrust axis at once.
+
+    Bounds are proven over continuous time, rounding included. Margins below about 1e-7 of a rotor's range
+    stay undecided (1e-5 after tens of seconds, and for commands), as do clearances below 1e-6 m. All
+    quantities that need an attitude stay undecided where thrust vanishes and leaves the attitude
+    undetermined. Speed, and the quantities of `envelope.limits` and `envelope.conditions`, may reach their
+    limits exactly (`path.kinematics.LIMIT_TOLERANCE`).
+
+    Dead rotors are left out, and the others are numbered without them. SpecError is raised for unreasonably
+    large derivatives, and for a vehicle that is not controllable without its dead rotors.
 
     Args:
-        trajectory: The path [m] over time [s], world, and its heading [rad]; of a plan its path alone, what
-            its problem asks beside is proven in `plan.certificate`.
-        vehicle: What flies it, or its name, by default the plan's; its rotors' limits [N] and its body rate's
-            [rad/s] are those that count.
+        trajectory: The path [m] over time [s], world, and its heading [rad]; of a plan only its path. All
+            that a plan's problem requires is proven in `plan.certificate`.
+        vehicle: The vehicle that flies it, or its name, by default the plan's; its rotors' limits [N] and its
+            body rate limit [rad/s] are those that count.
         environment: Gravity, wind and obstacles, by default the plan's, else those of a calm day on Earth.
             Drag acts on the velocity relative to the wind; speed and its limit are relative to the ground.
-        envelope: What else it shall stay within, by default nothing.
+        envelope: Further limits, by default none.
     """
     envelope = Envelope() if envelope is None else envelope
     whole = vehicle_of(trajectory, vehicle)
@@ -123,7 +125,7 @@ def certify(
 def _series(
     curve: ThrustCurve, found: Subdivision, columns: SeriesColumns
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
-    """All quantities along the pieces, if there are any, and where unequal drag leaves the attitude open."""
+    """Return all quantities along the pieces, or None, and where unequal drag leaves the attitude open."""
     whole = not found.vanishing
     if not len(found.pieces):
         return None, ()
@@ -135,7 +137,7 @@ def _series(
 def _bodies(
     curve: ThrustCurve, series: ChebyshevSeries | None, body: Revolved
 ) -> tuple[BodyPath | None, BodyPath]:
-    """The body in its attitude, where one is ever known, and as a ball on the rest of the path.
+    """Return the body in its attitude, where one is known, and as a ball on the rest of the path.
 
     Args:
         curve: What is flown.
@@ -149,12 +151,12 @@ def _bodies(
 
 
 def _is_of_thrust(limit: Limit, conditions: Sequence[Condition]) -> bool:
-    """True of what conditions on the specific thrust ask, of unequal drag not linear in the path."""
+    """Return True for conditions on the specific thrust, which unequal drag makes nonlinear in the path."""
     return limit.name in {x.name for x in conditions if x.quantity is Quantity.SPECIFIC_THRUST}
 
 
 def _is_stated(limit: Limit) -> bool:
-    """True of limits on what a certificate states anyway: plain thrusts of rotors, tilt and body rate."""
+    """Return True for limits that a certificate always states: plain rotor thrusts, tilt and body rate."""
     used = limit.quantity.measures
     is_thrust = limit.rotor is not None and max(used) < WRENCH.stop
     return is_thrust or used in ((UPRIGHT,), (BODY_RATE,))
@@ -163,7 +165,7 @@ def _is_stated(limit: Limit) -> bool:
 def _queries(
     vehicle: Vehicle, envelope: Envelope, limits: Sequence[Limit], columns: SeriesColumns
 ) -> list[ExtremumQuery]:
-    """The extrema that a certificate states.
+    """Return the queries for the extrema that a certificate states.
 
     Args:
         vehicle: What flies, with n rotors.
@@ -191,7 +193,7 @@ def _queries(
 
 
 def _nearest(query: ExtremumQuery, limits: Sequence[tuple[float, Limit]]) -> ExtremumQuery:
-    """The query with the least of its own limit and of others, each with what it is an end of."""
+    """Return the query with the tightest of its own limit and others, and the source of that limit."""
     least, source = min(limits, key=lambda pair: pair[0], default=(inf, None))
     return query if query.limit <= least else replace(query, limit=least, source=source)
 
@@ -199,7 +201,7 @@ def _nearest(query: ExtremumQuery, limits: Sequence[tuple[float, Limit]]) -> Ext
 def interpolated(
     curve: ThrustCurve, pieces: Subintervals, everywhere: bool, columns: SeriesColumns | None = None
 ) -> ChebyshevSeries:
-    """All quantities along pieces that follow each other, in the frame that is carried along them.
+    """Return all quantities along consecutive pieces, in the frame without spin that is carried along them.
 
     Args:
         curve: What is flown, without unequal drag.
@@ -217,7 +219,7 @@ def interpolated(
     omega, omega_dot = rates.body(angle) if yaw is None else rates.turning(angle, yaw)
     sums = curve.sums[pieces.interval]
     bound = accuracy(curve.norms(series, pieces), seconds, sums, vehicle, curve.turns(pieces))
-    # errors of the frame's angle add up from piece to piece
+    # errors of the frame's angle accumulate from piece to piece
     own_error = (bound.twist_remainder + basis.lebesgue * bound.twist_rounding)[:, None]
     angle_error = np.cumsum(own_error, axis=0)
     error = bound.remainder + basis.lebesgue * (bound.rounding + angle_error * bound.per_radian)
@@ -225,7 +227,7 @@ def interpolated(
     errors = [error]
     if columns.derived:
         per_second, thrusts = 2 / seconds[:, None], found[0][..., : len(vehicle.rotors)]
-        # what is interpolated is off by so much, and its derivative by what that makes of it
+        # error of the interpolated values, which differentiation amplifies
         noise = bound.rounding + own_error * bound.per_radian
         noise += SUMMATION_ROUNDING * np.abs(found[0]).sum(axis=1)
         rate_error = bound.rate_remainder + (angle_error - own_error) * bound.rate_per_radian
@@ -233,7 +235,7 @@ def interpolated(
         weights = _weights(columns.derived, vehicle)
         found.append(_derived(weights, found[0], per_second[..., None] * (basis.derivative @ thrusts)))
         errors.append(_derived([np.abs(each) for each in weights], error, rate_error))
-    if columns.with_axis:  # each component as exact as that along z
+    if columns.with_axis:  # each component is as exact as the one along z
         thrust = values[:, :, 1]
         found.append(basis.analysis @ (thrust / np.linalg.norm(thrust, axis=-1, keepdims=True)))
         errors.append(np.tile(error[:, len(vehicle.rotors) + 1, None], 3))
@@ -242,9 +244,10 @@ def interpolated(
 
 
 def _derived(weights: Sequence[Array], values: Array, rates: Array) -> Array:
-    """What derived limits are about, or how far it is off, from `quantities.values` and their derivatives.
+    """Return the quantities of derived limits, or their errors, from `quantities.values` and derivatives.
 
-    A wrench is what the rotors' thrusts make, so that whatever is linear in it is linear in them.
+    A wrench is linear in the rotors' thrusts, so quantities that are linear in the wrench are linear in the
+    thrusts.
 
     Args:
         weights: Of `_weights`; for errors their absolute values.
@@ -259,13 +262,13 @@ def _derived(weights: Sequence[Array], values: Array, rates: Array) -> Array:
 
 
 def _weights(derived: Sequence[Limit], vehicle: Vehicle) -> tuple[Array, Array, Array]:
-    """What D limits weigh n rotors' thrusts by, their derivatives, (n, D) each, and cos tilt by, (D,)."""
+    """Return the weights of D limits on n thrusts and on their derivatives, (n, D) each, and on cos tilt."""
     plain, change = np.array([_on_rotors(limit, vehicle) for limit in derived]).transpose(1, 2, 0)
     return plain, change, np.array([limit.quantity.measured[UPRIGHT] for limit in derived])
 
 
 def _on_rotors(limit: Limit, vehicle: Vehicle) -> tuple[Array, Array]:
-    """A limit's weights on the rotors' thrusts and on their derivatives, (n,) each."""
+    """Return a limit's weights on the rotors' thrusts and on their derivatives, (n,) each."""
     wrench, rate = limit.quantity.measured[WRENCH], limit.quantity.measured[WRENCH_RATE]
     if limit.rotor is None:
         return wrench @ vehicle.allocation, rate @ vehicle.allocation

@@ -1,19 +1,19 @@
-"""Clearance of a body from all obstacles over continuous time: the least gap, enclosed.
+"""Clearance of a body from all obstacles over continuous time: a proven enclosure of the smallest gap.
 
-Planes that are normal to a unit vector n leave a gap between an obstacle's piece and the body. With u = n·b3
-and s(u) = √(wide² − (wide² − high²) u²) the gap is
+Two parallel planes with unit normal n leave a gap between an obstacle's piece and the body. With u = n·b3 and
+s(u) = √(wide² − (wide² − high²) u²) the gap is
 
     φ(n) = n·p + up u − s(u) − aside − h(n).
 
-It is a lower bound of the distance, whichever n is taken. s is concave where wide ≥ high, so its tangent is
-above it. With the tangent in place of s, φ is linear in position p and thrust axis b3, whose Chebyshev series
-are known. Branch and bound looks at parts of the path, each beside one piece. It takes n at the middle of a
-part and bounds φ along the part. What may yet be nearer than the nearest that was found is cut into shorter
-parts. DERIVATION.md, section 9, has the details.
+For every n the gap is a lower bound of the distance. s is concave where wide ≥ high, so its tangent is an
+upper bound of s. With the tangent in place of s, φ is linear in position p and thrust axis b3, whose
+Chebyshev series are known. Branch and bound considers pairs of a part of the path and one piece. It chooses n
+at the middle of the part and bounds φ along the part. Pairs that may still be nearer than the nearest gap
+found are halved. DERIVATION.md, section 9, has the details.
 
-As flights are judged, a gate's frame is its plane around the opening, without an end and as thin as nothing.
-It counts while the body, or its centre within PASSAGE_DEPTH, is at that plane without a break, near enough to
-touch the circle about the opening.
+A gate's frame is treated as in the scores of flights: the plane around the opening, infinitely wide and thin.
+It counts during the passage: while the body, or its centre within PASSAGE_DEPTH, is at that plane without a
+break, near enough to touch the circle around the opening.
 """
 
 from __future__ import annotations
@@ -36,35 +36,35 @@ from aerobat.problem import Gate
 from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.trajectory.subintervals import Subintervals
 
-CLEARANCE_TIGHTNESS = 3e-4  # [m] how near the proven bound is to what is reached
-NEAR_TIGHTNESS = 0.5  # of a smaller gap, how near it is there
-OVERLAP_TIGHTNESS = 0.02  # of an overlap's depth, how near it is there
-FINEST_TIGHTNESS = 1e-6  # [m]
-FIRST = 64  # obstacles that are looked at before others: any small gap spares many
-HALVINGS = 3  # of a part at a time: separating costs little more for a hundred pairs than for one
-ROUNDS = 14
-MAX_OPEN = 20_000  # pairs at a time beside those at first; no path is known to need a tenth of it
+CLEARANCE_TIGHTNESS = 3e-4  # [m] largest distance between the proven bound and the smallest gap found
+NEAR_TIGHTNESS = 0.5  # the same as a fraction of the gap, where that is smaller
+OVERLAP_TIGHTNESS = 0.02  # the same as a fraction of the depth of an overlap, where that is larger
+FINEST_TIGHTNESS = 1e-6  # [m] smallest distance asked for
+FIRST = 64  # obstacles considered first: any small gap found prunes many others
+HALVINGS = 3  # halvings between two searches for planes: a hundred pairs cost little more than one
+ROUNDS = 14  # rounds of searching planes and halving
+MAX_OPEN = 20_000  # limit of the pairs besides the initial ones; no known path needs a tenth of it
 
 
 @dataclass(frozen=True)
 class LeastGap:
-    """The least gap between a body and obstacles, enclosed."""
+    """The smallest gap between a body and obstacles, enclosed between `value` and `bound`."""
 
     value: float = inf  # [m] reached at `time`
-    bound: float = inf  # [m] proven: nowhere less
+    bound: float = inf  # [m] proven: the gap is nowhere smaller
     time: float = 0.0  # [s]
-    obstacle: str | None = None  # the nearest at that time
+    obstacle: str | None = None  # the nearest obstacle at that time
 
     @property
     def enough(self) -> float:
-        """The bound [m] from which on nothing is looked at more closely."""
+        """The bound [m] at which the enclosure is tight enough."""
         if self.value < 0.0:
             return self.value - max(-OVERLAP_TIGHTNESS * self.value, CLEARANCE_TIGHTNESS)
         return self.value - min(max(NEAR_TIGHTNESS * self.value, FINEST_TIGHTNESS), CLEARANCE_TIGHTNESS)
 
 
 def clearance_finding(attitude: BodyPath | None, ball: BodyPath, pieces: Pieces) -> Finding:
-    """Return the finding about the least gap between a body and obstacles.
+    """Return the finding about the smallest gap between a body and obstacles.
 
     Args:
         attitude: The body where its attitude is determined, if it is anywhere.
@@ -77,7 +77,7 @@ def clearance_finding(attitude: BodyPath | None, ball: BodyPath, pieces: Pieces)
     nearest, verdict = min(known, around, key=lambda gap: gap.value), Verdict.UNDECIDED
     if bound >= 0.0:
         verdict = Verdict.HOLDS
-    elif known.value < 0.0:  # whereas a ball that overlaps says nothing of the body in it
+    elif known.value < 0.0:  # where only the ball overlaps, the body inside it may still be clear
         nearest, verdict = known, Verdict.VIOLATED
     value = max(nearest.value, bound)  # where bodies overlap, another plane may separate them better
     found = Finding("clearance", "m", Side.MIN, value, bound, nearest.time, 0.0, verdict)
@@ -87,7 +87,7 @@ def clearance_finding(attitude: BodyPath | None, ball: BodyPath, pieces: Pieces)
 def frame_findings(
     attitude: BodyPath | None, ball: BodyPath, passages: Sequence[PlannedPassage]
 ) -> list[Finding]:
-    """The findings about the body's least gap from the frame of each gate as it passes.
+    """Return the findings about the body's smallest gap from the frame of each gate during its passage.
 
     Args:
         attitude: The body where its attitude is determined, if it is anywhere.
@@ -98,7 +98,7 @@ def frame_findings(
 
 
 def _clear(attitude: BodyPath | None, ball: BodyPath, passage: PlannedPassage) -> Finding:
-    """The finding about one passage."""
+    """Return the finding about one passage."""
     gate, reach = passage.gate, ball.body.reach
     around = gate.opening.circumradius + reach
     paths = [path for path in (attitude, ball) if path is not None]
@@ -111,7 +111,7 @@ def _clear(attitude: BodyPath | None, ball: BodyPath, passage: PlannedPassage) -
 
 
 def _away(path: BodyPath, gate: Gate, around: float) -> Array:
-    """Instants [s] at which the body on a path is not about a gate's opening, within `around` [m] of it."""
+    """Return instants [s] at which the body is not at a gate's plane within `around` [m] of its centre."""
     times, centres, axes = path.sampled
     offset = centres - gate.places(times)
     height, along = offset @ gate.normal, axes @ gate.normal
@@ -122,7 +122,7 @@ def _away(path: BodyPath, gate: Gate, around: float) -> Array:
 
 
 def least_gap(path: BodyPath, pieces: Pieces) -> LeastGap:
-    """Enclose the least gap between a body on its path and any of the pieces; infinite for no path."""
+    """Enclose the smallest gap between a body on its path and the pieces; infinite for an empty path."""
     if not len(path.pieces):
         return LeastGap()
     centres, radii = path.balls
@@ -142,13 +142,13 @@ def least_gap(path: BodyPath, pieces: Pieces) -> LeastGap:
         found, pairs = pairs.left_open(found)
         if not 0 < len(pairs) <= most:
             break
-    # bounds of what is open hold, if not tightly
+    # bounds of pairs that are still open are valid, but may not be tight
     return replace(found, bound=float((pairs.lower - pairs.error).min(initial=found.bound)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """Parts of a path, each beside a piece of an obstacle, with a plane that touches that piece."""
+    """Pairs of a part of a path and a piece of an obstacle, with a plane that touches the piece."""
 
     path: BodyPath
     pieces: Pieces
@@ -160,7 +160,7 @@ class _Beside:
 
     @classmethod
     def of(cls, path: BodyPath, pieces: Pieces, rows: Indices, obstacles: Indices) -> _Beside:
-        """Whole pieces of a path, before planes are known."""
+        """Return pairs of whole pieces of a path and obstacles, before planes are known."""
         parts, count = Subintervals.whole(len(path.pieces))[rows], len(rows)
         return cls(path, pieces, parts, path.series[rows], obstacles, np.zeros((count, 3)), np.zeros(count))
 
@@ -179,24 +179,25 @@ class _Beside:
         )
 
     def halves(self) -> _Beside:
-        """Both halves of every part, beside the same planes."""
+        """Return both halves of every part, with the same planes."""
         halves = chebyshev.basis(self.series.shape[1] - 1).halves
         series = np.concatenate([half @ self.series for half in halves])
         twice = np.tile(np.arange(len(self)), 2)
         return replace(self[twice], parts=self.parts.halves(), series=series)
 
     def separated(self) -> _Beside:
-        """The same pairs with the planes that separate best in the middle of the parts."""
+        """Return the same pairs with the planes that separate best at the middle of the parts."""
         centres, axes = np.split(_in_the_middle(self._relative), 2, axis=-1)
         arms, shapes = self.path.body.turned(axes / np.linalg.norm(axes, axis=-1, keepdims=True))
         planes = self.pieces.separated(self.obstacles, centres + arms, shapes)
         found = replace(self, normals=planes.normals, offsets=planes.offsets)
-        worse = self.normals.any(axis=-1) & (found.middle < self.middle)  # of bodies that overlap
+        # the new plane may be worse where bodies overlap
+        worse = self.normals.any(axis=-1) & (found.middle < self.middle)
         normals = np.where(worse[:, None], self.normals, planes.normals)
         return replace(self, normals=normals, offsets=np.where(worse, self.offsets, planes.offsets))
 
     def nearest(self, known: LeastGap) -> LeastGap:
-        """The least gap in the middle of a part where that is less than the one known, which else stays."""
+        """Return the smallest gap at the middle of a part, or `known` where that is not larger."""
         gaps = self.middle + self.error
         row = int(np.argmin(gaps)) if len(gaps) else 0
         if not len(gaps) or gaps[row] >= known.value:
@@ -206,25 +207,25 @@ class _Beside:
         return replace(known, value=float(gaps[row]), time=time, obstacle=name)
 
     def left_open(self, found: LeastGap) -> tuple[LeastGap, _Beside]:
-        """Return what is found with the bound of all pairs that are far enough, and the other pairs."""
+        """Return `found` with the bound of all pairs that are far enough, and the remaining pairs."""
         near = self.lower < found.enough
         bound = (self.lower - self.error)[~near].min(initial=found.bound)
         return replace(found, bound=float(bound)), self[near]
 
     @cached_property
     def middle(self) -> Array:
-        """The gaps across the planes in the middle of the parts, but for errors [m], (m,)."""
+        """The gaps [m] at the middle of the parts, without errors, (m,)."""
         return _in_the_middle(self._linear)
 
     @cached_property
     def lower(self) -> Array:
-        """Bounds of the gaps along the parts, but for errors [m], (m,)."""
+        """Lower bounds of the gaps [m] along the parts, without errors, (m,)."""
         peak, tail, _ = parabola_maximum(-self._linear)
         return np.asarray(-peak - tail - self._bend)
 
     @cached_property
     def error(self) -> Array:
-        """Of bounds and gaps, at most [m], (m,)."""
+        """The largest error [m] of `middle` and `lower`, (m,)."""
         position, axis = self.path.error[self.parts.interval].T
         bent = self._moved[2]
         summed = np.abs(self._linear).sum(axis=1) + np.abs(self.offsets) + self.pieces.largest
@@ -233,7 +234,7 @@ class _Beside:
 
     @cached_property
     def _relative(self) -> Array:
-        """The series beside pieces that stay where they are at first."""
+        """The series relative to the pieces, whose motion along each part is approximated by a line."""
         if not self.pieces.moving:
             return self.series
         middle, slope, _ = self._moved
@@ -244,7 +245,10 @@ class _Beside:
 
     @cached_property
     def _moved(self) -> tuple[Array, Array, Array]:
-        """How pieces move, m + s τ along the parts, τ in [−1, 1] [m], (m, 3) each; but for so much, (m,)."""
+        """Motion of the pieces [m], as m + s τ along the parts with τ in [−1, 1].
+
+        Return m and s, (m, 3) each, and the largest distance of the true motion from that line, (m,).
+        """
         begin, end = self._times(-1.0), self._times(1.0)
         first, last = self.pieces.moved(self.obstacles, begin), self.pieces.moved(self.obstacles, end)
         bent = np.zeros(len(self))
@@ -259,7 +263,7 @@ class _Beside:
         return (first + last) / 2.0, (last - first) / 2.0, bent
 
     def _times(self, position: float) -> Array:
-        """The times [s] of a position in [-1, 1] on each part, (m,)."""
+        """Return the times [s] of a position in [-1, 1] on each part, (m,)."""
         along = 2 * self.parts.start + self.parts.length * (1 + position) - 1
         return self.path.pieces[self.parts.interval].times(self.path.trajectory, along)
 
@@ -272,7 +276,7 @@ class _Beside:
 
     @cached_property
     def _tangents(self) -> tuple[Array, Array, Array]:
-        """u in the middle, and s [m] and its slope [m] there, (m,) each."""
+        """The values of u, of s [m] and of its slope [m] at the middle of the parts, (m,) each."""
         body = self.path.body
         cosine = np.clip(_in_the_middle(self._along[1]), -1.0, 1.0)
         difference = body.wide**2 - body.high**2
@@ -281,7 +285,7 @@ class _Beside:
 
     @cached_property
     def _linear(self) -> Array:
-        """The series of φ [m] with the tangent of s in its place, (m, K + 1)."""
+        """The series of φ [m] with s replaced by its tangent, (m, K + 1)."""
         (position, turning), (cosine, reached, slope) = self._along, self._tangents
         series = position + self._lever[:, None] * turning
         series[:, 0] += slope * cosine - reached - self.path.body.aside - self.offsets
@@ -289,12 +293,12 @@ class _Beside:
 
     @property
     def _lever(self) -> Array:
-        """What a change of u does to φ [m], (m,)."""
+        """The derivative of φ with respect to u [m], (m,)."""
         return np.asarray(self.path.body.up - self._tangents[2])
 
     @property
     def _bend(self) -> Array:
-        """By how much s is above its tangent along the parts, at most [m], (m,): 0 where wide ≥ high."""
+        """The largest excess of s over its tangent [m] along the parts, (m,); 0 where wide ≥ high."""
         body, turning = self.path.body, self._along[1]
         beyond = np.abs(turning[:, 0] - self._tangents[0]) + np.abs(turning[:, 1:]).sum(axis=1)
         beyond += self.path.error[self.parts.interval, 1]
@@ -302,6 +306,6 @@ class _Beside:
 
 
 def _in_the_middle(series: Array) -> Array:
-    """What series (m, K + 1, ...) are in the middle of their intervals, (m, ...)."""
+    """Return the values of series (m, K + 1, ...) at the middle of their intervals, (m, ...)."""
     signs = np.cos(np.pi / 2 * np.arange(series.shape[1])).round()
     return np.asarray(np.tensordot(signs, series, (0, 1)))

@@ -1,6 +1,7 @@
-"""Jumps between segments: of what forces and moments make, only thrust's norm and the moments may.
+"""Jumps between segments that no finite force or moment can produce.
 
-Where rotors lag behind their commands, their thrusts may not either.
+Only the norm of the thrust and the moments may jump. Where rotors have lag, their thrusts may not jump
+either.
 """
 
 from __future__ import annotations
@@ -24,19 +25,20 @@ from aerobat.flatness.unequal_drag import UnequalDrag
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.vehicle import Vehicle
 
-NEGLIGIBLE_JUMP = 1e-6  # of the largest value at knots: less than any controller or solver can tell
-NEGLIGIBLE_SEAM = 1e-6  # of the largest value, rad, or of 1 rad/s, where a lap closes
-# of a rotor's range: the steps of a pulse of 1000 to 2000 µs, as motors take commands
+NEGLIGIBLE_JUMP = 1e-6  # of the largest value at knots; no controller or solver resolves less
+NEGLIGIBLE_SEAM = 1e-6  # of the largest value, or of 1 rad or 1 rad/s, where a lap closes
+# of a rotor's range: the resolution of motor commands, pulses of 1000 to 2000 µs
 COMMAND_RESOLUTION = 1 / 1000
-CANCELLATION = 1e3  # units in the last place of the largest coefficient that fitting a segment may cost
+CANCELLATION = 1e3  # rounding error of fitted segments, in units in the last place of the largest coefficient
 
 
 def discontinuities(
     curve: ThrustCurve, floor: float, found: ChebyshevSeries | None
 ) -> tuple[Discontinuity, ...]:
-    """The jump of lowest order at every inner knot where one cannot be flown; directions above the floor.
+    """Return the jump of lowest order at every inner knot with one that cannot be flown.
 
-    Rates are compared as b3' in the world: with b3 the same on both sides that is the body rates' jump.
+    Thrust directions are compared where the thrust is above the floor. Rates are compared as b3' in the world
+    frame: where b3 is continuous, its jump is that of the body rate.
 
     Args:
         curve: What is flown.
@@ -77,7 +79,7 @@ def discontinuities(
 
 
 def _yaw_checks(curve: ThrustCurve) -> Iterator[tuple[str, str, Array, float, Array]]:
-    """The jumps of yaw and its rate at inner knots, with what is negligible, everywhere."""
+    """Yield the jumps of yaw and its rate at inner knots, with their tolerance."""
     for name, unit, yaw in zip(("attitude", "body rate"), ("rad", "rad/s"), curve.yaw, strict=False):
         ends = polynomial.evaluate(yaw[:, None], np.array([0.0, 1.0]))
         size = max(1.0, float(np.abs(ends).max()))
@@ -85,10 +87,10 @@ def _yaw_checks(curve: ThrustCurve) -> Iterator[tuple[str, str, Array, float, Ar
 
 
 def _unequal_directions(curve: ThrustCurve, ends: Array) -> tuple[Array, Array]:
-    """The thrust axis and its derivative by what both sides of a knot ask in one attitude, (S, 2, 3) each.
+    """Return the thrust axis and its derivative that each side of a knot requires, (S, 2, 3) each.
 
-    With drag that differs along body x and y, in that body's axes b3 = (α_x/α_z, β_y/β_z, 1) to first order
-    and b3' = (α'_x/α_z, β'_y/β_z, 0).
+    Both sides are evaluated in one attitude. With drag that differs along body x and y, in body axes b3 =
+    (α_x/α_z, β_y/β_z, 1) to first order and b3' = (α'_x/α_z, β'_y/β_z, 0).
 
     Args:
         curve: What is flown.
@@ -109,9 +111,9 @@ def _unequal_directions(curve: ThrustCurve, ends: Array) -> tuple[Array, Array]:
 
 
 def seam(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> tuple[Discontinuity, ...]:
-    """Return the first jump from the end to the start of a lap that is flown over and over, if there is one.
+    """Return the first jump from the end to the start of a lap that is flown repeatedly, if there is one.
 
-    Attitudes are compared whole: a body that is carried around without spin may come back turned.
+    Full attitudes are compared: a body carried around the lap without spin may return rotated.
 
     Args:
         trajectory: The lap.
@@ -138,7 +140,9 @@ def seam(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> 
 
 
 def _thrust_jumps(curve: ThrustCurve, ends: Array, min_thrust: Array, found: ChebyshevSeries | None) -> Array:
-    """The largest jump [N] of a lagging rotor's thrust at each inner knot, (S - 1,); zero if negligible.
+    """Return the largest jump [N] of a lagging rotor's thrust at each inner knot, (S - 1,).
+
+    Jumps below the tolerance count as zero.
 
     Args:
         curve: What is flown.
@@ -159,7 +163,7 @@ def _thrust_jumps(curve: ThrustCurve, ends: Array, min_thrust: Array, found: Che
 
 
 def _thrust_tolerances(curve: ThrustCurve, ends: Array, min_thrust: Array) -> Array:
-    """The jumps of the rotors' thrusts that rounding makes or commands are too coarse for, (S - 1, n)."""
+    """Return the rotor thrust jumps that rounding or the resolution of commands explains, (S - 1, n)."""
     off = [_tolerance(curve.trajectory, ends[:, :, k], k + 1) for k in range(4)]
     norms = np.linalg.norm(ends, axis=-1)
     speed, thrust, jerk, snap = np.maximum(norms[1:, 0], norms[:-1, 1]).T
@@ -171,12 +175,12 @@ def _thrust_tolerances(curve: ThrustCurve, ends: Array, min_thrust: Array) -> Ar
 
 
 def _jump(ends: Array) -> Array:
-    """Norm of the jump at each inner knot of values at both ends of segments, (S, 2, 3) -> (S - 1,)."""
+    """Return the norms of the jumps at inner knots (S - 1,) of values at segment ends (S, 2, 3)."""
     return np.asarray(np.linalg.norm(ends[1:, 0] - ends[:-1, 1], axis=-1))
 
 
 def _tolerance(trajectory: Trajectory, ends: Array, derivative: int) -> Array:
-    """Largest jump of `ends` (S, 2, 3) that rounding may make, at each inner knot, (S - 1,)."""
+    """Return the largest jump of `ends` (S, 2, 3) that rounding explains, at each inner knot, (S - 1,)."""
     largest = np.abs(trajectory.coefficients).max(axis=(1, 2))
     steepness = math.perm(trajectory.degree, derivative) / trajectory.durations**derivative
     rounding = CANCELLATION * np.finfo(float).eps * largest * steepness

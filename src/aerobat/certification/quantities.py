@@ -1,7 +1,7 @@
 """Certified quantities: rotor thrusts, collective thrust, tilt, body rate and moment, as analytic functions.
 
-Magnitudes are squared and the tilt is taken by its cosine, so that no kink spoils interpolation; an
-`ExtremumQuery` turns them into what people read.
+Magnitudes are squared and the tilt is replaced by its cosine, because interpolation needs smooth functions.
+An `ExtremumQuery` converts them back.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from aerobat.vehicle import Vehicle, mixer, rotor_thrusts
 
 @dataclass(frozen=True)
 class MagnitudeBounds:
-    """Bounds of, or errors in, what the quantities are made of; all (...)."""
+    """Bounds or errors of the arguments of the quantities; all (...)."""
 
     thrust: Array  # [N]
     cos_tilt: Array  # [-]
@@ -27,7 +27,7 @@ class MagnitudeBounds:
 
 
 def values(vehicle: Vehicle, curve: Array, omega: Array, omega_dot: Array) -> Array:
-    """Rotor thrusts, collective thrust, cos tilt, |ω|², |M|², (..., n + 4).
+    """Return rotor thrusts, collective thrust, cos tilt, |ω|², |M|², (..., n + 4).
 
     Args:
         vehicle: What flies, with n rotors.
@@ -44,14 +44,14 @@ def values(vehicle: Vehicle, curve: Array, omega: Array, omega_dot: Array) -> Ar
 
 
 def bounds(vehicle: Vehicle, magnitudes: MagnitudeBounds) -> Array:
-    """The largest absolute values that `values` can have for arguments of these magnitudes, (..., n + 4)."""
+    """Return upper bounds of |`values`| for arguments of these magnitudes, (..., n + 4)."""
     moment = _moment(vehicle, magnitudes)
     squares = magnitudes.omega**2, moment**2
     return _stacked(vehicle, magnitudes.thrust, moment, magnitudes.cos_tilt, *squares)
 
 
 def errors(vehicle: Vehicle, magnitudes: MagnitudeBounds, of: MagnitudeBounds) -> Array:
-    """Errors of `values`, (..., n + 4), for arguments of these magnitudes that have small errors `of`."""
+    """Return the errors of `values`, (..., n + 4), for small errors `of` in arguments of these magnitudes."""
     moment = _inertia(vehicle) * (of.omega_dot + 2 * magnitudes.omega * of.omega)
     squares = 2 * magnitudes.omega * of.omega, 2 * _moment(vehicle, magnitudes) * moment
     return _stacked(vehicle, of.thrust, moment, of.cos_tilt, *squares)
@@ -59,7 +59,7 @@ def errors(vehicle: Vehicle, magnitudes: MagnitudeBounds, of: MagnitudeBounds) -
 
 @lru_cache(maxsize=128)
 def scales(vehicle: Vehicle) -> Array:
-    """Magnitudes that count as large, (n + 4,): the rotors' ranges and the moments that use them up."""
+    """Return values that count as large, (n + 4,): the rotors' ranges and the moments that use them up."""
     ranges = vehicle.thrust_ranges
     moment = float((ranges / np.linalg.norm(mixer(vehicle)[:, 1:], axis=1)).max())
     return frozen([*ranges, ranges.sum(), 0.01, 1.0, moment**2], "scales")
@@ -79,5 +79,5 @@ def _moment(vehicle: Vehicle, magnitudes: MagnitudeBounds) -> Array:
 
 @lru_cache(maxsize=128)
 def _inertia(vehicle: Vehicle) -> float:
-    """The largest principal moment of inertia."""
+    """Return the largest principal moment of inertia."""
     return float(np.linalg.norm(vehicle.inertia, 2))

@@ -1,4 +1,4 @@
-"""Cutting a trajectory into pieces on which interpolation is provably as good as exact."""
+"""Subdivision of a trajectory into pieces on which the interpolation error is negligible."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.flatness import TimeInterval
 from aerobat.trajectory.subintervals import Subintervals
 
-MAX_REMAINDER = 1e-8  # of its scale: what interpolation may leave open of a quantity
-MAX_COMMAND_REMAINDER = 1e-7  # and of a command, of a derivative of what is interpolated
-MIN_DURATION = 1e-8  # [s], a piece that is not cut further
-MAX_PIECES = 20_000  # at a time, beside four a segment; no flight needs so many
+MAX_REMAINDER = 1e-8  # largest interpolation error of a quantity, relative to its scale
+MAX_COMMAND_REMAINDER = 1e-7  # the same for a command, which contains a derivative of the interpolant
+MIN_DURATION = 1e-8  # [s] shorter pieces are not cut further
+MAX_PIECES = 20_000  # limit of the pieces at a time, besides four a segment; no known flight needs as many
 
 
 @dataclass(frozen=True)
 class Subdivision:
-    """The pieces of a curve in their order, and what is left of it."""
+    """The pieces of a curve in order, and the intervals that are left out."""
 
     pieces: Subintervals
     vanishing: tuple[TimeInterval, ...]  # where |f| is below the floor
@@ -31,7 +31,7 @@ class Subdivision:
 def subdivide(curve: ThrustCurve, floor: float) -> Subdivision:
     """Halve segments until |f| >= floor [m/s²] and interpolation is accurate on each piece.
 
-    What stays below the floor, or cannot be told from it, is left out.
+    Pieces below the floor, or too close to it to decide, are left out.
     """
     count = curve.trajectory.segments
     pending = Subintervals.whole(count)
@@ -65,7 +65,7 @@ def _accurate(curve: ThrustCurve, pieces: Subintervals, norms: Array) -> NDArray
 
 
 def _time_intervals(curve: ThrustCurve, pieces: Subintervals) -> tuple[TimeInterval, ...]:
-    """The intervals that pieces in order make up together."""
+    """Return the intervals covered by consecutive pieces."""
     if not len(pieces):
         return ()
     start, end = pieces.spans(curve.trajectory)

@@ -1,4 +1,4 @@
-"""Airspeed and specific thrust along a trajectory: what all certified quantities are made of."""
+"""Airspeed and specific thrust along a trajectory, from which all certified quantities are computed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle
 
-MAX_DERIVATIVE = 1e30  # [m/s^k] up to crackle; a larger one cannot be meant, and powers of it might overflow
+# [m/s^k] up to crackle; larger values are input errors, and their powers might overflow
+MAX_DERIVATIVE = 1e30
 
 
 @dataclass(frozen=True)
@@ -29,15 +30,18 @@ class ThrustCurve:
     vehicle: Vehicle
     environment: Environment
     rates: Array  # velocity to snap in powers of normalised time, (S, K, 12)
-    sums: Array  # sums of the absolute values of what v, f, f', f'' are summed from, (S, 4)
+    sums: Array  # sums of absolute values of the terms of v, f, f', f'', (S, 4)
     basis: chebyshev.Basis
-    yaw: tuple[Array, ...]  # and its two derivatives, in powers of normalised time, (S, any, 1); () without
+    # yaw and two derivatives, in powers of normalised time, (S, any, 1); () without yaw
+    yaw: tuple[Array, ...]
 
     @classmethod
     def of(
         cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, degree: int
     ) -> ThrustCurve:
-        """The curve of a vehicle on a trajectory. Raises SpecError for derivatives beyond all reason.
+        """Return the curve of a vehicle on a trajectory.
+
+        Raise SpecError for unreasonably large derivatives.
 
         Args:
             trajectory: The path; its heading does not matter here, its yaw does.
@@ -62,7 +66,7 @@ class ThrustCurve:
         return cls(trajectory, vehicle, environment, flat, sums, basis, turned)
 
     def at(self, segment: NDArray[np.intp], s: Array) -> Array:
-        """v, f, f', f'' at normalised times s (..., k) of segments (...), (..., k, 4, 3)."""
+        """Return v, f, f', f'' at normalised times s (..., k) of segments (...), (..., k, 4, 3)."""
         rates = polynomial.evaluate(self.rates[segment][..., None, :, :], s)
         v, a, j, snap = np.moveaxis(rates.reshape(*s.shape, 4, 3), -2, 0)
         airspeed = v - self.environment.wind
@@ -71,17 +75,17 @@ class ThrustCurve:
         return np.stack([airspeed, *thrust], axis=-2)
 
     def on(self, pieces: Subintervals) -> Array:
-        """v, f, f', f'' at the basis's nodes on pieces of segments, (P, K + 1, 4, 3)."""
+        """Return v, f, f', f'' at the basis's nodes on pieces of segments, (P, K + 1, 4, 3)."""
         return self.at(pieces.interval, pieces.positions(self.basis.nodes))
 
     def yaw_on(self, pieces: Subintervals) -> Array | None:
-        """Any yaw and two derivatives at the basis's nodes on pieces of segments, (P, K + 1, 3)."""
+        """Return yaw and two derivatives at the basis's nodes, (P, K + 1, 3), or None without yaw."""
         s = pieces.positions(self.basis.nodes)
         found = [polynomial.evaluate(yaw[pieces.interval, None], s) for yaw in self.yaw]
         return np.concatenate(found, axis=-1) if found else None
 
     def turns(self, pieces: Subintervals) -> Turns | None:
-        """Magnitudes of any yaw on pieces."""
+        """Return the magnitudes of the yaw's Chebyshev terms on pieces, or None without yaw."""
         values = self.yaw_on(pieces)
         if values is None:
             return None
@@ -89,13 +93,13 @@ class ThrustCurve:
         return Turns(np.abs(self.basis.analysis @ values), chebyshev.EVALUATION_ROUNDING * sums)
 
     def series(self, values: Array) -> Array:
-        """Chebyshev series of v, f, f', f'' from `on`, in the order of their terms, (P, K + 1, 4, 3)."""
+        """Return the Chebyshev series of v, f, f', f'' from their values `on` pieces, (P, K + 1, 4, 3)."""
         flat = self.basis.analysis @ values.reshape(*values.shape[:2], 12)
         flat[:, self.rates.shape[1] :] = 0.0  # polynomials of this degree have no further terms
         return np.asarray(flat.reshape(values.shape))
 
     def norms(self, series: Array, pieces: Subintervals) -> Array:
-        """Norms of the terms of `series`, all but the first padded outward by rounding, (P, K + 1, 4)."""
+        """Return norms of the terms of `series`, all but the first enlarged by rounding, (P, K + 1, 4)."""
         norms = np.linalg.norm(series, axis=-1)
         padding = self.basis.lebesgue * chebyshev.EVALUATION_ROUNDING * self.sums[pieces.interval]
         norms[:, 1 : self.rates.shape[1]] += padding[:, None]

@@ -1,9 +1,10 @@
-"""The certified quantities of a vehicle whose drag along its x differs from that along its y.
+"""The certified quantities of a vehicle whose drag differs between body x and body y.
 
-Its attitude R solves a differential equation (`kernels.unequal_drag`). On each piece the quaternion of
-`flatness.reference` is replaced by a polynomial, which solves that equation but for defects: these are
-polynomials too, and bound how far R is. All quantities are rational functions of polynomials then, whose
-interpolation is proven by their bounds in complex time. DERIVATION.md, section 8, has the details.
+The attitude R of such a vehicle solves a differential equation (`kernels.unequal_drag`). On each piece the
+quaternion of `flatness.reference` is replaced by a polynomial, which solves the equation with a small defect.
+The defects are polynomials too, and bound the distance from R. All quantities are then rational functions of
+polynomials, whose interpolation error follows from bounds in complex time. DERIVATION.md, section 8, has the
+details.
 """
 
 from __future__ import annotations
@@ -34,7 +35,9 @@ from aerobat.trajectory import polynomial
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import mixer
 
+# rounds of halving pieces on which interpolation for the mean drag is already accurate
 QUATERNION_DEGREE = 14
+# [rad] largest attitude error: first-order errors, doubled, are valid far beyond it
 RHO = np.array([1.0, 1.4, 1.6, 1.8, 2.0, 2.3])
 HALVINGS = 8  # of pieces that the mean drag is content with
 LARGEST_ERROR = 1e-3  # [rad] of attitude: first-order errors, taken twice, hold far beyond
@@ -43,7 +46,7 @@ LARGEST_ERROR = 1e-3  # [rad] of attitude: first-order errors, taken twice, hold
 def interpolated_with_unequal_drag(
     curve: ThrustCurve, pieces: Subintervals, everywhere: bool, columns: SeriesColumns
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
-    """Return the series of `certify.interpolated`, and where no attitude is determined.
+    """Return the series of `certify.interpolated`, and the intervals without a proven attitude.
 
     Args:
         curve: What is flown.
@@ -76,19 +79,19 @@ def interpolated_with_unequal_drag(
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """A motion on pieces, at the nodes of a basis for products of it with two quaternions."""
+    """A motion on pieces, at the nodes of a basis that holds products of it with two quaternions."""
 
     curve: ThrustCurve
     pieces: Subintervals
     basis: chebyshev.Basis
     world: Array  # airspeed to crackle, (P, N, 5, 3)
-    sums: Array  # of absolute values that they are evaluated from, (P, 5)
-    attitude: Array  # coefficients of a quaternion, next to a unit one, (P, QUATERNION_DEGREE + 1, 4)
+    sums: Array  # sums of the absolute values of their terms, (P, 5)
+    attitude: Array  # coefficients of an almost unit quaternion, (P, QUATERNION_DEGREE + 1, 4)
     start: Array  # the quaternion at the trajectory's start, (4,)
 
     @classmethod
     def of(cls, curve: ThrustCurve, pieces: Subintervals) -> _Motion:
-        """The motion of a vehicle, and the attitude of its reference."""
+        """Return the motion of a vehicle, and the attitude of its reference."""
         trajectory = curve.trajectory
         sizes = [yaw.shape[1] for yaw in curve.yaw]
         basis = chebyshev.basis(2 * QUATERNION_DEGREE + max(trajectory.degree, 1, *sizes))
@@ -111,7 +114,7 @@ class _Motion:
 
     @cached_property
     def yaw(self) -> tuple[Bounded, ...] | None:
-        """The yaw's rate and its two derivatives; None without a yaw."""
+        """The yaw rate and its two derivatives; None without a yaw."""
         if not self.curve.yaw:
             return None
         polynomials = (self.curve.trajectory.yaw_polynomials(k) for k in (1, 2, 3))
@@ -121,12 +124,12 @@ class _Motion:
 
     @cached_property
     def drag(self) -> Array:
-        """Coefficients over the mass [1/s], (3,)."""
+        """Drag coefficients divided by the mass [1/s], (3,)."""
         return np.asarray(self.curve.vehicle.drag_body / self.curve.vehicle.mass)
 
     @cached_property
     def quaternion(self) -> tuple[Array, Array, Array, Array]:
-        """The components of the polynomial at the nodes, (P, N) each."""
+        """The components of the polynomial quaternion at the nodes, (P, N) each."""
         w, x, y, z = np.moveaxis(self._at_nodes @ self.attitude, -1, 0)
         return w, x, y, z
 
@@ -135,22 +138,22 @@ class _Motion:
         return np.asarray(series_of.chebvander(self.basis.nodes, QUATERNION_DEGREE))
 
     def polynomials(self, values: Array) -> Polynomials:
-        """Polynomials of the basis's degree, of these values (P, N)."""
+        """Return polynomials of the basis's degree with these values (P, N) at the nodes."""
         return Polynomials(values, self.basis, RHO)
 
     @cached_property
     def squared(self) -> Polynomials:
-        """The quaternion's square norm, next to 1."""
+        """The squared norm of the quaternion, almost 1."""
         w, x, y, z = self.quaternion
         return self.polynomials(w * w + x * x + y * y + z * z)
 
     @cached_property
     def per_square(self) -> Bounded:
-        """The inverse of the quaternion's square norm."""
+        """The inverse of the squared norm of the quaternion."""
         return self.squared.bounded().inverse(self.squared.least())
 
     def turned(self, world: Array) -> list[Array]:
-        """World vectors (P, N, 3) or (3,) in body axes, times `squared`: polynomials, (P, N) each."""
+        """Return world vectors (P, N, 3) or (3,) in body axes, times `squared`: polynomials, (P, N) each."""
         w, x, y, z = self.quaternion
         a, b, c = np.moveaxis(world, -1, 0)
         return [
@@ -160,14 +163,14 @@ class _Motion:
         ]
 
     def dragged(self, coefficient: float, k: int) -> tuple[Array, Array]:
-        """The k-th derivative of a + g e3 + c v at the nodes, (P, N, 3), and its rounding, (P,)."""
+        """Return the k-th derivative of a + g e3 + c v at the nodes, (P, N, 3), and its rounding, (P,)."""
         weight = self.curve.environment.weight if k == 0 else np.zeros(3)
         vector = self.world[:, :, k + 1] + weight + coefficient * self.world[:, :, k]
         summed = self.sums[:, k + 1] + np.linalg.norm(weight) + coefficient * self.sums[:, k]
         return vector, chebyshev.EVALUATION_ROUNDING * summed
 
     def body(self, world: Array, rounding: Array) -> Vector:
-        """A world vector in body axes, off by its rounding and by the attitude's error."""
+        """Return a world vector in body axes, with the errors of its rounding and of the attitude."""
         bounds = [self.polynomials(component).bound()[:, 0] for component in np.moveaxis(world, -1, 0)]
         size = np.linalg.norm(bounds, axis=0)
         off = rounding + self.attitude_error * size
@@ -180,9 +183,9 @@ class _Motion:
     def attitude_error(self) -> Array:
         """The largest angle [rad] between the polynomial's attitude and R, (P,); infinite if unknown.
 
-        Let θ be the rotation between them in body axes, with the defects ε₁ = b1·α, ε₂ = b2·β and σ = ω_z.
-        To first order θ_y = (ε₁ + θ_z α_y)/α_z, θ_x = (θ_z β_x − ε₂)/β_z and |θ_z'| ≤ |σ| + |ω| |(θ_x, θ_y)|,
-        ω across the thrust; with a yaw, σ = ω_z less its rate.
+        Let θ be the rotation between them in body axes, with the defects ε₁ = b1·α, ε₂ = b2·β and σ = ω_z. To
+        first order θ_y = (ε₁ + θ_z α_y)/α_z, θ_x = (θ_z β_x − ε₂)/β_z and |θ_z'| ≤ |σ| + |ω| |(θ_x, θ_y)|,
+        where ω is the body rate across the thrust axis. With a yaw, σ is ω_z minus the yaw rate.
         """
         square = self.squared.least()[:, 0]
 
@@ -199,8 +202,8 @@ class _Motion:
             rate.append(sup(self.turned(first)[axis]) + off_first)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             lowest = np.where(np.minimum(*least) > 0.0, np.minimum(*least), 0.0)
-            tilt = np.hypot(*defect) / lowest  # without any spin
-            lever = np.hypot(*slope) / lowest  # of an angle about the thrust
+            tilt = np.hypot(*defect) / lowest  # tilt error without any error about the thrust axis
+            lever = np.hypot(*slope) / lowest  # tilt error per angle about the thrust axis
             turn = self.yaw[0].bound[:, 0] if self.yaw is not None else 0.0
             omega = 1.01 * (np.hypot(*rate) + turn * np.hypot(*slope)) / lowest
             seconds = self.pieces.seconds(self.curve.trajectory)
@@ -215,7 +218,7 @@ class _Motion:
 
     @cached_property
     def _spin(self) -> Array:
-        """ω_z, less what it shall be, times `squared` at the nodes [rad/s], (P, N)."""
+        """The defect of ω_z, times `squared`, at the nodes [rad/s], (P, N)."""
         seconds = self.pieces.seconds(self.curve.trajectory)[:, None]
         slopes = np.asarray(series_of.chebder(self.attitude, axis=1))
         dw, dx, dy, dz = np.moveaxis(self._at_nodes[:, :-1] @ slopes, -1, 0) * 2 / seconds
@@ -225,7 +228,7 @@ class _Motion:
 
     @cached_property
     def _handed_over(self) -> Array:
-        """The angle [rad] between the attitudes of a piece's start and of what it goes on from, (P,)."""
+        """The angle [rad] between the attitude at a piece's start and that of its predecessor's end, (P,)."""
         ends = series_of.chebvander(np.array([-1.0, 1.0]), QUATERNION_DEGREE) @ self.attitude
         before = np.concatenate([self.start[None], ends[:-1, 1]])
         after = ends[:, 0]
@@ -234,7 +237,7 @@ class _Motion:
         return np.asarray(4 * np.arcsin(np.minimum(sine / 2, 1.0)))
 
     def columns(self, columns: SeriesColumns) -> list[Bounded]:
-        """All quantities, in the order of the columns."""
+        """Return all quantities, in the order of the columns."""
         vehicle = self.curve.vehicle
         cx, cy, cz = self.drag.tolist()
         rated = any(limit.quantity.measured[WRENCH_RATE].any() for limit in columns.derived)
@@ -261,32 +264,32 @@ class _Motion:
         return found + [self.axis(each) for each in np.eye(3) if columns.with_axis]
 
     def axis(self, direction: Array) -> Bounded:
-        """The component of the thrust axis along a direction (3,)."""
+        """Return the component of the thrust axis along a direction (3,)."""
         off = self.attitude_error * float(np.linalg.norm(direction))
         along = self.polynomials(self.turned(direction)[2]).bounded() * self.per_square
         return along.with_error(off)
 
     def _inverse(self, coefficient: float, along: Bounded) -> Bounded:
-        """1/α_z or 1/β_z; `along` is what it is the inverse of."""
+        """Return 1/α_z or 1/β_z, given `along` = α_z or β_z."""
         whole = self.polynomials(self.turned(self.dragged(coefficient, 0)[0])[2])
         least = whole.least() / self.squared.bound()
         return along.inverse(least)
 
 
 def _weighted(weights: Sequence[float], terms: Sequence[Scalar]) -> Bounded:
-    """The sum of weights times terms."""
+    """Return the sum of weights times terms."""
     nothing: Bounded = 0.0 * terms[0]
     return sum((float(w) * term for w, term in zip(weights, terms, strict=True) if w != 0.0), nothing)
 
 
 def _remainder(column: Bounded, motion: _Motion) -> Array:
-    """Between a quantity and its interpolant, at most, rounding aside, (P,)."""
+    """Return the largest interpolation error of a quantity without rounding, (P,)."""
     decay, _ = chebyshev.tails(motion.basis.degree, RHO[1:])
     return np.asarray((column.bound[:, 1:] * decay).min(axis=1))
 
 
 def _is_rough(bounded: Sequence[Bounded], motion: _Motion, columns: SeriesColumns) -> Mask:
-    """Tell on which pieces interpolation of values and derived limits leaves more open than it may, (P,)."""
+    """Tell on which pieces the interpolation error of values or derived limits is too large, (P,)."""
     stated = len(motion.curve.vehicle.rotors) + 4
     scales = columns.scale(motion.curve.vehicle)[: stated + len(columns.derived)]
     rough = np.zeros(len(motion.pieces), dtype=bool)
@@ -298,7 +301,7 @@ def _is_rough(bounded: Sequence[Bounded], motion: _Motion, columns: SeriesColumn
 
 
 def _from(curve: ThrustCurve, pieces: Subintervals, count: int) -> tuple[TimeInterval, ...]:
-    """The time from the start of the piece behind the first `count` on, if there is one."""
+    """Return the interval from the end of the first `count` pieces to the end of the trajectory, if any."""
     if count == len(pieces):
         return ()
     starts, _ = pieces[count : count + 1].spans(curve.trajectory)

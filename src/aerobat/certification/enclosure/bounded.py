@@ -1,8 +1,8 @@
-"""Arithmetic that a proof needs: analytic functions on pieces, with bounds around them and their errors.
+"""Verified arithmetic: analytic functions on pieces, with bounds in the complex plane and error bounds.
 
-A function has its values at nodes, bounds of its magnitude on Bernstein ellipses about the piece, and the
-largest error of its values on the piece. Sums and products have theirs; so has 1/x where |x| is bounded from
-below. Kernels run on it as on any numbers.
+A function has values at nodes, bounds of its magnitude on Bernstein ellipses around the piece, and a bound of
+the error of its values on the piece. Sums, products and inverses propagate all three. Kernels run on these
+functions as on numbers.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.certification.enclosure import chebyshev
 
-ROUNDING = 4 * np.finfo(float).eps  # of an operation, complex or not
+ROUNDING = 4 * np.finfo(float).eps  # relative rounding error of one operation, real or complex
 
 
 @dataclass(frozen=True, eq=False)
 class Bounded:
-    """Functions on P pieces; `bound` begins with the ellipse that is the piece itself."""
+    """Functions on P pieces. The first ellipse of `bound` is the piece itself."""
 
     values: Array  # at the nodes, (P, N)
-    bound: Array  # of magnitudes on R ellipses, (P, R)
-    error: Array  # of the values on the piece, at most, (P,)
+    bound: Array  # bounds of magnitudes on R ellipses, (P, R)
+    error: Array  # largest error of the values on the piece, (P,)
 
-    __array_ufunc__ = None  # NumPy's numbers leave operators to this class
+    __array_ufunc__ = None  # makes NumPy's numbers use the operators of this class
 
     def __add__(self, other: Bounded | float) -> Bounded:
         if not isinstance(other, Bounded):
@@ -64,11 +64,11 @@ class Bounded:
         return Bounded(shape + value, bound, np.zeros_like(self.error))
 
     def with_error(self, error: Array) -> Bounded:
-        """Return the same functions with a larger error of the values, by so much, (P,)."""
+        """Return the same functions with the error of their values increased by `error`, (P,)."""
         return Bounded(self.values, self.bound, self.error + error)
 
     def inverse(self, least: Array) -> Bounded:
-        """Return 1/x, where |x| is at least so large on the ellipses, (P, R); zero or less is no bound."""
+        """Return 1/x, where |x| is at least `least` on the ellipses, (P, R); values <= 0 bound nothing."""
         known = least > 0.0
         bound = np.where(known, 1.0 / np.where(known, least, 1.0), np.inf)
         left = least[:, 0] - self.error
@@ -79,7 +79,7 @@ class Bounded:
 
 @dataclass(frozen=True)
 class Polynomials:
-    """Polynomials on pieces, from their values at the nodes of a basis that has enough of them."""
+    """Polynomials on pieces, from their values at the nodes of a basis of sufficient degree."""
 
     values: Array  # (P, N)
     basis: chebyshev.Basis
@@ -87,7 +87,7 @@ class Polynomials:
 
     @property
     def _terms(self) -> tuple[Array, Array]:
-        """The magnitudes of Chebyshev coefficients, (P, N), and the rounding in them, (P, 1)."""
+        """The magnitudes of the Chebyshev coefficients, (P, N), and their rounding errors, (P, 1)."""
         rounding = chebyshev.EVALUATION_ROUNDING * np.abs(self.values).max(axis=1, keepdims=True)
         return np.abs(self.values @ self.basis.analysis.T), rounding
 
@@ -96,16 +96,16 @@ class Polynomials:
         return chebyshev.growth(self.basis.degree, self.rho)
 
     def bound(self) -> Array:
-        """Return bounds of their magnitudes on the ellipses, (P, R)."""
+        """Return upper bounds of the magnitudes on the ellipses, (P, R)."""
         terms, rounding = self._terms
         return np.asarray((terms + rounding) @ self._growth)
 
     def least(self) -> Array:
-        """Return what their magnitudes exceed on the ellipses, (P, R); zero or less says nothing."""
+        """Return lower bounds of the magnitudes on the ellipses, (P, R); values <= 0 bound nothing."""
         terms, rounding = self._terms
         return np.asarray(terms[:, :1] - rounding - (terms[:, 1:] + rounding) @ self._growth[1:])
 
     def bounded(self) -> Bounded:
-        """Return them as functions."""
+        """Return the polynomials as bounded functions."""
         bound = self.bound()
         return Bounded(self.values, bound, chebyshev.EVALUATION_ROUNDING * bound[:, 0])

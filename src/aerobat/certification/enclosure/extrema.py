@@ -1,8 +1,8 @@
-"""Maxima of Chebyshev series, enclosed: branch and bound by halving intervals.
+"""Enclosures of the maxima of Chebyshev series, by branch and bound with interval halving.
 
-On an interval a series is at most the maximum of its first three terms, a parabola, plus the magnitudes
-of all others. Halving shrinks these by eight, and wherever the bound stays below a value known, nothing
-remains to be looked for.
+On an interval a series is at most the maximum of its first three terms, a parabola, plus the magnitudes of
+all other terms. Halving the interval divides these magnitudes by eight. Intervals whose bound is below a
+known value are pruned.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ from aerobat.certification.enclosure import chebyshev
 from aerobat.trajectory.subintervals import Subintervals
 
 MAX_HALVINGS = 50
-MAX_OPEN = 50_000  # intervals at a time beside those at first; no flight is known to need a tenth of it
+MAX_OPEN = 50_000  # limit of the open intervals besides the initial ones; no known flight needs a tenth of it
 
 
 @dataclass(frozen=True)
 class SeriesBatch:
-    """Series that approximate functions, each of one of G groups whose greatest value is wanted.
+    """Series that approximate functions. Each belongs to one of G groups whose maximum is wanted.
 
-    The ends of an enclosure come as near to one another as `tightness` says: of the group's scale or of its
-    greatest value, whichever is larger, errors aside; less near where that takes too many intervals.
+    The width of an enclosure, without errors, is at most `tightness` times the group's scale or its maximum,
+    whichever is larger. It is wider where that takes too many intervals.
     """
 
     coefficients: Array  # (N, K + 1)
-    error: Array  # between function and series, at most, (N,)
+    error: Array  # largest difference between function and series, (N,)
     group: Indices  # (N,)
-    scale: Array  # what is large for a group, (G,)
+    scale: Array  # a large value for a group, (G,)
     tightness: float
 
 
 @dataclass(frozen=True)
 class Enclosure:
-    """For each group: min <= sup <= max, and where at least `min` is taken. All (G,)."""
+    """For each group: min <= sup <= max, and the point at which `min` is reached. All (G,)."""
 
     min: Array
     max: Array
@@ -45,7 +45,7 @@ class Enclosure:
 
 
 def enclose_maximum(batch: SeriesBatch) -> Enclosure:
-    """Enclose the greatest value of each group, all groups at once."""
+    """Return an enclosure of the maximum of each group, all groups at once."""
     groups = len(batch.scale)
     found = Enclosure(
         np.full(groups, -np.inf), np.full(groups, -np.inf), np.zeros(groups, dtype=np.intp), np.zeros(groups)
@@ -62,7 +62,7 @@ def enclose_maximum(batch: SeriesBatch) -> Enclosure:
         tolerance = batch.tightness * np.maximum(batch.scale, np.abs(found.min))[group]
         open_ = (upper > found.min[group] + tolerance) & (tail > tolerance / 4)
         if halving == MAX_HALVINGS - 1 or open_.sum() > MAX_OPEN + len(batch.group):
-            open_[:] = False  # their bounds hold, if not tightly
+            open_[:] = False  # their bounds are valid, but may not be tight
         np.maximum.at(found.max, group[~open_], upper[~open_])
         if not open_.any():
             break
@@ -73,9 +73,9 @@ def enclose_maximum(batch: SeriesBatch) -> Enclosure:
 
 
 def parabola_maximum(coefficients: Array, flat: Array | float = 0.0) -> tuple[Array, Array, Array]:
-    """Return the maximum of c0 T0 + c1 T1 + c2 T2 on [-1, 1], the magnitudes of all other terms, and where.
+    """Return the maximum of c0 T0 + c1 T1 + c2 T2 on [-1, 1], the sum of all other magnitudes, and its place.
 
-    The maximum is said to be at -1 where these terms change by less than `flat` (n,).
+    The place is -1 where these terms change by less than `flat` (n,).
     """
     padded = coefficients if coefficients.shape[1] > 2 else np.pad(coefficients, ((0, 0), (0, 2)))
     c0, c1, c2 = padded[:, :3].T
@@ -90,12 +90,12 @@ def parabola_maximum(coefficients: Array, flat: Array | float = 0.0) -> tuple[Ar
 def _improve(
     found: Enclosure, parts: Subintervals, group: Indices, vertex: Array, value: Array, slack: Array
 ) -> None:
-    """Enter values that exceed those known by more than a `slack` (G,); of equal ones the earliest."""
+    """Update maxima that rise by more than a `slack` (G,); of equal values take the earliest."""
     maximum = found.min.copy()
     np.maximum.at(maximum, group, value)
     position = 2 * parts.start + parts.length * (1 + vertex) - 1
     better = (maximum > found.min + slack)[group] & (value >= maximum[group] - slack[group])
-    order = np.lexsort((-position, -parts.interval))  # of several of one group the last assigned stays
+    order = np.lexsort((-position, -parts.interval))  # the last assignment to a group wins
     order = order[better[order]]
     at = group[order]
     found.min[at], found.member[at], found.position[at] = value[order], parts.interval[order], position[order]

@@ -1,15 +1,15 @@
-"""Error of flatness interpolated at Chebyshev points, proven by complex analysis.
+"""Error of flatness quantities interpolated at Chebyshev points, proven by complex analysis.
 
-Velocity and specific thrust f are polynomials on a piece of a segment, so all that flatness makes of them
-is analytic in complex time wherever f·f keeps off zero. Let q be analytic inside the Bernstein ellipse E_ρ
-about the piece, with |q| <= B there. Its interpolant p of degree K then has |q − p| <= 4 B ρ⁻ᴷ/(ρ − 1) on
-the piece (Trefethen, Approximation Theory and Approximation Practice, theorem 8.2). Such B follow from the
+Velocity and specific thrust f are polynomials on a piece of a segment, so all flatness quantities are
+analytic in complex time wherever f·f is not zero. Let q be analytic inside the Bernstein ellipse E_ρ around
+the piece, with |q| <= B there. Its interpolant p of degree K satisfies |q − p| <= 4 B ρ⁻ᴷ/(ρ − 1) on the
+piece (Trefethen, Approximation Theory and Approximation Practice, theorem 8.2). Bounds B follow from the
 norms of the terms of v, f, f', f'' alone. With c = |c_0| of f, |f − c_0| <= Δ = δ c on E_ρ and n² = f·f,
 
     δ < 1/2   =>   Re n >= c (1 − δ).
 
-The rest follows, as DERIVATION.md has it; complex vectors have their Hermitian norms. On the piece itself,
-ρ = 1, the same bounds say how large things are there, and what rounding does to them.
+DERIVATION.md derives the other bounds; complex vectors have their Hermitian norms. For ρ = 1, the piece
+itself, the same bounds give the magnitudes of the quantities and of their rounding errors.
 """
 
 from __future__ import annotations
@@ -27,51 +27,52 @@ from aerobat.flatness.references import axial_drag
 from aerobat.vehicle import Vehicle
 
 RHO = np.array([1.0, 1.6, 2.0, 2.5, 3.2, 4.0, 5.5, 8.0, 14.0, 30.0, 80.0])
-MAX_FRAME_ANGLE = 30.0  # an imaginary angle of the frame beyond which an ellipse is of no use
+MAX_FRAME_ANGLE = 30.0  # imaginary angle of the frame from which on an ellipse is not used
 
 
 @dataclass(frozen=True)
 class InterpolationError:
-    """Bounds on each of P pieces, for each of Q quantities."""
+    """Error bounds on each of P pieces, for each of Q quantities."""
 
-    magnitude: Array  # of the quantities, at most, (P, Q)
-    remainder: Array  # between a quantity and its interpolant, at most, rounding aside, (P, Q)
-    rounding: Array  # of a quantity's values, at most, (P, Q)
-    twist_remainder: Array  # [rad] of the angle by which the frame turns along the piece, (P,)
-    twist_rounding: Array  # [rad], and of the frame's hand-over from piece to piece, (P,)
-    per_radian: Array  # what an error in the frame's angle does to a quantity [1/rad], (P, Q)
-    rate_remainder: Array  # as `remainder`, of time derivatives [1/s], (P, Q)
-    rate_per_radian: Array  # what a constant error in the frame's angle does to them [1/(rad s)], (P, Q)
+    magnitude: Array  # largest magnitude of the quantities, (P, Q)
+    remainder: Array  # largest distance between a quantity and its interpolant, without rounding, (P, Q)
+    rounding: Array  # largest rounding error of a quantity's values, (P, Q)
+    twist_remainder: Array  # [rad] `remainder` of the frame's rotation angle along the piece, (P,)
+    twist_rounding: Array  # [rad] `rounding` of that angle, and of the transition between pieces, (P,)
+    per_radian: Array  # change of a quantity per error of the frame's angle [1/rad], (P, Q)
+    rate_remainder: Array  # `remainder` of time derivatives [1/s], (P, Q)
+    # change of time derivatives per constant error of the frame's angle [1/(rad s)], (P, Q)
+    rate_per_radian: Array
 
 
 @dataclass(frozen=True)
 class EllipseBounds:
-    """Bounds on R ellipses about P pieces, all (P, R)."""
+    """Bounds on R ellipses around P pieces, all (P, R)."""
 
-    regular: NDArray[np.bool_]  # where not, the others mean nothing
-    root: Array  # Re n, the thrust's norm, at least [m/s²]
+    regular: NDArray[np.bool_]  # False where the other bounds are invalid
+    root: Array  # lower bound of Re n, the norm of the thrust [m/s²]
     magnitudes: MagnitudeBounds
-    twist: Array  # of the angle by which the frame turns about b3 per half length [rad]
-    curl: Array  # of that angle's imaginary part [rad]
+    twist: Array  # the angle by which the frame rotates about b3 per half length [rad]
+    curl: Array  # the imaginary part of that angle [rad]
 
 
 @dataclass(frozen=True)
 class Turns:
-    """The yaw beside a frame without spin, its rate and the rate's derivative, along P pieces."""
+    """The yaw relative to a frame without spin, with two time derivatives, along P pieces."""
 
     terms: Array  # magnitudes of their Chebyshev coefficients, (P, K + 1, 3)
-    rounding: Array  # in their values, at most, (P, 3)
+    rounding: Array  # largest rounding error of their values, (P, 3)
 
     @property
     def on_ellipses(self) -> Array:
-        """Bounds of the yaw's imaginary part and of both rates, (P, R, 3)."""
+        """Bounds of the imaginary part of the yaw, and of both derivatives, (P, R, 3)."""
         terms = self.terms + self.rounding[:, None]
         larger = growth(terms.shape[1] - 1, RHO)
         return np.stack([terms[..., 0] @ np.sqrt(larger**2 - 1), *(terms.T[1:].swapaxes(1, 2) @ larger)], -1)
 
 
 def regular(norms: Array) -> NDArray[np.bool_]:
-    """Tell on which pieces the smallest ellipse is off the zeros of f·f; norms as from `ThrustCurve`."""
+    """Tell on which pieces the smallest ellipse contains no zero of f·f; norms as from `ThrustCurve`."""
     thrust = norms[..., 1]
     return _off_zero(thrust[:, 0], thrust[:, 1:] @ growth(thrust.shape[1] - 1, RHO[1:2])[1:, 0])
 
@@ -79,7 +80,7 @@ def regular(norms: Array) -> NDArray[np.bool_]:
 def accuracy(
     norms: Array, seconds: Array, sums: Array, vehicle: Vehicle, turns: Turns | None = None
 ) -> InterpolationError:
-    """Bound the error of interpolation on regular pieces.
+    """Bound the interpolation error on regular pieces.
 
     Args:
         norms: Of the terms of v, f, f', f'' as Chebyshev series, (P, K + 1, 4).
@@ -107,7 +108,7 @@ def accuracy(
     per_radian = quantities.errors(vehicle, around.magnitudes, turned)
     per_radian[:, 1:][~around.regular[:, 1:]] = np.inf
     away = (RHO[1:] + 1 / RHO[1:]) / 2 - 1  # of an ellipse from the piece, by Cauchy's inequality
-    per_second = 2 / seconds[:, None]
+    per_second = 2 / seconds[:, None]  # distance of an ellipse from the piece, for Cauchy's inequality
     return InterpolationError(
         magnitude=bounds[:, 0],
         remainder=(bounds[:, 1:] * decay[:, None]).min(axis=1),
@@ -121,42 +122,45 @@ def accuracy(
 
 
 def on_ellipses(norms: Array, half: Array, vehicle: Vehicle, turns: Turns | None = None) -> EllipseBounds:
-    """Bounds from the norms (P, K + 1, 4) of the terms of v, f, f', f'' on pieces `half` (P,) [s] a side."""
+    """Return bounds from the norms (P, K + 1, 4) of the terms of v, f, f', f''.
+
+    `half` (P,) is half the duration of the pieces [s].
+    """
     larger = growth(norms.shape[1] - 1, RHO)
     speed, _, jerk, snap = (norms[..., k] @ larger for k in range(4))
     mean = norms[:, :1, 1]
     away = norms[:, 1:, 1] @ larger[1:]
     usable = _off_zero(mean, away)
     away, speed, jerk, snap = (np.where(usable, bound, 0.0) for bound in (away, speed, jerk, snap))
-    root = mean - away  # Re n, at least; |n + w| is twice that or more
-    ratio = (mean + away) / root  # |f|/|n|, at most
+    root = mean - away  # lower bound of Re n; |n + w| is at least twice as large
+    ratio = (mean + away) / root  # upper bound of |f|/|n|
     twist = half[:, None] * away * jerk / (2 * root**2)
-    curl = twist * (RHO + 1 / RHO) / 2  # the angle's imaginary part, gathered from the real line on
+    curl = twist * (RHO + 1 / RHO) / 2  # imaginary part of the angle, accumulated from the real line
     if turns is not None:
         turned, rate, acceleration = np.moveaxis(turns.on_ellipses, -1, 0)
         curl = curl + turned
     usable &= curl < MAX_FRAME_ANGLE
-    frame = (1 + away * mean / root**2) * np.exp(np.where(usable, curl, 0.0))  # |x|, |y|, at most
+    frame = (1 + away * mean / root**2) * np.exp(np.where(usable, curl, 0.0))  # upper bound of |x|, |y|
     omega = frame * jerk / root
     omega_dot = frame * (snap + 2 * ratio * jerk**2 / root) / root
     if turns is not None:
         omega_dot = np.hypot(omega_dot + rate * omega, acceleration)
         omega = np.hypot(omega, rate)
-    grown = away * (2 * mean + away) / (mean + root)  # |n − c|, at most
+    grown = away * (2 * mean + away) / (mean + root)  # upper bound of |n − c|
     axial = abs(axial_drag(vehicle))
     thrust = vehicle.mass * (np.where(RHO > 1, grown, mean + away) + axial * ratio * speed)
     return EllipseBounds(usable, root, MagnitudeBounds(thrust, ratio, omega, omega_dot), twist, curl)
 
 
 def _off_zero(mean: Array, away: Array) -> NDArray[np.bool_]:
-    """Tell where δ < 1/2, with a thousandth to spare."""
+    """Tell where δ < 1/2, with a margin of 0.1 %."""
     return np.asarray(2 * away < 0.999 * mean)
 
 
 def first_order(
     real: MagnitudeBounds, min_thrust: Array, speed: Array, off: Array, vehicle: Vehicle
 ) -> MagnitudeBounds:
-    """First-order errors of what flatness gives if v, f, f', f'' are off by so much.
+    """Return first-order errors of flatness quantities for errors `off` of v, f, f', f''.
 
     Args:
         real: Bounds of what it gives, (P,) each.

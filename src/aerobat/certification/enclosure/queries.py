@@ -1,4 +1,4 @@
-"""Extrema of Chebyshev series on pieces of a trajectory, and what they say of limits: findings."""
+"""Extrema of Chebyshev series on pieces of a trajectory, and the resulting findings about limits."""
 
 from __future__ import annotations
 
@@ -16,26 +16,28 @@ from aerobat.limits.limit import Limit
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.subintervals import Subintervals
 
-TIGHTNESS = 1e-7  # of a rotor's range: how near the proven bounds are to what is reached
-SUMMATION_ROUNDING = 1e-13  # of the magnitudes of a series' terms: halving it some ten times, and summing
+TIGHTNESS = 1e-7  # of a rotor's range: largest distance between the proven bounds and the values reached
+# of the magnitudes of a series' terms: rounding of some ten halvings, and of the sum
+SUMMATION_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
 class ExtremumQuery:
-    """A question for the maximum (with the sign -1, the minimum) of a function given by series on pieces."""
+    """A query for the maximum (minimum if the sign is -1) of a function given by series on pieces."""
 
     quantity: str
     unit: str
     side: Side
-    limit: float  # infinite where there is none
+    limit: float  # infinite without a limit
     column: int  # of the series
     sign: int
-    read: Callable[[float], float]  # from the greatest value of sign times function to what people read
-    slack: float = 0.0  # beyond the limit by so much it counts as met
-    source: Limit | None = None  # what the limit is an end of
+    # converts the maximum of sign times function to the quantity that people read
+    read: Callable[[float], float]
+    slack: float = 0.0  # violation that still counts as met
+    source: Limit | None = None  # the limit that sets this bound
 
     def answer(self, reached: float, bound: float, time: float, everywhere: bool) -> Finding:
-        """The finding for a proven enclosure of the greatest value.
+        """Return the finding for a proven enclosure of the maximum.
 
         Args:
             reached: The function is at least so large at `time`.
@@ -66,18 +68,18 @@ class ChebyshevSeries:
     trajectory: Trajectory
     pieces: Subintervals
     series: Array  # (P, K + 1, Q)
-    error: Array  # at most, (P, Q)
-    scale: Array  # what is large, (Q,)
-    everywhere: bool  # whether the pieces make up the whole trajectory
-    tightness: float = TIGHTNESS  # of enclosures, as `SeriesBatch` has it
+    error: Array  # largest error of the series, (P, Q)
+    scale: Array  # a large value of each function, (Q,)
+    everywhere: bool  # whether the pieces cover the whole trajectory
+    tightness: float = TIGHTNESS  # tightness of enclosures, see `SeriesBatch`
 
     def ends(self) -> Array:
-        """The values at both ends of the pieces, (P, 2, Q)."""
+        """Return the values at both ends of the pieces, (P, 2, Q)."""
         alternating = (-1.0) ** np.arange(self.series.shape[1])
         return np.stack([alternating @ self.series, self.series.sum(axis=1)], axis=1)
 
     def answers(self, queries: Sequence[ExtremumQuery]) -> list[Finding]:
-        """A finding for each query; none at all if there are no pieces."""
+        """Return a finding for each query; none if there are no pieces."""
         count = len(self.pieces)
         if not (count and queries):
             return []
@@ -97,7 +99,7 @@ class ChebyshevSeries:
 
 
 def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float) -> list[ExtremumQuery]:
-    """Queries for the minimum and the maximum of a function."""
+    """Return queries for the minimum and the maximum of a function."""
     return [
         ExtremumQuery(quantity, unit, Side.MIN, float(lower), column, -1, neg),
         ExtremumQuery(quantity, unit, Side.MAX, float(upper), column, 1, float),
@@ -105,16 +107,16 @@ def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float
 
 
 def within(limit: Limit, column: int) -> list[ExtremumQuery]:
-    """Queries about the ends that a limit has, of a function."""
+    """Return queries for the finite ends of a limit on a function."""
     sides = both_sides(limit.name, limit.unit, column, limit.lower, limit.upper)
     return [replace(side, source=limit) for side in sides if math.isfinite(side.limit)]
 
 
 def root(value: float) -> float:
-    """A magnitude, read from its square."""
+    """Return a magnitude, given its square."""
     return math.sqrt(max(value, 0.0))
 
 
 def angle(value: float) -> float:
-    """An angle [rad], read from the negative of its cosine."""
+    """Return an angle [rad], given the negative of its cosine."""
     return math.acos(min(max(-value, -1.0), 1.0))

@@ -1,4 +1,4 @@
-"""The start and the end of a path, compared with the states that are asked of it there."""
+"""The start and the end of a path, compared with the required end states."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from aerobat.problem import EndState
 from aerobat.problem.limits import DERIVATIVES, UNITS
 from aerobat.trajectory import Trajectory
 
-# [m, m/s, m/s²] by which an end may miss its state: what solvers leave adds up to a tenth of it
+# [m, m/s, m/s²] accepted error of an end state: ten times the accumulated error of solvers
 END_TOLERANCES = (1e-5, 1e-5, 1e-4)
 
 
 def end_findings(trajectory: Trajectory, start: EndState | None, goal: EndState | None) -> list[Finding]:
-    """Return how far a path is from each derivative that its ends ask for; nothing of an end left out."""
+    """Return the error of each derivative that the start and goal fix; nothing for an end that is None."""
     found = [] if start is None else _findings(trajectory, "start", start, 0.0)
     return found if goal is None else found + _findings(trajectory, "goal", goal, trajectory.duration)
 

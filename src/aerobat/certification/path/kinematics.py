@@ -1,4 +1,4 @@
-"""Speed and limits on the path: polynomials, so that interpolation is exact but for rounding."""
+"""Speed and limits on the path: polynomials, for which interpolation is exact up to rounding."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from aerobat.problem.limits import DERIVATIVES
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 
-# of the limit or of the largest value of what it limits, the larger: a plan may run along such a limit or end
-# on it, so beyond by so much counts as met
+# accepted violation, relative to the limit or to the largest value of the limited quantity, whichever is
+# larger: a plan may follow such a limit or end on it
 LIMIT_TOLERANCE = 1e-9
-KINEMATIC_TIGHTNESS = LIMIT_TOLERANCE / 10  # of enclosures
+KINEMATIC_TIGHTNESS = LIMIT_TOLERANCE / 10  # tightness of enclosures
 
 
 @dataclass(frozen=True)
 class PolynomialCurve:
-    """Position and its derivatives at Chebyshev nodes, as many as polynomials of twice their degree need."""
+    """Position and its derivatives at Chebyshev nodes, enough for polynomials of twice their degree."""
 
     trajectory: Trajectory
     basis: chebyshev.Basis
     derivatives: Array  # position to crackle, (S, N, 6, 3)
-    sums: Array  # of the absolute values that they are evaluated from, (S, 6, 3)
+    sums: Array  # sums of the absolute values of their terms, (S, 6, 3)
 
     @classmethod
     def of(cls, trajectory: Trajectory) -> PolynomialCurve:
-        """The curve of a trajectory."""
+        """Return the curve of a trajectory."""
         basis = chebyshev.basis(max(2 * (trajectory.degree - 1), trajectory.degree, 1))
         s = (1 + basis.nodes) / 2
         orders = range(len(DERIVATIVES))
@@ -41,7 +41,7 @@ class PolynomialCurve:
         return cls(trajectory, basis, derivatives, np.stack([_sums(trajectory, k) for k in orders], axis=1))
 
     def series(self, columns: list[PolynomialColumn]) -> ChebyshevSeries:
-        """Return the polynomials of the columns as Chebyshev series with their errors."""
+        """Return the columns as Chebyshev series with their errors."""
         series = self.basis.analysis @ np.stack([column.values for column in columns], axis=-1)
         error = self.basis.lebesgue * np.stack([column.error for column in columns], axis=-1)
         whole = Subintervals.whole(self.trajectory.segments)
@@ -51,22 +51,22 @@ class PolynomialCurve:
 
 @dataclass(frozen=True)
 class PolynomialColumn:
-    """A polynomial on each segment, at the nodes, and what is wanted to be known of it."""
+    """A polynomial on each segment, by its values at the nodes, with queries about it."""
 
     values: Array  # (S, N)
-    error: Array  # of the values, by rounding, at most, (S,)
+    error: Array  # largest rounding error of the values, (S,)
     queries: list[ExtremumQuery]
 
 
 def kinematic_findings(trajectory: Trajectory, speed: float, limits: Iterable[Limit]) -> list[Finding]:
-    """The largest speed, beside its limit [m/s], and the extrema of what limits on the path are about."""
+    """Return the findings about the largest speed [m/s] and the extrema of path quantities with limits."""
     curve = PolynomialCurve.of(trajectory)
     columns = [_speed(curve, speed), *(_linear(curve, limit, place) for place, limit in enumerate(limits, 1))]
     return curve.series(columns).answers([query for column in columns for query in column.queries])
 
 
 def _speed(curve: PolynomialCurve, limit: float) -> PolynomialColumn:
-    """|v|², asked for |v|."""
+    """Return |v|², with a query for |v|."""
     velocity = curve.derivatives[:, :, 1]
     squared = np.sum(velocity**2, axis=-1)
     off = chebyshev.EVALUATION_ROUNDING * np.linalg.norm(curve.sums[:, 1], axis=1)
@@ -77,7 +77,7 @@ def _speed(curve: PolynomialCurve, limit: float) -> PolynomialColumn:
 
 
 def _linear(curve: PolynomialCurve, limit: Limit, place: int) -> PolynomialColumn:
-    """What a limit on the path is about, the column at a place."""
+    """Return the quantity of a limit on the path, as the column at index `place`."""
     quantity = limit.quantity
     values = np.einsum("snka,ka->sn", curve.derivatives, quantity.path) + quantity.constant
     summed = np.sum(np.abs(quantity.path) * curve.sums, axis=(1, 2)) + abs(quantity.constant)
@@ -92,6 +92,6 @@ def _lenient(query: ExtremumQuery, largest: float) -> ExtremumQuery:
 
 
 def _sums(trajectory: Trajectory, derivative: int) -> Array:
-    """The sums of absolute values that each component is evaluated from, (S, 3)."""
+    """Return the sums of absolute values of the terms of each component, (S, 3)."""
     coefficients = polynomial.differentiate(trajectory.coefficients, derivative)
     return np.asarray(np.abs(coefficients).sum(axis=1) / trajectory.durations[:, None] ** derivative)

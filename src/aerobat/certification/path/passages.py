@@ -1,6 +1,6 @@
-"""Passages through gates and waypoints, at the instants at which they are planned.
+"""Passages through gates and waypoints, checked at their planned instants.
 
-Path and thrust at one instant are known but for rounding; solvers meet their equations to PASSAGE_TOLERANCE.
+Path and thrust at one instant are known up to rounding. Solvers satisfy their equations to PASSAGE_TOLERANCE.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-PASSAGE_TOLERANCE = 1e-6  # [m, m/s, rad] by which a passage may miss what is asked: what solvers leave
-PLANE_DISTANCE = 1e-3  # [m] from the gate's plane, within which a path is said to be in it
+PASSAGE_TOLERANCE = 1e-6  # [m, m/s, rad] violation of a passage that is accepted: the accuracy of solvers
+PLANE_DISTANCE = 1e-3  # [m] largest distance from the gate's plane of a point in it
 
 
 def passage_findings(
     trajectory: Trajectory, passages: Sequence[PlannedPassage], vehicle: Vehicle, environment: Environment
 ) -> list[Finding]:
-    """The findings about each passage: in the gate's plane, through it, inside the opening, attitude.
+    """Return the findings about each passage: in the gate's plane, inside the opening, speed, attitude.
 
     Args:
         trajectory: The path.
@@ -40,7 +40,7 @@ def passage_findings(
 
 
 def waypoint_findings(trajectory: Trajectory, waypoints: Sequence[PlannedWaypoint]) -> list[Finding]:
-    """The findings about each waypoint: how far from its centre it is met."""
+    """Return the findings about each waypoint: the distance from its centre."""
     return [_met(trajectory, waypoint) for waypoint in waypoints]
 
 
@@ -59,14 +59,14 @@ class _Instant:
     passage: PlannedPassage
     offset: Array  # [m], (3,)
     velocity: Array  # relative to the gate's [m/s], (3,)
-    thrust: Array  # specific, drag counted [m/s²], (3,)
-    floor: float  # [m/s²] of |thrust|, below which no attitude is determined
+    thrust: Array  # specific thrust, drag included [m/s²], (3,)
+    floor: float  # [m/s²] |thrust| below which no attitude is determined
 
     @classmethod
     def of(
         cls, trajectory: Trajectory, passage: PlannedPassage, vehicle: Vehicle, environment: Environment
     ) -> _Instant:
-        """The state of a vehicle on a trajectory."""
+        """Return the state of a vehicle on a trajectory."""
         time = np.array([min(passage.time, trajectory.duration)])
         position, velocity, acceleration = (trajectory.evaluate(time, k)[0] for k in range(3))
         thrust = force_balance(environment, vehicle).specific_thrust(velocity, acceleration)
@@ -81,7 +81,7 @@ class _Instant:
         return cls(passage, position - gate.places(time)[0], velocity, thrust, floor)
 
     def findings(self) -> list[Finding]:
-        """Return the findings on the passage: what it does, against what is asked of it."""
+        """Return the findings about the passage, compared with what it requires."""
         gate = self.passage.gate
         along, depth = float(self.offset @ gate.normal), gate.opening.depth(gate.plane_axes @ self.offset)
         margin = min(self.passage.margin, gate.opening.inradius)
@@ -94,7 +94,7 @@ class _Instant:
         return found if self.passage.attitude_tolerance == np.inf else [*found, self._attitude()]
 
     def _attitude(self) -> Finding:
-        """The angle between the thrust axis and where it shall point, undecided where there is no thrust."""
+        """Return the angle between the thrust axis and its required direction; undecided without thrust."""
         wanted = self.passage.up
         sine, cosine = np.linalg.norm(np.cross(wanted, self.thrust)), wanted @ self.thrust
         angle = float(np.arctan2(sine, cosine))
