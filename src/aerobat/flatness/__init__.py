@@ -1,4 +1,4 @@
-"""Differential flatness: what a vehicle must do to fly a trajectory, inverted or not."""
+"""Differential flatness: attitude, rates, moments and rotor thrusts that a trajectory requires."""
 
 from aerobat.flatness.flyable import Flyable, Planned, environment_of, vehicle_of
 from aerobat.flatness.parallel_transport import TimeInterval

@@ -1,4 +1,4 @@
-"""A plan as far as flying goes: what a trajectory alone does not say, its vehicle and its environment."""
+"""The part of a plan that flying needs besides the trajectory: its vehicle and its environment."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from aerobat.vehicle.vehicle import Vehicle
 
 @runtime_checkable
 class Flyable(HasTrajectory, Protocol):
-    """A plan as far as flying goes."""
+    """A plan, as far as flying needs it."""
 
     @property
     def vehicle(self) -> Vehicle | None:
-        """The vehicle it was planned for."""
+        """The vehicle that the plan was made for."""
 
     @property
     def problem(self) -> Any:
-        """The problem it solves, with its environment."""
+        """The problem that the plan solves, with its environment."""
 
 
 Planned = Annotated[Flyable, AS_IT_IS, Field(description="plan")]
 
 
 def environment_of(flown: Flyable | Trajectory, environment: Environment | None) -> Environment:
-    """The environment given, else a plan's, else a calm day on Earth."""
+    """Return the given environment, else a plan's, else a calm day on Earth."""
     if environment is not None:
         return environment
     if isinstance(flown, Trajectory):
@@ -41,7 +41,7 @@ def environment_of(flown: Flyable | Trajectory, environment: Environment | None)
 
 
 def vehicle_of(flown: Flyable | Trajectory, vehicle: Vehicle | str | None) -> Vehicle:
-    """The vehicle given, else a plan's. Raises SpecError where there is none."""
+    """Return the given vehicle, else a plan's. Raise SpecError where there is none."""
     if vehicle is not None:
         return as_vehicle(vehicle)
     own = None if isinstance(flown, Trajectory) else flown.vehicle

@@ -1,11 +1,10 @@
-"""Carrying a frame along a thrust direction without spin: no pole, no drift.
+"""Parallel transport of a frame along a thrust direction, without spin, singularity or drift.
 
-Between samples the specific thrust f is the quintic through its values and two derivatives at both ends
-(exact for trajectories of degree 7 or less), kept as Bézier control points: they bound the curve, so that
-halving intervals until each stays inside a cone is a proof, not a guess. On such a piece the frame turns
-first by the smallest rotation from one thrust direction to the next. The frame then turns about the direction
-by the area between the curve and that great arc (Hanson and Ma, "Parallel transport approach to curve
-framing", 1995).
+Between samples the specific thrust f is the quintic through its values and two derivatives at both ends,
+which is exact for trajectories of degree 7 or less. Its Bézier control points bound the curve, so halving
+intervals until each piece stays inside a cone is a proof. On such a piece the frame first turns by the
+smallest rotation from one thrust direction to the next. It then turns about that direction by the area
+between the curve and the great arc (Hanson and Ma, "Parallel transport approach to curve framing", 1995).
 """
 
 from __future__ import annotations
@@ -21,14 +20,14 @@ from aerobat.arrays import Array
 from aerobat.so3 import UP
 from aerobat.trajectory.subintervals import Subintervals
 
-MAX_TURN = 0.5  # a piece stays within this fraction of |f| of its start: 30 degrees
-MAX_HALVINGS = 60  # far more than the cone asks of any sane curve
-CROSSING_ROUNDS = 10  # each divides by 16: to the last digit
+MAX_TURN = 0.5  # largest change of f on a piece, as a fraction of |f| at its start: 30 degrees
+MAX_HALVINGS = 60  # far more than any realistic curve needs
+CROSSING_ROUNDS = 10  # each divides the interval by 16, so the result has full precision
 
 
 @dataclass(frozen=True)
 class TimeInterval:
-    """A stretch of time [s]."""
+    """An interval of time [s]."""
 
     start: float
     end: float
@@ -36,19 +35,20 @@ class TimeInterval:
 
 @dataclass(frozen=True)
 class TransportedFrames:
-    """Attitudes along a thrust curve, at its samples and at the nodes put between them, M in all."""
+    """Attitudes along a thrust curve at M nodes: its samples, and nodes added between them."""
 
     q_world_body: Array  # (M, 4), sign continuous
-    determined: NDArray[np.bool_]  # |f| reaches the floor, so that there is a thrust direction, (M,)
-    samples: NDArray[np.intp]  # where among the nodes the samples are, (T,)
+    determined: NDArray[np.bool_]  # (M,) True where |f| reaches the floor, so that the thrust has a direction
+    samples: NDArray[np.intp]  # indices of the samples among the nodes, (T,)
     undetermined: tuple[TimeInterval, ...]
 
 
 def frames(times: Array, thrust: Array, floor: float, heading: float) -> TransportedFrames:
-    """Carry a frame along the specific thrust; times (T,), thrust f, f', f'' (T, 3, 3), floor on |f| [m/s²].
+    """Carry a frame along the specific thrust f without spin.
 
-    It starts as the smallest rotation from the vertical to f, turned about f by `heading`. Where |f| is below
-    the floor it stays as it was; beyond, the smallest rotation takes it on. Repeated times are allowed.
+    The initial frame is the smallest rotation from the vertical to f, turned about f by `heading`. Where |f|
+    is below `floor` [m/s²] the frame is held; behind such an interval it continues by the smallest rotation.
+    Times (T,) may repeat; `thrust` holds f, f', f'', (T, 3, 3).
     """
     pieces, control = _subdivided(times, thrust, floor)
     samples = np.append(np.flatnonzero(pieces.start == 0.0), len(pieces))
@@ -64,10 +64,10 @@ def frames(times: Array, thrust: Array, floor: float, heading: float) -> Transpo
 
 
 def _carry(directions: Array, control: Array, heading: float) -> Array:
-    """Attitudes at unit thrust directions (M, 3) along the pieces between them, (M - 1, 6, 3) -> (M, 4)."""
+    """Return attitudes (M, 4) at unit thrust directions (M, 3), from the pieces between, (M - 1, 6, 3)."""
     chart = _chart(directions)
     first = so3.multiply(so3.smallest_rotation(UP, directions[0]), so3.about_axis(UP, np.array(heading)))
-    # any frame of the right direction differs from the chart's by an angle about it: angles add up
+    # all frames of one thrust direction differ by an angle about it, and angles add up
     arcs = so3.multiply(so3.smallest_rotation(directions[:-1], directions[1:]), chart[:-1])
     carried = np.concatenate([first[None], arcs])
     angles = so3.twist(chart, carried)
@@ -78,9 +78,10 @@ def _carry(directions: Array, control: Array, heading: float) -> Array:
 
 
 def _area(start: Array, control: Array) -> Array:
-    """Area on the unit sphere between each curve (n, 6, 3) and the great arc from `start` (n, 3), its b3.
+    """Return the area on the unit sphere between each curve (n, 6, 3) and the great arc from `start`.
 
-    ∫ start·(f × f') / (r (r + start·f)) with r = |f|, from A = (1 − cos θ) dφ in polar angles about start.
+    `start` (n, 3) is b3 at the curve's start. The area is ∫ start·(f × f') / (r (r + start·f)) with r = |f|,
+    from dA = (1 − cos θ) dφ in polar angles about start.
     """
     ux, uy, uz = start.T[:, :, None]
     x, y, z = (GAUSS_VALUES @ control).transpose(2, 0, 1)
@@ -91,9 +92,9 @@ def _area(start: Array, control: Array) -> Array:
 
 
 def _chart(directions: Array) -> Array:
-    """Some attitude with each thrust direction, well conditioned on the whole sphere, (M, 3) -> (M, 4).
+    """Return one attitude for each thrust direction, well conditioned everywhere, (M, 3) -> (M, 4).
 
-    Above the horizon the smallest rotation from upright; below, from inverted by a half turn about x.
+    Above the horizon it is the smallest rotation from upright; below, from inverted by a half turn about x.
     """
     x, y, z = directions.T
     u, zero = 1 + np.abs(z), np.zeros_like(z)
@@ -102,9 +103,9 @@ def _chart(directions: Array) -> Array:
 
 
 def _subdivided(times: Array, thrust: Array, floor: float) -> tuple[Subintervals, Array]:
-    """Parts of sample intervals in their order, and control points (n, 6, 3) there.
+    """Return parts of sample intervals in order, and their control points (n, 6, 3).
 
-    They are halved until each stays in a cone about its start or below the floor.
+    Intervals are halved until each part stays in a cone about its start, or below the floor.
     """
     pending, control = Subintervals.whole(len(times) - 1), _hermite(thrust[:-1], thrust[1:], np.diff(times))
     done: list[tuple[Subintervals, Array]] = []
@@ -124,14 +125,14 @@ def _subdivided(times: Array, thrust: Array, floor: float) -> tuple[Subintervals
 
 
 def _leaves_cone(control: Array, floor: float) -> NDArray[np.bool_]:
-    """Tell which pieces may leave the cone about their start, and rise above the floor."""
+    """Tell which pieces may leave the cone about their start while they are above the floor."""
     spread = _norm(control - control[:, :1]).max(axis=1)
     norms = _norm(control)
     return np.asarray((spread > MAX_TURN * norms[:, 0]) & (norms.max(axis=1) > floor))
 
 
 def _hermite(thrust: Array, ahead: Array, step: Array) -> Array:
-    """Control points (n, 6, 3) of the quintics from f, f', f'' (n, 3, 3) to those `step` (n,) ahead."""
+    """Return control points (n, 6, 3) of the quintics between f, f', f'' (n, 3, 3) and those `step` later."""
     h = step[:, None]
     (f0, d0, c0), (f1, d1, c1) = (side.swapaxes(0, 1) for side in (thrust, ahead))
     left, right = f0 + h / 5 * d0, f1 - h / 5 * d1
@@ -140,7 +141,7 @@ def _hermite(thrust: Array, ahead: Array, step: Array) -> Array:
 
 
 def _held_directions(f: Array, magnitude: Array, determined: NDArray[np.bool_]) -> Array:
-    """f/|f|, and where that is undetermined the last one that was; upwards before the first, (M, 3)."""
+    """Return f/|f|, held where it is undetermined; upwards before the first determined one, (M, 3)."""
     last = np.maximum.accumulate(np.where(determined, np.arange(len(f)), -1))
     directions = f / np.where(determined, magnitude, 1.0)[:, None]
     return np.where(last[:, None] >= 0, directions[last], UP)
@@ -149,7 +150,7 @@ def _held_directions(f: Array, magnitude: Array, determined: NDArray[np.bool_]) 
 def _undetermined(
     times: Array, control: Array, determined: NDArray[np.bool_], floor: float
 ) -> tuple[TimeInterval, ...]:
-    """The intervals whose nodes are below the floor, to where the curve crosses it."""
+    """Return the intervals with nodes below the floor, extended to where the curve crosses it."""
     edges = np.diff(np.concatenate([[0], ~determined, [0]]).astype(int))
     crossings = [
         float(times[i] + _crossing(control[i], floor) * (times[i + 1] - times[i]))
@@ -162,7 +163,7 @@ def _undetermined(
 
 
 def _crossing(control: Array, floor: float) -> float:
-    """Where in [0, 1] a piece whose ends are on both sides of the floor crosses it."""
+    """Return the parameter in [0, 1] at which a piece crosses the floor, given ends on both sides of it."""
     low, high = 0.0, 1.0
     for _ in range(CROSSING_ROUNDS):
         s = np.linspace(low, high, 17)
@@ -177,11 +178,11 @@ def _norm(vectors: Array) -> Array:
 
 
 def _bernstein(degree: int, s: Array) -> Array:
-    """Bernstein polynomials at the parameters s (k,), (k, degree + 1)."""
+    """Return the Bernstein polynomials at the parameters s (k,), (k, degree + 1)."""
     return np.stack([comb(degree, i) * s**i * (1 - s) ** (degree - i) for i in range(degree + 1)], axis=1)
 
 
-# de Casteljau's halves: control points of [0, 1/2] are means of the first ones with binomial weights
+# de Casteljau's algorithm: control points of [0, 1/2] are binomially weighted means of the first ones
 LOWER_HALF = np.array([[comb(i, j) / 2**i for j in range(6)] for i in range(6)])
 UPPER_HALF = LOWER_HALF[::-1, ::-1].copy()
 

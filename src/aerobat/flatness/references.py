@@ -1,8 +1,9 @@
-"""From a trajectory to everything a vehicle must do to fly it: attitude, rates, moments, rotor thrusts.
+"""The reference for a trajectory by differential flatness: attitude, rates, moments, rotor thrusts.
 
-The equations are those of `kernels.flatness`; `parallel_transport` carries the attitude along. Linear drag
-with coefficients d across and d_z along the body's z keeps the vehicle flat (Faessler, Franchi, Scaramuzza,
-RA-L 2018). With unequal ones across, d is their mean, and `unequal_drag` turns the frame to the body's own.
+The equations are those of `kernels.flatness`; `parallel_transport` carries the attitude along. A vehicle with
+linear drag, of coefficients d across and d_z along body z, is differentially flat (Faessler, Franchi,
+Scaramuzza, RA-L 2018). Where the coefficients of body x and y differ, d is their mean, and `unequal_drag`
+corrects the attitude.
 """
 
 from __future__ import annotations
@@ -35,15 +36,17 @@ from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.allocation import rotor_thrusts
 
-QUINTIC = 5  # the degree of what stands for the thrust between nodes
-PARTS = 16  # of a segment whose thrust is of a higher one: quintics err by the sixth power of their length
+QUINTIC = 5  # degree of the interpolant of the thrust between nodes
+# parts of a segment whose thrust has a higher degree; the error of quintics falls with the length to the
+# sixth
+PARTS = 16
 UNDETERMINED = 1e-3  # the attitude is undetermined where |f| is below this fraction of gravity
 
 
 @short
 @by_value
 class Reference:
-    """All that a vehicle must do to follow a trajectory, at every time of a series."""
+    """The state and the rotor thrusts that a trajectory requires, at every time of a series."""
 
     times: Array  # [s], (T,)
     setpoint: Setpoint  # leading axis T; where the attitude is undetermined it is held and its rates are zero
@@ -51,7 +54,7 @@ class Reference:
     undetermined: tuple[TimeInterval, ...]  # where |f| is next to nothing, between samples too
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return a one-line summary."""
         thrusts = f"{self.rotor_thrusts.min():.2f} to {self.rotor_thrusts.max():.2f} N"
         return f"{len(self.times)} times to {self.times[-1]:.3f} s, rotors asked for {thrusts}"
 
@@ -64,12 +67,12 @@ def reference(
     rate: Positive | None = None,
     environment: Environment | None = None,
 ) -> Reference:
-    """Derive from `trajectory` what `vehicle` must do, at `times`, or at `rate` and the very end.
+    """Compute the reference of `vehicle` on `trajectory`, at `times`, or at `rate` and at the end.
 
-    The attitude starts, at the trajectory's start, as the smallest rotation from upright to the thrust,
-    turned about the thrust by the trajectory's heading. From there the attitude is carried along without
-    spin but for the trajectory's yaw, so that it does not depend on the times. Raises SpecError unless one of
-    times and rate is given, rising and in the trajectory.
+    The initial attitude is the smallest rotation from upright to the thrust, turned about the thrust by the
+    trajectory's heading. From there the attitude is carried along without spin, plus the trajectory's yaw, so
+    it does not depend on the chosen times. SpecError is raised unless exactly one of times and rate is given,
+    and the times rise within the trajectory.
 
     Args:
         trajectory: The path and its heading, or a plan.
@@ -101,10 +104,10 @@ def reference_of(
     environment: Environment | None = None,
     heading: Angle = 0.0,
 ) -> Reference:
-    """Derive from a series of flat states what `vehicle` must do; as `reference` otherwise.
+    """Compute the reference of `vehicle` for a series of flat states, as `reference` does.
 
-    Between samples the thrust is taken as the quintic that fits both; where a derivative jumps, give the
-    time twice, with the states of both sides. Raises SpecError for falling times and shapes that differ.
+    Between samples the thrust is the quintic that fits both ends. Where a derivative jumps, give the time
+    twice, with the states of both sides. SpecError is raised for falling times and shapes that differ.
 
     Args:
         times: When [s], (T,).
@@ -131,9 +134,9 @@ def reference_of(
 
 
 def body_rates(thrust: Array, q_world_body: Array, determined: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Body rates [rad/s] and accelerations [rad/s²] that keep b3 along f, body axes, both (..., 3).
+    """Return body rates [rad/s] and accelerations [rad/s²] that keep b3 along f, body axes, (..., 3) each.
 
-    `thrust` holds f, f', f'' (..., 3, 3); where the attitude is not `determined` (...), both are zero.
+    `thrust` holds f, f', f'' (..., 3, 3). Both results are zero where the attitude is not `determined` (...).
     """
     n = np.where(determined, np.linalg.norm(thrust[..., 0, :], axis=-1), np.inf)
     turning = so3.unrotate(q_world_body[..., None, :], thrust[..., 1:, :]) / n[..., None, None]
@@ -143,7 +146,7 @@ def body_rates(thrust: Array, q_world_body: Array, determined: NDArray[np.bool_]
 
 
 def wrench_for(thrust: Array, airspeed: Array, omega: Array, omega_dot: Array, vehicle: Vehicle) -> Wrench:
-    """Collective thrust and moment along a path.
+    """Return collective thrust and moment along a path.
 
     Args:
         thrust: f, f', f'' [m/s²] and so on, world, (..., 3, 3).
@@ -161,35 +164,38 @@ def wrench_for(thrust: Array, airspeed: Array, omega: Array, omega_dot: Array, v
 
 
 def specific_thrust(flat: FlatState, vehicle: Vehicle, environment: Environment) -> Array:
-    """Specific thrust f and its derivatives f', f'' [m/s²] and so on, world, (..., 3, 3)."""
+    """Return the specific thrust and two derivatives, f, f', f'' [m/s², m/s³, m/s⁴], world, (..., 3, 3)."""
     airspeed, drag = flat.velocity - environment.wind, lateral_drag(vehicle)
     motion = airspeed, flat.acceleration, flat.jerk, flat.snap
     return np.stack(kernel.specific_thrust(environment.weight, drag, *motion), axis=-2)
 
 
 def lateral_drag(vehicle: Vehicle) -> float:
-    """The drag coefficient across the thrust axis per mass, d/m [1/s]."""
+    """Return the drag coefficient across the thrust axis per mass, d/m [1/s]."""
     return float(vehicle.drag_body[:2].mean()) / vehicle.mass
 
 
 def axial_drag(vehicle: Vehicle) -> float:
-    """The drag coefficient along the thrust less that across it, per mass, (d_z − d)/m [1/s]."""
+    """Return the drag coefficient along the thrust minus that across it, per mass, (d_z − d)/m [1/s]."""
     return float(vehicle.drag_body[2]) / vehicle.mass - lateral_drag(vehicle)
 
 
 def has_unequal_drag(vehicle: Vehicle) -> bool:
-    """True if drag along body x differs from that along body y, so that the attitude is not the mean's."""
+    """Return True if drag differs between body x and y, which changes the attitude."""
     return bool(vehicle.drag_body[0] != vehicle.drag_body[1])
 
 
 def force_balance(environment: Environment, vehicle: Vehicle | None = None) -> ForceBalance:
-    """Return the forces that thrust works against in an environment; without a vehicle there is no drag."""
+    """Return the balance of thrust, gravity and drag in an environment; without a vehicle, without drag."""
     drag = 0.0 if vehicle is None else lateral_drag(vehicle)
     return ForceBalance(environment.gravity, drag, environment.wind)
 
 
 def _nodes_for_quintics(trajectory: Trajectory, vehicle: Vehicle) -> list[float]:
-    """Normalised times within each segment between which the thrust is all but a quintic, if it is none."""
+    """Return normalised times inside segments between which a quintic approximates the thrust.
+
+    The list is empty where the thrust has degree 5 or less.
+    """
     degree = trajectory.degree - (1 if lateral_drag(vehicle) > 0.0 else 2)
     return [] if degree <= QUINTIC else np.linspace(0.0, 1.0, PARTS + 1)[1:-1].tolist()
 
@@ -197,9 +203,10 @@ def _nodes_for_quintics(trajectory: Trajectory, vehicle: Vehicle) -> list[float]
 def _mean_frames(
     trajectory: Trajectory, vehicle: Vehicle, environment: Environment, times: Array
 ) -> tuple[TransportedFrames, NDArray[np.intp]]:
-    """The frames along the mean-drag thrust, and where among their nodes some times (T,) are."""
+    """Return the frames along the mean-drag thrust, and the indices of `times` (T,) among their nodes."""
     flat = trajectory.flat(times)
-    # both sides of every knot join the times, which show the later side, and what quintics need between
+    # both sides of every knot and the nodes that quintics need are added; the times use the later side of a
+    # knot
     inner = _nodes_for_quintics(trajectory, vehicle)
     parts = [1.0, 0.0, *inner]
     curve = [FlatState(*(trajectory.on_segments([s], k)[:, 0] for k in range(5))) for s in parts]
@@ -215,7 +222,7 @@ def _mean_frames(
 def _turned_frames(
     trajectory: Trajectory, vehicle: Vehicle, environment: Environment, times: Array
 ) -> tuple[TransportedFrames, NDArray[np.intp], FrameAngle]:
-    """The same, and the angle between the frames of mean and of unequal drag."""
+    """Return the same, and the angle from the frames of mean drag to those of unequal drag."""
     drag = UnequalDrag.of(vehicle, environment)
     pieces = resolved_pieces(trajectory, drag)
     inner = pieces.times_at(trajectory, nodes())
@@ -239,7 +246,7 @@ def _assembled(
     angle: Array | None,
     yaw: Array | None = None,
 ) -> Reference:
-    """The reference at `nodes` of a path of frames.
+    """Return the reference at `nodes` of a path of frames.
 
     Args:
         times: [s], (T,).

@@ -1,8 +1,8 @@
-"""The attitude of a vehicle whose drag along its x differs from that along its y.
+"""The attitude of a vehicle whose drag differs between body x and body y.
 
-Its thrust axis is off from that of the mean drag, and by how much depends on the body's angle ψ about it. The
-angle is counted from the frame that `parallel_transport` carries along the mean-drag thrust. Its rate follows
-from ω_z = 0 (`kernels.unequal_drag`) and is integrated by Picard's iteration on Chebyshev series.
+Its thrust axis differs from that of the mean drag by an amount that depends on the body's angle ψ about it.
+The angle is measured from the frame that `parallel_transport` carries along the mean-drag thrust. The rate ψ'
+follows from ω_z = 0 (`kernels.unequal_drag`) and is integrated by Picard iteration on Chebyshev series.
 """
 
 from __future__ import annotations
@@ -26,17 +26,18 @@ from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle.vehicle import Vehicle
 
-NODES = 20  # of a piece
-RESOLVED = 1e-10  # of its size, the last terms of what is singular where no attitude is determined
-SHORTEST = 2.0**-12  # of a segment: no piece is cut further
-ROUNDS = 100  # of Picard's iteration, whose errors fall as those of the exponential series
-SETTLED = 1e-14  # [rad]
-LARGEST_PART = 0.5  # of the mean-drag thrust, what the difference in drag may add to it
+NODES = 20  # Chebyshev nodes of a piece
+# largest last terms, relative to the first, of functions that are singular where no attitude is determined
+RESOLVED = 1e-10
+SHORTEST = 2.0**-12  # smallest piece, as a fraction of a segment
+ROUNDS = 100  # limit of Picard iterations; the errors fall as the terms of the exponential series
+SETTLED = 1e-14  # [rad] change at which the iteration has converged
+LARGEST_PART = 0.5  # largest contribution of the drag difference, as a fraction of the mean-drag thrust
 
 
 @dataclass(frozen=True)
 class UnequalDrag:
-    """Drag coefficients over the mass, and the environment that they act in."""
+    """Drag coefficients divided by the mass, and the environment."""
 
     coefficients: Array  # [1/s] along body x, y and z, (3,)
     wind: Array  # [m/s]
@@ -44,32 +45,32 @@ class UnequalDrag:
 
     @classmethod
     def of(cls, vehicle: Vehicle, environment: Environment) -> UnequalDrag:
-        """Of a vehicle."""
+        """Return the drag of a vehicle in an environment."""
         return cls(vehicle.drag_body / vehicle.mass, environment.wind, environment.weight)
 
     @property
     def mean(self) -> float:
-        """Of drag along body x and y [1/s]."""
+        """The mean of the drag coefficients along body x and y [1/s]."""
         return float(self.coefficients[:2].mean())
 
     @property
     def difference(self) -> float:
-        """By how much drag along body x exceeds the mean [1/s]."""
+        """The excess of the drag coefficient along body x over the mean [1/s]."""
         return float(self.coefficients[0] - self.coefficients[1]) / 2
 
     def part(self, thrust: Array, airspeed: Array) -> Array:
-        """Return what unequal drag may add to mean-drag thrusts (..., 3), as a fraction of them, (...)."""
+        """Return the largest contribution of unequal drag, as a fraction (...) of mean-drag thrusts."""
         size = np.maximum(np.linalg.norm(thrust, axis=-1), np.finfo(float).tiny)
         return np.asarray(abs(self.difference) * np.linalg.norm(airspeed, axis=-1) / size)
 
     def counted(self, thrust: Array, airspeed: Array) -> Array:
-        """`difference`, less where it would add more than LARGEST_PART to mean-drag thrusts, (...)."""
+        """Return `difference`, reduced where its contribution exceeds LARGEST_PART of the thrust, (...)."""
         part = self.part(thrust, airspeed)
         return np.asarray(self.difference * LARGEST_PART / np.maximum(part, LARGEST_PART))
 
 
 def resolved_pieces(trajectory: Trajectory, drag: UnequalDrag) -> Subintervals:
-    """Halve segments until series of NODES terms resolve what an attitude is made of, in order."""
+    """Halve segments until series of NODES terms resolve the attitude; return the pieces in order."""
     pending, done = Subintervals.whole(trajectory.segments), []
     while len(pending):
         motion = motion_on(trajectory, pending, nodes(), 2)
@@ -85,7 +86,7 @@ def resolved_pieces(trajectory: Trajectory, drag: UnequalDrag) -> Subintervals:
 
 
 def trajectory_through(times: Array, flat: FlatState, heading: float) -> Trajectory:
-    """Return a trajectory from zero with velocity to snap of a series that spans time, at its times (T,)."""
+    """Return a trajectory from the origin through velocity to snap of a series at its times (T,)."""
     moves = np.diff(times) > 0.0
     durations = np.diff(times)[moves]
     rates = np.stack([flat.velocity, flat.acceleration, flat.jerk, flat.snap], axis=1)
@@ -97,11 +98,11 @@ def trajectory_through(times: Array, flat: FlatState, heading: float) -> Traject
 
 @dataclass(frozen=True)
 class FrameAngle:
-    """The angle ψ [rad] from the frame of the mean drag to the one that the body's axes are nearest to."""
+    """The angle ψ [rad] from the frame of the mean drag to the one nearest to the body's axes."""
 
     starts: Array  # [s] of the pieces, (P,)
-    seconds: Array  # [s] that they take, (P,)
-    series: Array  # of ψ on them, (P, NODES + 1)
+    seconds: Array  # [s] durations of the pieces, (P,)
+    series: Array  # Chebyshev series of ψ on the pieces, (P, NODES + 1)
 
     @classmethod
     def along(
@@ -133,14 +134,14 @@ class FrameAngle:
         return cls(starts, seconds, series)
 
     def at(self, times: Array) -> Array:
-        """ψ at times [s], (T,)."""
+        """Return ψ at times [s], (T,)."""
         piece = np.maximum(np.searchsorted(self.starts, times, side="right") - 1, 0)
         position = 2 * (times - self.starts[piece]) / self.seconds[piece] - 1
         return np.asarray(chebyshev.chebval(position, self.series[piece].T, tensor=False))
 
 
 def body_attitudes(q_mean: Array, angle: Array, flat: FlatState, drag: UnequalDrag, balance: Array) -> Array:
-    """Attitudes (..., 4) of the body.
+    """Return the attitudes (..., 4) of the body.
 
     Args:
         q_mean: The frame of the mean drag, (..., 4).
@@ -156,7 +157,7 @@ def body_attitudes(q_mean: Array, angle: Array, flat: FlatState, drag: UnequalDr
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = kernel.nearest_axes(
         np.sqrt, add_scaled(thrust, kappa, air), add_scaled(thrust, -kappa, air)
     )
-    # the body's axes are within a right angle of these: the quaternion's first component is large
+    # the body's axes are within a right angle of these, so the quaternion's first component is large
     q = np.stack([1 + xx + yy + zz, yz - zy, zx - xz, xy - yx], axis=-1)
     return so3.multiply(near, so3.normalize(q))
 
@@ -164,7 +165,7 @@ def body_attitudes(q_mean: Array, angle: Array, flat: FlatState, drag: UnequalDr
 def body_motion(
     q: Array, flat: FlatState, drag: UnequalDrag, balance: Array, yaw: Array | None
 ) -> tuple[Array, Array, Array]:
-    """Body rates [rad/s], their derivatives [rad/s²], body axes, and specific collective thrust [m/s²].
+    """Return body rates [rad/s] and accelerations [rad/s²], body axes, and specific collective thrust [m/s²].
 
     Args:
         q: Attitudes of the body, (..., 4).
@@ -190,12 +191,12 @@ def body_motion(
 
 @dataclass(frozen=True)
 class _Local:
-    """A motion in the frame of the mean drag, z along its thrust; across it x + i y. All (P, N)."""
+    """A motion in the frame of the mean drag, z along its thrust; x + i y across it. All (P, N)."""
 
     difference: Array
-    norm: Array  # of the thrust
-    rising: Array  # its derivative along itself
-    turning: NDArray[np.complex128]  # its derivative across itself
+    norm: Array  # norm of the thrust
+    rising: Array  # component of the thrust's derivative along the thrust
+    turning: NDArray[np.complex128]  # component of the thrust's derivative across the thrust
     air: NDArray[np.complex128]
     air_along: Array
     accelerated: NDArray[np.complex128]
@@ -217,7 +218,7 @@ class _Local:
         return cls(kappa, norm, rising, across, air, air_along, accelerated, accelerated_along)
 
     def spin(self, angle: Array, yaw_rate: Array) -> Array:
-        """ψ' [rad/s] at angles ψ, of a body that turns about its thrust axis at yaw rates [rad/s]."""
+        """Return ψ' [rad/s] at angles ψ, for a body that yaws about its thrust axis at `yaw_rate` [rad/s]."""
         back = np.exp(-1j * angle)
         change, air, accelerated = (
             _vector(back * across, along)
@@ -235,7 +236,7 @@ class _Local:
 
 
 def motion_on(trajectory: Trajectory, pieces: Subintervals, at: Array, orders: int) -> Array:
-    """Velocity and so on, `orders` derivatives, at positions in [-1, 1] on pieces, (P, N, orders, 3)."""
+    """Return `orders` derivatives, from velocity on, at positions in [-1, 1] on pieces, (P, N, orders, 3)."""
     s, found = pieces.positions(at), []
     for k in range(1, orders + 1):
         rates = polynomial.differentiate(trajectory.coefficients, k)[pieces.interval, None]
@@ -246,13 +247,13 @@ def motion_on(trajectory: Trajectory, pieces: Subintervals, at: Array, orders: i
 
 @cache
 def nodes(count: int = NODES) -> Array:
-    """Chebyshev points inside a piece, so that none is at a knot, (count,)."""
+    """Return Chebyshev points inside a piece, which exclude knots, (count,)."""
     return np.asarray(chebyshev.chebpts1(count))
 
 
 @cache
 def analysis(count: int = NODES) -> Array:
-    """The matrix from values at the nodes to Chebyshev coefficients, (count, count)."""
+    """Return the matrix from values at the nodes to Chebyshev coefficients, (count, count)."""
     return np.asarray(np.linalg.inv(chebyshev.chebvander(nodes(count), count - 1)))
 
 

@@ -1,8 +1,8 @@
-"""Limits along a path, each said once: a quantity, the interval that it must stay in, and who asks for it.
+"""Limits along a path, each defined once: a quantity, its bounds, and the fields that set them.
 
-A family of limits is one file with one function, registered in `along.FAMILIES` or by `register_limits`: the
-mixed-integer search, the refinements, the look between samples and the certificate hold its limits. The room
-of the body in a gate holds at one instant, and is said once for all optimizers in `body_in_gate`.
+A family of limits is one file with one function, registered in `along.FAMILIES` or by `register_limits`. The
+mixed-integer search, the refinement, the checks between samples and the certificate all use these limits. The
+clearance of the body in a gate holds near one instant, and is defined for all optimizers in `body_in_gate`.
 """
 
 from aerobat.limits.along import limits_along, register_limits

@@ -1,4 +1,4 @@
-"""All limits along a path, by family: the register of limits."""
+"""The register of limits: all limits along a path, by family."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FAMILIES: list[Family] = [
 
 
 def register_limits(family: Family) -> Family:
-    """Register a function that yields limits, as a decorator: every planner and certificate holds them.
+    """Register a function that yields limits, as a decorator; all planners and certificates use them.
 
     Args:
         family: Of what is asked, the vehicle and the problem's limits, to the limits that follow from it.
@@ -37,7 +37,7 @@ def register_limits(family: Family) -> Family:
 
 
 def limits_along(
-    vehicle: Vehicle | None,
+    vehicle: Vehicle | None,  # Return all limits that must hold along a whole path.
     environment: Environment,
     limits: Limits,
     conditions: tuple[Condition, ...],
@@ -55,7 +55,7 @@ def limits_along(
 
 
 def _limits(family: Family, asked: Asked) -> Iterator[Limit]:
-    """The limits of a family. Raises SpecError for what is none, which a function of one's own may return."""
+    """Yield the limits of a family. Raise SpecError for values that a user's family must not return."""
     try:
         found: Any = family(asked)
         if not isinstance(found, Iterable):

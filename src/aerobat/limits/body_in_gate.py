@@ -1,20 +1,19 @@
-"""The body's room in a gate: clear of the frame from before the plane until it is behind it.
+"""Clearance of the body from a gate's frame, from before the gate's plane until behind it.
 
-A stage asks where the centre of mass is at one instant. The body is about the plane for a while, and passes
-the opening if it flies on much as it flies there. Let v_n be the velocity along the normal, and v_a that
-outward across a side of the opening. The length d is the body's reach and more before and behind the plane,
-and s what the body reaches outward as it is turned. The room r is left to that side from where the body
-crosses. With an acceleration of at most a off a straight line, |path − straight line| ≤ ½ a (d/v_n)². The
-body is clear where
+A stage constrains the centre of mass at one instant. The body needs some time to pass the plane, and clears
+the opening if its motion changes little meanwhile. Let v_n be the velocity along the normal, and v_a the
+velocity outward across a side of the opening. The length d is the body's reach plus a margin, before and
+behind the plane. s is the body's extent in the outward direction in its attitude, and r the distance to that
+side from the crossing point. With an acceleration of at most a across a straight line, |path − straight line|
+≤ ½ a (d/v_n)². The body is clear where
 
     (r − s) v_n ± d v_a ≥ ½ a d²/v_n    on all sides    and    v_n ≥ √(2 a d).
 
-The latter keeps the body from turning back. The body is an ellipsoid with its semi-axes on the diagonal of D
-and the attitude R, so that s = |D Rᵀ e| along e. Where only the thrust axis is known, the ellipsoid of
-revolution about that axis is taken, which encloses the body however it is turned.
+The second condition keeps the body from turning back. The body is an ellipsoid with its semi-axes on the
+diagonal of D and the attitude R, so s = |D Rᵀ e| along e. Where only the thrust axis is known, the body is
+the ellipsoid of revolution about that axis that contains the vehicle at every angle about it.
 
-The values are written in components once, for whoever evaluates them: floats, complex steps,
-symbols.
+The values are written in components once, for all kinds of numbers: floats, complex steps, symbols.
 """
 
 from __future__ import annotations
@@ -32,25 +31,26 @@ from aerobat.kernels.vectors import dot, subtract
 from aerobat.problem.gate import Gate
 from aerobat.vehicle import Ellipsoid
 
-SLOWEST = 0.5  # [m/s] through a gate, below which no more room is asked: far less than what is asked there
-FRAME_CLEARANCE = 0.01  # [m] from body to frame
+SLOWEST = 0.5  # [m/s] lower bound of v_n in the curvature term; far below the speeds required at gates
+FRAME_CLEARANCE = 0.01  # [m] smallest distance of the body from the frame
 
-Extent: TypeAlias = Callable[[Vector], Scalar]  # [m] that a body reaches from its centre of mass, outward
+# [m] extent of a body from its centre of mass in an outward direction
+Extent: TypeAlias = Callable[[Vector], Scalar]
 
 
 class OpeningAhead(NamedTuple):
-    """An opening and the motion through it that is foreseen, in numbers or in symbols."""
+    """An opening and bounds of the motion through it, in numbers or in symbols."""
 
-    place: Vector  # [m] of the gate
+    place: Vector  # [m] position of the gate
     normal: Vector  # direction of passage
     outward: tuple[Vector, ...]  # normals of its K sides
     distances: tuple[Scalar, ...]  # [m] of the sides from the place
-    reach: Scalar  # [m] before and behind the plane, over which the room counts
-    bending: Scalar  # [m/s²] across a straight line, at most
+    reach: Scalar  # [m] distance before and behind the plane over which the body must be clear
+    bending: Scalar  # [m/s²] largest acceleration across a straight line
 
     @classmethod
     def of_parameters(cls, parameters: Sequence[Scalar]) -> OpeningAhead:
-        """The opening of 8 + 4 K numbers in the order of its fields."""
+        """Return the opening given by 8 + 4 K numbers in the order of the fields."""
         vectors = [(parameters[k], parameters[k + 1], parameters[k + 2]) for k in range(0, 6, 3)]
         sides = (len(parameters) - 8) // 4
         outward = tuple(
@@ -60,9 +60,10 @@ class OpeningAhead(NamedTuple):
         return cls(vectors[0], vectors[1], outward, distances, parameters[-2], parameters[-1])
 
     def room(self, ops: Ops, position: Vector, velocity: Vector, extent: Extent) -> Iterator[Scalar]:
-        """Yield 2 K + 1 values that are at least zero where the body passes clear of the frame.
+        """Yield 2 K + 1 values that are nonnegative where the body is clear of the frame.
 
-        The room [m²/s] on each side, before and behind the plane, and the speed to spare [m/s].
+        The values are the clearance [m²/s] on each side, before and behind the plane, and the excess speed
+        [m/s].
 
         Args:
             ops: The arithmetic of the arguments.
@@ -82,21 +83,21 @@ class OpeningAhead(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BodyInGate:
-    """A body's room in the gate that a stage crosses."""
+    """The clearance of a body in the gate that a stage crosses."""
 
     gate: Gate
     stage: int
-    reach: float  # [m] before and behind the plane, over which it counts
-    bending: float  # [m/s²] across a straight line, at most
+    reach: float  # [m] distance before and behind the plane over which the body must be clear
+    bending: float  # [m/s²] largest acceleration across a straight line
 
     @property
     def min_speed(self) -> float:
-        """The least speed through the gate [m/s], at which the path does not turn back."""
+        """The smallest speed through the gate [m/s] at which the path cannot turn back."""
         return sqrt(2.0 * self.bending * self.reach)
 
     @property
     def parameters(self) -> Array:
-        """The numbers of its opening, (8 + 4 K,)."""
+        """The numbers of its `OpeningAhead`, (8 + 4 K,)."""
         normals, distances = self.gate.opening.sides
         outward = normals @ self.gate.plane_axes
         place = np.concatenate([self.gate.position, self.gate.normal])
@@ -123,7 +124,7 @@ def extent_of_attitude(ops: Ops, body: Ellipsoid, axes: Axes) -> Extent:
 
 
 def extent_of_thrust(ops: Ops, revolved: Sequence[Scalar], thrust: Vector) -> Extent:
-    """Return the extent of a body that is turned about its thrust axis in whichever way.
+    """Return the largest extent of a body over all angles about its thrust axis.
 
     Args:
         ops: The arithmetic of the thrust.

@@ -1,4 +1,4 @@
-"""The body rate, within what the vehicle's flight controller and gyroscopes allow."""
+"""The limit of the body rate, set by the vehicle's flight controller and gyroscopes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from aerobat.limits.quantity import BODY_RATE, PathQuantity
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
-    """Yield the one limit, where the vehicle has one."""
+    """Yield the body rate limit if the vehicle has one."""
     most = inf if asked.vehicle is None else asked.vehicle.max_body_rate
     if most < inf:
         yield Limit(

@@ -1,4 +1,4 @@
-"""Position and its derivatives, each axis within the problem's bounds."""
+"""Bounds of position and its derivatives per axis, from the problem."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from aerobat.problem import Limits
 from aerobat.problem.limits import DERIVATIVES, UNITS
 
 UP = AXES.index("z")
-# the fields that bound each derivative of position, in sentences
+# the fields that bound each derivative of position, for sentences
 FIELDS = ("limits.lower and limits.upper", *(f"limits.{name}" for name in DERIVATIVES[1:]))
 
 
@@ -41,6 +41,6 @@ def limits(asked: Asked) -> Iterator[Limit]:
 
 
 def field_with_value(derivative: int, limits: Limits) -> str:
-    """Return the fields that bound a derivative of position, with the least bound where it is no place."""
+    """Return the fields that bound a derivative of position; except for position with the smallest bound."""
     field = FIELDS[derivative]
     return f"{field} ({np.min(limits.of(derivative)[1]):g} {UNITS[derivative]})" if derivative else field

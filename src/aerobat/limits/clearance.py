@@ -1,9 +1,9 @@
-"""The clearance of the body from obstacles: what is left between both across planes that separate them.
+"""Clearance of the body from obstacles, measured across separating planes.
 
-The plane between a body and a convex piece is held while a path is moved, as its normal n is found anew from
-round to round. With the position p, the piece's support h along n and the body's extent e against n,
-n·p − e − h is left between them. The body's attitude is the one that its thrust gives it. Whichever plane is
-taken, the body is no nearer to the piece than that.
+The plane between a body and a convex piece stays fixed while a path is optimized; its normal n is found anew
+in each round. With the position p, the piece's support h along n and the body's extent e against n, the
+clearance is n·p − e − h. The body's attitude follows from its thrust. For every plane, the clearance is a
+lower bound of the distance from the piece.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from aerobat.limits.limit import Limit
 from aerobat.limits.quantity import PathQuantity
 from aerobat.vehicle import Ellipsoid
 
-SIZE = 0.5  # [m] of which excesses are fractions: as a body is wide
-NEAREST = 4  # pieces at an instant, that count there (the four nearest are enough in forests)
-AWAY = 1.5  # [m] beyond which a piece does not count
-EXACT_WITHIN = 0.2  # [m] within which the best plane is sought: from 0.5 m plans took a quarter longer
+SIZE = 0.5  # [m] size of the limit, about the width of a body; violations are fractions of it
+NEAREST = 4  # nearest pieces considered at each instant; four are enough in forests
+AWAY = 1.5  # [m] distance beyond which a piece is ignored
+# [m] distance within which the best plane is computed exactly: with 0.5 m, plans took a quarter longer
+EXACT_WITHIN = 0.2
 
 
 def limit(margin: float) -> Limit:
-    """Return the limit that a path keeps such a clearance [m]; its quantity is known where planes are."""
+    """Return the limit that keeps a clearance of at least `margin` [m]; planes define its quantity later."""
     fields = ("environment.obstacles", "environment.obstacles")
     return Limit("clearance", "m", PathQuantity(), margin, inf, fields, size=SIZE)
 
@@ -40,18 +41,18 @@ class Planes(NamedTuple):
     """Planes between a body and the nearest pieces at m instants; far away where there are fewer pieces."""
 
     normals: Array  # from the piece to the body, (m, NEAREST, 3)
-    offsets: Array  # [m] (m, NEAREST), −infinite for those that do not count
+    offsets: Array  # [m] (m, NEAREST), −infinite for unused planes
 
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """The clearance of a body from the pieces of a world."""
+    """The clearance of a body from the obstacle pieces of an environment."""
 
     pieces: Pieces
     body: Ellipsoid
 
     def planes(self, positions: Array, thrust_axes: Array, times: Array) -> Planes:
-        """Return the planes between body and pieces.
+        """Return the planes between the body and the nearest pieces.
 
         Args:
             positions: Of the centre of mass [m], (m, 3).
@@ -71,7 +72,7 @@ class Clearance:
         return Planes(normals, offsets)
 
     def least(self, positions: Array, thrusts: Array, times: Array) -> tuple[list[float], list[str]]:
-        """Return the clearance [m] from the nearest piece at each place, infinite far away, and its name.
+        """Return the clearance [m] from the nearest piece at each position (infinite if far), and its name.
 
         Args:
             positions: Of the centre of mass [m], (m, 3).
@@ -83,7 +84,7 @@ class Clearance:
         is_falling = length == 0.0
         axes = thrusts / np.where(is_falling, 1.0, length)
         bodies, numbers, found = self._separated(positions, axes, times, inf)
-        # without a thrust axis `turned` makes a ball as wide as the body, and the body reaches farther
+        # without a thrust axis `turned` returns a ball of radius `wide`; the body may reach farther
         beyond = np.where(is_falling[:, 0], revolved.reach - revolved.wide, revolved.aside)
         gaps = found.gaps - beyond[bodies]
         least, names = [inf] * len(positions), [""] * len(positions)
@@ -95,7 +96,7 @@ class Clearance:
     def _separated(
         self, positions: Array, thrust_axes: Array, times: Array, exact_within: float
     ) -> tuple[Indices, Indices, Separation]:
-        """Bodies and pieces that are near, (m,) each, and the planes between them."""
+        """Return the indices of nearby bodies and pieces, (m,) each, and the planes between them."""
         revolved = self.body.revolved
         offset, shapes = revolved.turned(thrust_axes)
         centres = positions + offset
@@ -107,7 +108,7 @@ class Clearance:
 def left_between(
     ops: Ops, revolved: Sequence[Scalar], position: Vector, thrust: Vector, normal: Vector, offset: Scalar
 ) -> Scalar:
-    """Return what is left between a body and a plane [m].
+    """Return the clearance between a body and a plane [m].
 
     Args:
         ops: The arithmetic.

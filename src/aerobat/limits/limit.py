@@ -1,4 +1,4 @@
-"""A limit: a quantity along a path, the interval that it must stay in, and the fields that say so."""
+"""A limit: a quantity along a path, its lower and upper bound, and the fields that set them."""
 
 from __future__ import annotations
 
@@ -15,34 +15,35 @@ from aerobat.problem import Condition, Limits
 from aerobat.problem.condition import ForceBalance
 from aerobat.vehicle import Vehicle
 
-HALF = 0.15  # the reserve that keeps half of a small room
-SMALLEST_SIZE = 1e-3  # in SI units: a bound next to zero has no size of its own
+HALF = 0.15  # reserve for which `kept` keeps half of a small room
+SMALLEST_SIZE = 1e-3  # in SI units: a smaller bound gets size 1
 
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """lower ≤ quantity ≤ upper, all along a path; infinite where one side is open.
+    """The condition lower ≤ quantity ≤ upper along a whole path; infinite where one side is open.
 
-    Where an optimizer cannot take it as it is, `search` says it once more: limits linear in a path's
-    derivatives that together imply it, for programs that know nothing else. It has none by itself where it is
-    not linear.
+    `search` holds limits that are linear in the path's derivatives and together imply this one, for programs
+    that accept only linear limits. It is empty by default, also where the quantity is not linear.
     """
 
-    name: str  # of the quantity in certificates: "command", "velocity x"
+    name: str  # name of the quantity in certificates: "command", "velocity x"
     unit: str
     quantity: PathQuantity
     lower: float
     upper: float
-    fields: tuple[str, str]  # that the lower and the upper end come from: "max_thrust", "limits.velocity"
-    size: float  # of its range, of which reserves and excesses are fractions
-    rotor: int | None = None  # whose it is
-    rooms: tuple[float, float] = (0.0, 0.0)  # of that size, beside either end, of which `kept` keeps a part
-    is_implied: bool = False  # whether others imply it along a whole path: an optimizer may leave it out
-    is_proven: bool = True  # whether a certificate states it; else it guards what planners do between
+    fields: tuple[str, str]  # that set the lower and the upper bound: "max_thrust", "limits.velocity"
+    size: float  # size of its range; reserves and violations are fractions of it
+    rotor: int | None = None  # index of the rotor that the limit is about
+    # room at either end, as a fraction of the size, of which `kept` keeps a part
+    rooms: tuple[float, float] = (0.0, 0.0)
+    # whether other limits imply it along a whole path, so that an optimizer may omit it
+    is_implied: bool = False
+    is_proven: bool = True  # whether a certificate states it; else it only guides planners
     search: tuple[Limit, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check what a family of one's own may get wrong."""
+        """Check the values that a user's family may get wrong."""
         if not self.lower <= self.upper:
             ends = f"lower {self.lower:g} and upper {self.upper:g}"
             raise SpecError(f"limit '{self.name}' has {ends}; let them rise, and inf be where a side is open")
@@ -53,22 +54,22 @@ class Limit:
 
     @cached_property
     def linear(self) -> tuple[Limit, ...]:
-        """The limits that stand for this one in programs that are linear in a path's derivatives."""
+        """The limits that replace this one in programs that are linear in a path's derivatives."""
         return (self,) if self.quantity.is_of_path else self.search
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The limit's ends less the quantity's constant, as fractions of the limit's size."""
+        """The bounds minus the quantity's constant, as fractions of the limit's size."""
         constant = self.quantity.constant
         return (self.lower - constant) / self.size, (self.upper - constant) / self.size
 
     def kept(self, reserve: float) -> tuple[float, float]:
-        """Return what a reserve for the controller keeps from either end, as fractions of its size."""
+        """Return the reserve kept for the controller at either end, as fractions of the limit's size."""
         lower, upper = self.rooms
         return kept(reserve, lower), kept(reserve, upper)
 
     def exceeded(self, excess: float, time: float, fields: Sequence[str] = ()) -> Reason:
-        """Return a sentence without its full stop about an excess.
+        """Return a sentence without its full stop about a violation.
 
         Args:
             excess: A fraction of its size.
@@ -82,7 +83,7 @@ class Limit:
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """All that asks for limits: a vehicle, an environment, and what a problem asks of the whole path."""
+    """All sources of limits: a vehicle, an environment, and a problem's bounds for the whole path."""
 
     vehicle: Vehicle | None  # None: no vehicle in particular
     environment: Environment
@@ -96,20 +97,21 @@ class Asked:
 
 
 def kept(reserve: float, room: float) -> float:
-    """Return what a reserve keeps from an end with some room: itself, but of a small room a part.
+    """Return the reserve that is kept at an end with some room: the reserve, or a part of a small room.
 
-    Half of the room is kept by HALF, and never all of it. Both are fractions of a limit's size.
+    A reserve of HALF keeps half of the room, and no reserve keeps all of it. Both are fractions of a limit's
+    size.
     """
     return min(reserve, room * (reserve / (reserve + HALF))) if reserve > 0.0 else 0.0
 
 
 def quantity_name(quantity: str, rotor: int | None) -> str:
-    """Return a quantity in words, with its rotor if it is one's."""
+    """Return a quantity in words, with the number of its rotor if it has one."""
     return quantity if rotor is None else f"{quantity} of rotor {rotor}"
 
 
 def size_of(lower: float, upper: float) -> float:
-    """Return the size of an interval: its length, or where one side is open what the other end says."""
+    """Return the size of an interval: its length, or the magnitude of its end where one side is open."""
     if -inf < lower < upper < inf:
         return upper - lower
     largest = max((abs(end) for end in (lower, upper) if abs(end) < inf), default=0.0)

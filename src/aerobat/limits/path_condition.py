@@ -1,7 +1,8 @@
-"""Conditions of a maneuver throughout: position, velocity, acceleration or specific thrust along a direction.
+"""Conditions of a maneuver along the whole path: position to specific thrust along a direction.
 
-Drag that differs along body x and y makes the specific thrust nonlinear in the path, and programs hold that
-of the mean drag. Thrust that never points down is held as it is beside that, as a bound on the tilt.
+With drag that differs along body x and y the specific thrust is nonlinear in the path, and planners constrain
+the specific thrust of the mean drag. A condition that thrust must not point down is also constrained exactly,
+as a bound on the tilt.
 """
 
 from __future__ import annotations
@@ -32,14 +33,14 @@ def limits(asked: Asked) -> Iterator[Limit]:
 
 
 def _is_upright(condition: Condition) -> bool:
-    """True of what asks of the specific thrust no more than to point upwards."""
+    """Return True for a condition that only requires the specific thrust to point upwards."""
     x, y, z = condition.direction.tolist()
     asks_sign = condition.lower == 0.0 and condition.upper == inf
     return condition.quantity is Quantity.SPECIFIC_THRUST and x == y == 0.0 < z and asks_sign
 
 
 def limit_of(condition: Condition, balance: ForceBalance) -> Limit:
-    """Return a condition as a limit; drag is counted where it is about thrust."""
+    """Return a condition as a limit; drag is included where the condition is about thrust."""
     bound = condition.bound(balance)
     path = np.zeros(PATH_SHAPE)
     path[: len(bound.weights)] = bound.weights

@@ -1,8 +1,8 @@
-"""A quantity along a path: what every limit is about, linear in what is measured at one instant.
+"""The quantity of a limit, linear in the path's derivatives and in flatness measures at one instant.
 
-An instant has two kinds of numbers: the derivatives of position, which are polynomials in time, and what
-flatness makes of them, the measures below. Whoever evaluates the measures, in floats, complex steps,
-symbols or Chebyshev series with proven errors, evaluates every limit.
+The derivatives of position are polynomials in time. The measures below follow from them by differential
+flatness. Code that evaluates the measures (in floats, complex steps, symbols or Chebyshev series with proven
+errors) can evaluate every limit.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MEASURES = 11
 
 @dataclass(frozen=True, eq=False)
 class PathQuantity:
-    """The sum of `path` times position and its derivatives and of `measured` times the measures."""
+    """The sum of `path` times position and derivatives, `measured` times the measures, and `constant`."""
 
     path: Array = field(default_factory=lambda: np.zeros(PATH_SHAPE))  # (6, 3)
     measured: Array = field(default_factory=lambda: np.zeros(MEASURES))  # (11,)
@@ -33,27 +33,27 @@ class PathQuantity:
 
     @classmethod
     def of_wrench(cls, wrench: ArrayLike, rate: ArrayLike = 0.0) -> PathQuantity:
-        """Return weights (4,) times the wrench, and others (4,) times its time derivative."""
+        """Return the quantity with weights (4,) on the wrench and on its time derivative."""
         measured = np.zeros(MEASURES)
         measured[WRENCH], measured[WRENCH_RATE] = wrench, rate
         return cls(measured=measured)
 
     @classmethod
     def of_measure(cls, measure: int) -> PathQuantity:
-        """Return one measure by its index."""
+        """Return the quantity that is one measure, by its index."""
         return cls(measured=np.eye(MEASURES)[measure])
 
     @property
     def derivatives(self) -> tuple[int, ...]:
-        """The derivatives of position that it is linear in."""
+        """The derivatives of position that the quantity depends on."""
         return tuple(np.flatnonzero(self.path.any(axis=1)).tolist())
 
     @property
     def measures(self) -> tuple[int, ...]:
-        """The indices of the measures that it is linear in."""
+        """The indices of the measures that the quantity depends on."""
         return tuple(np.flatnonzero(self.measured).tolist())
 
     @property
     def is_of_path(self) -> bool:
-        """True if it is linear in position and its derivatives."""
+        """True if the quantity depends only on position and its derivatives."""
         return not self.measured.any()

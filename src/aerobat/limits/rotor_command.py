@@ -1,4 +1,4 @@
-"""The command f + τ f' of every rotor that lags by τ behind it, within the thrusts that the rotor gives."""
+"""The command f + τ f' of every rotor with lag τ, limited to the rotor's thrust range."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from aerobat.limits.quantity import WRENCH, PathQuantity
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
-    """Yield a limit for each rotor that lags."""
+    """Yield a limit for each rotor with lag."""
     lags = () if asked.vehicle is None else asked.vehicle.lags.tolist()
     for thrust, lag in zip(rotor_thrust.limits(asked), lags, strict=True):
         if lag > 0.0:

@@ -1,4 +1,4 @@
-"""The thrust of every rotor, within what it gives."""
+"""The thrust of every rotor, limited to its range."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ from aerobat.limits.quantity import PathQuantity
 from aerobat.vehicle import mixer
 
 FIELDS = ("min_thrust", "max_thrust")
-_STRONG = 0.25  # of their range, below which rotors that hover have little room to sink
+# hover thrust, as a fraction of the maximum, below which the reserve at the lower end is reduced
+_STRONG = 0.25
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
-    """Yield a limit for each rotor. Where it lags, its command's limits imply it."""
+    """Yield a limit for each rotor. For rotors with lag, the limits of the command imply it."""
     vehicle = asked.vehicle
     if vehicle is None:
         return
-    hover = asked.environment.gravity / vehicle.max_specific_thrust  # with as much kept it could not sink
+    # a reserve as large as hover thrust would prevent sinking
+    hover = asked.environment.gravity / vehicle.max_specific_thrust
     room = hover if hover < _STRONG else inf
     for i, (rotor, share) in enumerate(zip(vehicle.rotors, mixer(vehicle), strict=True)):
         yield Limit(

@@ -1,7 +1,7 @@
-"""A floor under the specific thrust, which keeps the attitude determined.
+"""A lower limit of the specific thrust, which keeps the attitude determined.
 
-Where thrust vanishes, no attitude follows from it, and commands grow with 1/|f| on the way there. Planners
-keep off it; a certificate needs no such floor, it says where an attitude is undetermined.
+Where thrust vanishes, it determines no attitude, and commands grow with 1/|f| nearby. Planners avoid this
+region. A certificate does not need the limit: it reports where the attitude is undetermined.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from math import inf
 from aerobat.limits.limit import Asked, Limit
 from aerobat.limits.quantity import SPECIFIC_THRUST, PathQuantity
 
-FRACTION = 0.02  # of the largest specific thrust: with less, fast flips lost their way in programs
+FRACTION = 0.02  # of the largest specific thrust; with less, programs of fast flips diverged
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
-    """Yield the one limit, of a vehicle's motion."""
+    """Yield the limit for a problem with a vehicle."""
     if asked.vehicle is None:
         return
     yield Limit(

@@ -1,7 +1,7 @@
-"""A ceiling on the tilt, the angle between the thrust axis and the vertical.
+"""An upper limit of the tilt, the angle between the thrust axis and the vertical.
 
-Tilt is bounded by its cosine, which knows no kink where the body is upright. A ceiling below the horizontal
-is a cone of thrusts; the search holds them in the square pyramid inside it.
+The limit is written for the cosine of the tilt, which is smooth at zero tilt. A limit below 90° is a cone of
+thrusts; the mixed-integer search uses the square pyramid inside the cone.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from aerobat.problem.condition import Condition, Quantity
 from aerobat.so3 import UP
 
 FIELD = "limits.max_tilt"
-STEEPEST = radians(86.0)  # of a cone that a pyramid stands for: beyond, its faces are all but upright
+STEEPEST = radians(86.0)  # largest tilt for which the pyramid is used; beyond, its faces are almost vertical
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
-    """Yield the one limit, where the problem has one."""
+    """Yield the tilt limit if the problem has one."""
     most = asked.limits.max_tilt
     if most < pi:
         yield Limit(
@@ -38,7 +38,7 @@ def limits(asked: Asked) -> Iterator[Limit]:
 
 
 def _pyramid(asked: Asked, tilt: float) -> Iterator[Limit]:
-    """Yield the faces of the pyramid of thrusts inside the cone of a tilt [rad], which holds none level."""
+    """Yield the faces of the pyramid inside the cone of a tilt [rad]; none for tilts above STEEPEST."""
     if tilt <= STEEPEST:
         for axis in (*np.eye(3)[:2], *-np.eye(3)[:2]):
             face = Condition(Quantity.SPECIFIC_THRUST, axis - tan(tilt) / sqrt(2.0) * UP, upper=0.0)

@@ -1,4 +1,4 @@
-"""Position over time: piecewise polynomials, their extrema, and those of minimum effort."""
+"""Position over time: piecewise polynomials, their extrema, and minimum-effort polynomials."""
 
 from aerobat.trajectory.files import load_trajectory, save_trajectory
 from aerobat.trajectory.minimum_effort import ContinuityRule, minimum_effort

@@ -1,4 +1,4 @@
-"""Trajectories as they are, coefficients and all, in .npz files and back."""
+"""Trajectories with exact coefficients in .npz files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from aerobat.storage import format_of, read_arrays, whole_file
 from aerobat.trajectory.piecewise import Carrier, Trajectory, as_trajectory
 
 _FORMAT = "aerobat-trajectory-3"
-_WITHOUT_YAW = "aerobat-trajectory-2"  # as one without is written
+_WITHOUT_YAW = "aerobat-trajectory-2"  # written for trajectories without yaw
 _WITHOUT_HEADING = "aerobat-trajectory-1"  # read with heading 0
 
 
@@ -22,7 +22,7 @@ _WITHOUT_HEADING = "aerobat-trajectory-1"  # read with heading 0
 def save_trajectory(trajectory: Trajectory | Carrier, path: PathName) -> None:
     """Write durations (S,), coefficients (S, degree + 1, 3), heading and any yaw (S, any) as an .npz file.
 
-    It is written whole or not at all. Raises SpecError when the file cannot be written.
+    The file is written completely or not at all. SpecError is raised when it cannot be written.
     """
     trajectory = as_trajectory(trajectory)
     content: dict[str, ArrayLike] = {
@@ -35,7 +35,7 @@ def save_trajectory(trajectory: Trajectory | Carrier, path: PathName) -> None:
 
 @validated
 def load_trajectory(path: PathName) -> Trajectory:
-    """Read what `save_trajectory` wrote, exactly. Raises SpecError, one sentence, for any other file."""
+    """Read a file of `save_trajectory` exactly. Raise SpecError for any other file."""
     content = read_arrays(path, "trajectory")
     found = format_of(content)
     if found not in (_FORMAT, _WITHOUT_YAW, _WITHOUT_HEADING):
@@ -49,12 +49,12 @@ def load_trajectory(path: PathName) -> Trajectory:
 
 
 def arrays_of(trajectory: Trajectory) -> dict[str, Array]:
-    """The arrays of a file by which a trajectory is known, bit for bit."""
+    """Return the arrays that define a trajectory bit for bit, as stored in a file."""
     names = ("durations", "coefficients", "heading", *(() if trajectory.yaw is None else ("yaw",)))
     return {name: np.asarray(getattr(trajectory, name)) for name in names}
 
 
 def trajectory_in(arrays: Mapping[str, Array]) -> Trajectory:
-    """The trajectory that a file's arrays hold. Raises KeyError for one that is missing."""
+    """Return the trajectory stored in a file's arrays. Raise KeyError for a missing one."""
     durations, coefficients, heading = (arrays[name] for name in ("durations", "coefficients", "heading"))
     return Trajectory(durations, coefficients, heading, arrays.get("yaw"))  # type: ignore[arg-type]

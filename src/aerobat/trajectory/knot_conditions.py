@@ -1,15 +1,15 @@
-"""Conditions on polynomial segments at their knots, as one banded linear system: linear in the segments.
+"""Conditions on polynomial segments at their knots, as one banded linear system with linear cost in segments.
 
 A component of n segments of degree 2s - 1 has 2s·n coefficients, of the powers of normalised segment time,
-and as many conditions: s at each end of the course, 2s at each inner knot. On the side of a segment that
-lasts T, the condition on derivative d reads
+and as many conditions: s at each end of the course, 2s at each inner knot. For a segment of duration T, the
+condition on derivative d reads
 
-    (u/T)^d Σ_j C(j, d) c_j   where it ends,      (u/T)^d c_d   where it begins.
+    (u/T)^d Σ_j C(j, d) c_j   at its end,      (u/T)^d c_d   at its beginning.
 
-Both are the d-th derivative over d!, in units u of time: the geometric mean of all durations. So scaled, rows
-keep more digits than equilibrated ones when durations differ by orders of magnitude. Residuals in extended
-precision win back what the factorization in float64 loses (Higham, "Accuracy and Stability of Numerical
-Algorithms", chapter 12).
+Both are the d-th derivative divided by d!, with time in units of u, the geometric mean of all durations. Rows
+scaled in this way keep more digits than equilibrated ones when durations differ by orders of magnitude.
+Iterative refinement with residuals in extended precision restores the digits that the factorization in
+float64 loses (Higham, "Accuracy and Stability of Numerical Algorithms", chapter 12).
 """
 
 from __future__ import annotations
@@ -25,19 +25,20 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array, Mask, frozen
 from aerobat.errors import SpecError
 
-Extended = NDArray[np.longdouble]  # 80 bits where the machine has them, else float64
+Extended = NDArray[np.longdouble]  # 80 bits where the machine supports them, else float64
 
-MAX_PASSES = 12  # each wins back digits; beyond, the system is as good as singular
+# passes of iterative refinement; each adds digits, and a system that needs more is almost singular
+MAX_PASSES = 12
 NEGLIGIBLE_CORRECTION = 2.0**-54  # a correction this small, relative to its segment, is lost in float64
-MAX_LAST_CORRECTION = 1e-6  # relative to its segment: after a larger one it did not converge
+MAX_LAST_CORRECTION = 1e-6  # relative to its segment: a larger last correction means no convergence
 
 
 @dataclass(frozen=True, eq=False)
 class KnotConditions:
-    """The conditions on derivatives 0..2s-1 at every knot, for components of which the same is fixed.
+    """The conditions on derivatives 0..2s-1 at every knot, for components with the same fixed derivatives.
 
-    Masks (n + 1, 2s). A fixed derivative takes its value on each side of the knot that there is. A
-    continuous one is the same on both sides; at an end of the course the far side is zero.
+    The masks have shape (n + 1, 2s). A fixed derivative takes its value on each existing side of the knot. A
+    continuous derivative is equal on both sides; at an end of the course the missing side counts as zero.
     """
 
     durations: Array  # [s], (n,)
@@ -45,9 +46,10 @@ class KnotConditions:
     continuous: Mask
 
     def solve(self, values: Array) -> Array:
-        """Coefficients (n, 2s, m) of m components; `values` (n + 1, s, m) are zero where none is fixed.
+        """Return coefficients (n, 2s, m) of m components.
 
-        Raises SpecError when float64 can't tell the system from a singular one.
+        `values` (n + 1, s, m) are zero where no derivative is fixed. SpecError is raised where the system is
+        singular to float64 precision.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             back_substituted = self._factorized()
@@ -57,7 +59,7 @@ class KnotConditions:
                 step = back_substituted(targets - self._met(coefficients))
                 coefficients += step
                 before, error = error, _relative_size(step, coefficients.astype(float))
-                # errors shrink by a constant ratio: what is left is known without another pass
+                # errors shrink by a constant ratio, so the next error is known without another pass
                 if error * (error / before) <= NEGLIGIBLE_CORRECTION or not error <= before / 2:
                     break
         if not error <= MAX_LAST_CORRECTION:
@@ -66,7 +68,7 @@ class KnotConditions:
 
     @cached_property
     def _unit(self) -> np.longdouble:
-        """The unit of time u [s]."""
+        """The unit of time u [s], the geometric mean of the durations."""
         return np.longdouble(np.exp(np.log(self.durations).mean()))
 
     @cached_property
@@ -78,8 +80,8 @@ class KnotConditions:
     def _rows(self) -> Mask:
         """Masks of the conditions: (n + 1, 2s, 2), on a segment's end, then on a segment's beginning.
 
-        Continuity counts as one on the end. In this order rows stay within s places above the diagonal
-        and 2s - 1 below.
+        Continuity counts as a condition on the end. In this order rows stay within s places above the
+        diagonal and 2s - 1 below.
         """
         ends = self.fixed | self.continuous
         begins = self.fixed.copy()
@@ -88,7 +90,7 @@ class KnotConditions:
         return np.stack([ends, begins], axis=-1)
 
     def _met(self, coefficients: Extended) -> Extended:
-        """The left-hand sides of all rows, (rows, m)."""
+        """Return the left-hand sides of all rows, (rows, m)."""
         table = np.zeros((*self._rows.shape, coefficients.shape[-1]), dtype=np.longdouble)
         begins = coefficients * self._rates[..., None]
         table[1:, :, 0] = (_binomials(self._rates.shape[1]) @ coefficients) * self._rates[..., None]
@@ -97,7 +99,7 @@ class KnotConditions:
         return np.asarray(table[self._rows])
 
     def _targets(self, values: Array) -> Extended:
-        """The right-hand sides of all rows, (rows, m)."""
+        """Return the right-hand sides of all rows, (rows, m)."""
         orders = range(values.shape[1])
         scale = np.array([self._unit**order / math.factorial(order) for order in orders])
         table = np.zeros((*self._rows.shape, values.shape[-1]), dtype=np.longdouble)
@@ -105,7 +107,7 @@ class KnotConditions:
         return np.asarray(table[self._rows])
 
     def _factorized(self) -> Callable[[Extended], Array]:
-        """A function from right-hand sides of all rows (rows, m) to coefficients (n, 2s, m), in float64."""
+        """Return a function from right-hand sides (rows, m) to coefficients (n, 2s, m), in float64."""
         from scipy.linalg import lapack
 
         band, lower, upper = self._band()
@@ -118,16 +120,16 @@ class KnotConditions:
         return back_substituted
 
     def _band(self) -> tuple[Array, int, int]:
-        """The matrix in LAPACK's band storage with room for pivoting, and its lower and upper bandwidths."""
+        """Return the matrix in LAPACK's band storage with room for pivoting, and its two bandwidths."""
         size = self._rates.shape[1]
         row = np.cumsum(self._rows).reshape(self._rows.shape) - 1
         rates = self._rates.astype(float)
-        # a row's entry on power d of the segment that begins at its knot, there or, negative, where it joins
+        # a row's entry on power d of the segment that begins at its knot; negative for continuity
         (k, d), (k_join, d_join) = self._rows[:-1, :, 1].nonzero(), self.continuous[1:-1].nonzero()
         i = np.concatenate([row[k, d, 1], row[k_join + 1, d_join, 0]])
         j = size * np.concatenate([k, k_join + 1]) + np.concatenate([d, d_join])
         entries = np.concatenate([rates[k, d], -rates[k_join + 1, d_join]])
-        # and those on powers d and above of the segment that ends there
+        # and entries on powers d and above of the segment that ends there
         k, d = self._rows[1:, :, 0].nonzero()
         i_end, first = row[k + 1, d, 0], size * k
         lower = int(max((i_end - first - d).max(), (i - j).max()))
@@ -150,14 +152,15 @@ class KnotConditions:
 
 @cache
 def _binomials(size: int) -> Array:
-    """C(j, d) in row d and column j."""
+    """Return C(j, d) in row d and column j."""
     return frozen([[math.comb(j, d) for j in range(size)] for d in range(size)], "binomials")
 
 
 def _relative_size(step: Array, coefficients: Array) -> float:
-    """The largest step, beside the largest coefficient of its segment and component, both (n, 2s, m).
+    """Return the largest step relative to the largest coefficient of its segment and component.
 
-    A component that all but rests in one segment is measured by float64's rounding of the others.
+    Both arrays have shape (n, 2s, m). A component that is almost constant zero in one segment is measured by
+    float64's rounding of its other segments.
     """
     sizes = np.abs(coefficients).max(axis=1)
     floor = np.finfo(float).eps * sizes.max(axis=0)

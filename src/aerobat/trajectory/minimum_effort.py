@@ -1,9 +1,9 @@
 """Closed-form minimum-effort polynomials through waypoints (paper, Section V-B; Cutler and How, 2012).
 
-Of all curves that take the fixed derivatives at the knots, the curve here has the smallest
-∫ |d^s p/dt^s|² dt: jerk for s = 3, snap for 4, crackle for 5. The curve consists of polynomials of degree
-2s - 1. Where derivative d < s is free at a knot, derivative 2s - 1 - d is continuous there (at an end of the
-course: zero).
+Among all curves with the fixed derivatives at the knots, this curve has the smallest ∫ |d^s p/dt^s|² dt:
+minimum jerk for s = 3, minimum snap for 4, minimum crackle for 5. The curve consists of polynomials of degree
+2s - 1. Where derivative d < s is free at a knot, derivative 2s - 1 - d is continuous there, and zero at an
+end of the course.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ ORDERS = {3: "jerk", 4: "snap", 5: "crackle"}
 
 
 class ContinuityRule(StrEnum):
-    """Continuity that gives way at an inner knot for a derivative that is fixed there."""
+    """The derivative whose continuity is given up at an inner knot for each fixed derivative."""
 
     VARIATIONAL = "variational"  # derivative 2s - 1 - d for a fixed derivative d: minimum effort
-    # the highest that remains, as in Cutler and How: more effort, low ones stay continuous
+    # the highest that remain, as in Cutler and How: more effort, but low derivatives stay continuous
     HIGHEST = "highest"
 
 
@@ -38,12 +38,14 @@ def minimum_effort(
     rule: ContinuityRule | str = ContinuityRule.VARIATIONAL,
     heading: Angle = 0.0,
 ) -> Trajectory:
-    """Return polynomials of degree 2s - 1 on n segments, through what is fixed at their n + 1 knots.
+    """Return polynomials of degree 2s - 1 on n segments with the fixed derivatives at their n + 1 knots.
 
-    By the variational rule the result is the minimizer of ∫ |d^s p/dt^s|² dt, `Trajectory.effort(s)`; each
+    By the variational rule the result is the minimizer of ∫ |d^s p/dt^s|² dt, `Trajectory.effort(s)`. Each
     axis is independent of the others. Time and memory grow linearly with n. The paper's curves, of degree 9,
-    have s = 5. Raises SpecError for other shapes, durations that are not positive, infinities, and an end
-    without a position. Raises SpecError too where too little is fixed to determine the curve, and where
+    have s = 5.
+
+    SpecError is raised for other shapes, durations that are not positive, infinities, and an end without a
+    position. It is also raised where too few derivatives are fixed to determine the curve, and where
     durations differ by more orders of magnitude than float64 can resolve.
 
     Args:
@@ -63,28 +65,29 @@ def minimum_effort(
 
 
 def _conditions(known: Mask, durations: Array, rule: ContinuityRule) -> KnotConditions:
-    """The conditions at all knots for components of which `known` (n + 1, s) is fixed."""
+    """Return the conditions at all knots for components with the fixed derivatives `known` (n + 1, s)."""
     order = known.shape[1]
     fixed = np.concatenate([known, np.zeros_like(known)], axis=1)
     variational = ~fixed & ~fixed[:, ::-1]
     continuous = variational.copy() if rule is ContinuityRule.VARIATIONAL else _without_highest(fixed)
-    # beyond an end of the course lies nothing to join: free derivatives make others vanish
+    # an end of the course has no neighbour: a free derivative d makes derivative 2s - 1 - d zero
     ends = [0, -1]
     continuous[ends] = variational[ends] & (np.arange(2 * order) >= order)
     return KnotConditions(durations, fixed, continuous)
 
 
 def _without_highest(fixed: Mask) -> Mask:
-    """At each knot, the derivatives not fixed but for as many of the highest as there are fixed."""
+    """Return the free derivatives of each knot without the highest ones, as many as derivatives are fixed."""
     from_top = np.cumsum(~fixed[:, ::-1], axis=1)[:, ::-1]
     return np.asarray(~fixed & (from_top > fixed.sum(axis=1, keepdims=True)))
 
 
 def _check_determined(known: Mask, durations: Array, axis: str) -> None:
-    """Refuse (n + 1, s) conditions on all of which some polynomial of degree below s vanishes.
+    """Raise SpecError if conditions (n + 1, s) leave the curve undetermined.
 
-    Values with all derivatives below those fixed at the same knot (Hermite's) determine such a polynomial
-    by their number; others (Birkhoff's) by the rank of their matrix.
+    That is so where a nonzero polynomial of degree below s satisfies them all with zero values. Fixed values
+    whose lower derivatives are fixed at the same knot (Hermite) determine such a polynomial by their number,
+    others (Birkhoff) by the rank of their matrix.
     """
     order = known.shape[1]
     if np.logical_and.accumulate(known, axis=1).sum() >= order:
@@ -103,7 +106,7 @@ def _check_determined(known: Mask, durations: Array, axis: str) -> None:
 
 
 def _alike(known: Mask) -> list[list[int]]:
-    """The axes in groups of which the same is fixed."""
+    """Return groups of axes with the same fixed derivatives."""
     groups: dict[bytes, list[int]] = {}
     for axis in range(3):
         groups.setdefault(known[..., axis].tobytes(), []).append(axis)
@@ -118,7 +121,7 @@ def _positive(durations: ArrayLike) -> Array:
 
 
 def _split(fixed: ArrayLike, segments: int) -> tuple[Array, Mask]:
-    """Fixed values, zero where free, and where they are, both (n + 1, s, 3)."""
+    """Return fixed values (zero where free) and the mask of fixed derivatives, (n + 1, s, 3) each."""
     try:
         array = np.array(fixed, dtype=np.float64)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Trajectory: a piecewise polynomial position with its heading, all derivatives and their exact extrema."""
+"""Trajectory: position as piecewise polynomials with a heading, its derivatives and their exact extrema."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from aerobat.errors import SpecError
 from aerobat.states import FlatState
 from aerobat.trajectory import polynomial
 
-TIME_TOLERANCE = 1e-9  # [s], by which a time may miss the ends of a trajectory
-MAX_DEGREE = 30  # powers of normalised time tell no more apart in float64
-MAX_MAGNITUDE = 1e30  # [m/s^k] of a derivative up to snap: products of several stay far from overflow
+TIME_TOLERANCE = 1e-9  # [s] by which a time may lie outside a trajectory
+MAX_DEGREE = 30  # higher powers of normalised time cannot be distinguished in float64
+MAX_MAGNITUDE = 1e30  # [m/s^k] of a derivative up to snap: products of several do not overflow
 MAX_DURATION = 1e6  # [s], eleven days
 MAX_SAMPLES = 10_000_000
-KNOT_TOLERANCE = 1e-12  # [s], a time that misses a knot by rounding is meant to be on it
+KNOT_TOLERANCE = 1e-12  # [s] a time this close before a knot counts as on it
 
 
 @runtime_checkable
 class HasTrajectory(Protocol):
-    """A plan as far as its path goes."""
+    """An object with a trajectory, for instance a plan."""
 
     @property
     def trajectory(self) -> Trajectory:
@@ -38,13 +38,13 @@ Carrier = Annotated[HasTrajectory, AS_IT_IS, Field(description="plan")]
 
 
 def as_trajectory(flown: Trajectory | HasTrajectory) -> Trajectory:
-    """The trajectory, of itself or of a plan."""
+    """Return the trajectory itself, or the trajectory of a plan."""
     return flown if isinstance(flown, Trajectory) else flown.trajectory
 
 
 @dataclass(frozen=True)
 class Extremum:
-    """The extreme value of a quantity along a trajectory, and where it is taken."""
+    """The extreme value of a quantity along a trajectory, and the time at which it occurs."""
 
     value: float
     time: float  # [s]
@@ -56,13 +56,13 @@ class Extremum:
 class Trajectory:
     """Position over time, p(t) = Σ_k c_k s^k with s = (t - knot)/T on each segment; starts at t = 0.
 
-    Neighbouring segments need not agree in any derivative: at a knot the values of the segment that
-    begins there count, and `on_segments` shows both sides. Raises SpecError for durations that are not
-    positive, numbers that are not finite or that no motion has, and shapes that do not match.
+    Neighbouring segments may differ in every derivative. At a knot the values are those of the segment that
+    begins there; `on_segments` returns both sides. SpecError is raised for durations that are not positive,
+    for numbers that are not finite or unreasonably large, and for shapes that do not match.
 
-    At the start the attitude is the smallest rotation from upright to the thrust, turned about it by the
-    heading, and from there it is carried along without spin. `yaw` turns the body beside that about its
-    thrust axis, by polynomials in the same s.
+    The initial attitude is the smallest rotation from upright to the thrust, turned about the thrust by the
+    heading. From there the attitude is carried along without spin. `yaw` additionally turns the body about
+    its thrust axis, by polynomials in the same s.
     """
 
     durations: Array  # [s], (S,)
@@ -103,7 +103,7 @@ class Trajectory:
     ) -> Trajectory:
         """Integrate exactly a chain of r integrators whose input is constant on each interval.
 
-        That is the paper's Section II for r = 3, jerk. Raises SpecError for other shapes.
+        For r = 3 (jerk input) this is the paper's Section II. SpecError is raised for other shapes.
 
         Args:
             initial: Position, velocity, ... at t = 0 [m/s^k], world, (r, 3).
@@ -123,8 +123,8 @@ class Trajectory:
                 f"inputs must last {MAX_DURATION:g} s at most, got {steps.sum():g} s, and stay below "
                 f"{MAX_MAGNITUDE:g} m/s^k; check distances, limits and their units"
             )
-        # scaled by dt^k/k! the derivatives at an interval's start are its coefficients, and
-        # those at its end are the same polynomial expanded about s = 1
+        # scaled by dt^k/k!, the derivatives at an interval's start are its coefficients, and those at its end
+        # are the same polynomial expanded about s = 1
         order = len(state)
         factorials = np.array([math.factorial(k) for k in range(order + 1)])
         scale = (steps[:, None] ** np.arange(order + 1) / factorials)[..., None]
@@ -138,7 +138,7 @@ class Trajectory:
         return cls(steps, coefficients, heading)
 
     def __str__(self) -> str:
-        """A few words about this trajectory."""
+        """Return a short description."""
         return f"Trajectory({self.segments} segments of degree {self.degree}, {self.duration:.6g} s)"
 
     @property
@@ -153,7 +153,7 @@ class Trajectory:
 
     @cached_property
     def knots(self) -> Array:
-        """Times at which segments begin, and the end [s], (S + 1,)."""
+        """The times at which segments begin, and the end [s], (S + 1,)."""
         knots = np.concatenate([[0.0], np.cumsum(self.durations)])
         knots.flags.writeable = False
         return knots
@@ -164,69 +164,71 @@ class Trajectory:
         return float(self.knots[-1])
 
     def evaluate(self, t: ArrayLike, derivative: int = 0) -> Array:
-        """d^k p/dt^k at the times t [s] (...), world frame, (..., 3); at a knot of the later segment.
+        """Return d^k p/dt^k at the times t [s] (...), world, (..., 3); at a knot, of the later segment.
 
-        Raises SpecError for a time outside [0, duration], a nanosecond of rounding aside.
+        SpecError is raised for times outside [0, duration], with a tolerance of a nanosecond.
         """
         segment, s = self._locate(t)
         return polynomial.evaluate(self._rates(derivative)[segment], s)
 
     def flat(self, t: ArrayLike) -> FlatState:
-        """Position to snap at the times t [s] (...). Raises SpecError as `evaluate` does."""
+        """Return position to snap at the times t [s] (...). Raise SpecError as `evaluate` does."""
         segment, s = self._locate(t)
         return FlatState(*(polynomial.evaluate(self._rates(k)[segment], s) for k in range(5)))
 
     def yaw_rates(self, t: ArrayLike) -> Array:
-        """The yaw beside what is carried along [rad] and two derivatives at times (...), (..., 3)."""
+        """Return the yaw relative to the frame without spin [rad], and two derivatives, (..., 3)."""
         segment, s = self._locate(t)
         return np.stack(
             [polynomial.evaluate(self.yaw_polynomials(k)[segment], s)[..., 0] for k in range(3)], -1
         )
 
     def yaw_polynomials(self, derivative: int) -> Array:
-        """Coefficients of a derivative of the yaw [rad/s^k] on each segment, (S, K, 1)."""
+        """Return coefficients of a derivative of the yaw [rad/s^k] on each segment, (S, K, 1)."""
         yaw = np.zeros((self.segments, 1)) if self.yaw is None else self.yaw
         return (
             polynomial.differentiate(yaw[..., None], derivative) / self.durations[:, None, None] ** derivative
         )
 
     def on_segments(self, s: ArrayLike, derivative: int = 0) -> Array:
-        """d^k p/dt^k at the normalised times s (k,) of every segment, (S, k, 3).
+        """Return d^k p/dt^k at the normalised times s (k,) of every segment, (S, k, 3).
 
-        With 0 and 1 among s, both sides of every knot are there.
+        With s = 0 and 1 the result contains both sides of every knot.
         """
         return polynomial.evaluate(self._rates(derivative)[:, None], _normalised(s))
 
     @validated
     def sample(self, rate: Positive) -> Array:
-        """Times 0, 1/rate, 2/rate, ... [s], and the end as the last even if its step is shorter."""
+        """Return the times 0, 1/rate, 2/rate, ... [s], and the end, even if the last step is shorter."""
         whole_steps = max(math.floor((self.duration - TIME_TOLERANCE) * rate), 0)
         if whole_steps > MAX_SAMPLES:
             raise SpecError(f"rate must ask for {MAX_SAMPLES} samples at most, {rate!r} asks {whole_steps}")
         return np.append(np.arange(whole_steps + 1) / rate, self.duration)
 
     def jumps(self, derivative: int) -> Array:
-        """|jump| of d^k p/dt^k at each inner knot, (S - 1,)."""
+        """Return the norm of the jump of d^k p/dt^k at each inner knot, (S - 1,)."""
         ends = self.on_segments([0.0, 1.0], derivative)
         return np.asarray(np.linalg.norm(ends[1:, 0] - ends[:-1, 1], axis=-1))
 
     def effort(self, derivative: int) -> float:
-        """∫ |d^k p/dt^k|² dt over the whole trajectory, exactly."""
+        """Return ∫ |d^k p/dt^k|² dt over the whole trajectory, exactly."""
         derivative = _whole(derivative)
         quadratic = polynomial.gram(self.degree, derivative)
         per_segment = np.einsum("sid,ij,sjd->s", self.coefficients, quadratic, self.coefficients)
         return float(np.sum(per_segment / self.durations ** (2 * derivative - 1)))
 
     def peak(self, derivative: int) -> Extremum:
-        """The largest |d^k p/dt^k| over continuous time, from roots of its squared norm's derivative."""
+        """Return the largest |d^k p/dt^k| over continuous time, from roots of the derivative of its
+        square."""
         return self._extrema(self._rates(derivative))[1]
 
     def component_range(self, derivative: int) -> tuple[Array, Array]:
-        """The smallest and the largest of each component of d^k p/dt^k over continuous time, each (3,)."""
+        """Return the minimum and maximum of each component of d^k p/dt^k over continuous time, (3,) each."""
         values = []
         for axis in range(3):
             component = self._rates(derivative)[..., axis : axis + 1]
-            s = polynomial.stationary_points(component)  # of its square: a zero among them does no harm
+            # of the square; its additional points, the zeros, do no harm
+            s = polynomial.stationary_points(component)
             values.append(polynomial.evaluate(component[:, None], s).ravel())
         return np.min(values, axis=1), np.max(values, axis=1)
 
@@ -234,19 +236,19 @@ class Trajectory:
     def specific_thrust_range(
         self, gravity: Annotated[float, Field(ge=0, le=1e9)]
     ) -> tuple[Extremum, Extremum]:
-        """The smallest and the largest |a + g e3| [m/s²] over continuous time, exactly."""
+        """Return the minimum and maximum of |a + g e3| [m/s²] over continuous time, exactly."""
         thrust = self._rates(2).copy()
         thrust[:, 0, 2] += gravity
         return self._extrema(thrust)
 
     def _rates(self, derivative: int) -> Array:
-        """Coefficients of d^k p/dt^k on each segment, (S, K, 3)."""
+        """Return coefficients of d^k p/dt^k on each segment, (S, K, 3)."""
         derivative = _whole(derivative)
         scale = self.durations[:, None, None] ** derivative
         return np.asarray(polynomial.differentiate(self.coefficients, derivative) / scale)
 
     def _locate(self, t: ArrayLike) -> tuple[NDArray[np.intp], Array]:
-        """The segment of each time and the normalised time in it. Raises SpecError outside the trajectory."""
+        """Return the segment of each time and the normalised time in it. Raise SpecError outside."""
         times = numbers(t, "times")
         if not ((times >= -TIME_TOLERANCE) & (times <= self.duration + TIME_TOLERANCE)).all():
             raise SpecError(f"times must lie in [0, {self.duration:.9g}] s, the trajectory's span")
@@ -255,7 +257,7 @@ class Trajectory:
         return segment, (times - self.knots[segment]) / self.durations[segment]
 
     def _extrema(self, coefficients: Array) -> tuple[Extremum, Extremum]:
-        """The smallest and the largest norm of segment polynomials (S, K, 3), with their times."""
+        """Return the minimum and maximum norm of segment polynomials (S, K, 3), with their times."""
         s = polynomial.stationary_points(coefficients)
         norms = np.linalg.norm(polynomial.evaluate(coefficients[:, None], s), axis=-1)
         times = self.knots[:-1, None] + s * self.durations[:, None]
@@ -267,7 +269,7 @@ class Trajectory:
 
 
 def _whole(derivative: int) -> int:
-    """The order of a derivative. Raises SpecError for what is none; higher ones than this all vanish."""
+    """Return the order of a derivative. Raise SpecError if it is invalid; higher derivatives are zero."""
     is_whole = isinstance(derivative, int | np.integer) and not isinstance(derivative, bool)
     if not is_whole or not 0 <= derivative <= MAX_DEGREE + 1:
         complaint = f"must be a whole number from 0 to {MAX_DEGREE + 1}, got {shown(derivative)}"
@@ -276,7 +278,7 @@ def _whole(derivative: int) -> int:
 
 
 def _normalised(s: ArrayLike) -> Array:
-    """Normalised times. Raises SpecError outside a segment."""
+    """Return normalised times. Raise SpecError outside [0, 1]."""
     times = numbers(s, "s")
     if not ((times >= 0.0) & (times <= 1.0)).all():
         raise SpecError("s must lie in [0, 1], from a segment's start to its end")
@@ -284,7 +286,7 @@ def _normalised(s: ArrayLike) -> Array:
 
 
 def _check_magnitude(durations: Array, coefficients: Array) -> None:
-    """Refuse numbers that no vehicle's motion has, whose squares would overflow where they are used."""
+    """Raise SpecError for unreasonably large numbers, whose squares would overflow."""
     if not durations.sum() <= MAX_DURATION:
         raise SpecError(f"durations must add up to {MAX_DURATION:g} s at most, got {durations.sum():g} s")
     powers = np.arange(coefficients.shape[1])

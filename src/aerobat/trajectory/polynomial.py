@@ -1,7 +1,7 @@
 """Vector polynomials p(s) = Σ c_k s^k in normalised time s ∈ [0, 1]; leading axes broadcast.
 
-Coefficients have the shape (..., K, D): K = degree + 1 powers, rising, of D components. Derivatives
-are with respect to s here; a segment of duration T divides the k-th one by T^k.
+Coefficients have the shape (..., K, D): K = degree + 1 powers, rising, of D components. Derivatives are with
+respect to s; divide the k-th one by T^k for a segment of duration T.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerobat.arrays import Array
 
-NEGLIGIBLE_LEADING = 1e-11  # a leading coefficient this small beside the largest spoils a companion matrix
+# smaller leading coefficients, relative to the largest, are dropped: they spoil a companion matrix
+NEGLIGIBLE_LEADING = 1e-11
 
 
 def differentiate(coefficients: Array, order: int = 1) -> Array:
-    """Coefficients of the `order`-th derivative, (..., K, D) -> (..., max(K - order, 1), D)."""
+    """Return coefficients of the `order`-th derivative, (..., K, D) -> (..., max(K - order, 1), D)."""
     size = coefficients.shape[-2]
     if order >= size:
         return np.zeros_like(coefficients[..., :1, :])
@@ -26,7 +27,7 @@ def differentiate(coefficients: Array, order: int = 1) -> Array:
 
 
 def evaluate(coefficients: Array, s: ArrayLike) -> Array:
-    """p(s) by Horner's rule; s (...) broadcasts with the leading axes: (..., K, D) -> (..., D)."""
+    """Return p(s) by Horner's rule; s (...) broadcasts with the leading axes: (..., K, D) -> (..., D)."""
     s = np.asarray(s, dtype=float)[..., None]
     value = coefficients[..., -1, :] + 0.0 * s
     for power in range(coefficients.shape[-2] - 2, -1, -1):
@@ -36,10 +37,7 @@ def evaluate(coefficients: Array, s: ArrayLike) -> Array:
 
 
 def hermite(left: Array, right: Array) -> Array:
-    """The polynomials of degree 2r - 1 with given derivatives 0..r-1 at s = 0 and s = 1.
-
-    Derivatives are with respect to s: (..., r, D) twice -> (..., 2r, D).
-    """
+    """Return the polynomials of degree 2r - 1 with given derivatives 0..r-1 at s = 0 and s = 1."""
     count = left.shape[-2]
     at_end = np.array(
         [[math.perm(power, k) for power in range(2 * count)] for k in range(count)], dtype=float
@@ -50,7 +48,7 @@ def hermite(left: Array, right: Array) -> Array:
 
 
 def restricted(coefficients: Array, start: Array, length: Array) -> Array:
-    """p(start + length s): coefficients (n, K, D) of parts of each polynomial's own [0, 1], (n,) each."""
+    """Return coefficients (n, K, D) of p(start + length s), for a part of each polynomial's [0, 1]."""
     powers = np.arange(coefficients.shape[-2])
     binomial = np.array([[math.comb(high, low) for high in powers] for low in powers], dtype=float)
     rising = np.maximum(powers - powers[:, None], 0)
@@ -59,7 +57,7 @@ def restricted(coefficients: Array, start: Array, length: Array) -> Array:
 
 
 def gram(degree: int, derivative: int) -> Array:
-    """Q with ∫₀¹ (dᵏp/dsᵏ)² ds = cᵀ Q c for the coefficients c of one component, (K, K)."""
+    """Return Q with ∫₀¹ (dᵏp/dsᵏ)² ds = cᵀ Q c for the coefficients c of one component, (K, K)."""
     powers = np.arange(degree + 1)
     factors = np.array([math.perm(power, derivative) for power in range(degree + 1)], dtype=float)
     exponents = powers[:, None] + powers[None, :] - 2 * derivative + 1
@@ -68,7 +66,7 @@ def gram(degree: int, derivative: int) -> Array:
 
 
 def squared_norm(coefficients: Array) -> Array:
-    """Coefficients of |p(s)|², (..., K, D) -> (..., 2K - 1)."""
+    """Return coefficients of |p(s)|², (..., K, D) -> (..., 2K - 1)."""
     size = coefficients.shape[-2]
     products = coefficients @ np.swapaxes(coefficients, -1, -2)
     result = np.zeros((*coefficients.shape[:-2], 2 * size - 1))
@@ -80,9 +78,9 @@ def squared_norm(coefficients: Array) -> Array:
 def stationary_points(coefficients: Array) -> Array:
     """Return points of [0, 1] where |p(s)|² may be extreme: both ends and its derivative's interior roots.
 
-    (S, K, D) -> (S, n), a fixed number per polynomial: complex roots give their real part and roots
-    outside are moved to the nearer end, which adds harmless candidates and needs no tolerance. Each
-    root comes again after one Newton step, which restores the digits that eigenvalues lose.
+    (S, K, D) -> (S, n), a fixed number per polynomial. Complex roots are replaced by their real part, and
+    roots outside are moved to the nearer end: such extra candidates are harmless and need no tolerance. Each
+    root is repeated after one Newton step, which restores the digits that eigenvalues lose.
     """
     squares = squared_norm(coefficients)
     slopes = differentiate(squares[..., None])[..., 0]
@@ -92,7 +90,7 @@ def stationary_points(coefficients: Array) -> Array:
 
 
 def _newton_step(coefficients: Array, s: Array) -> Array:
-    """One Newton step from each s (S, n) towards a root of its scalar polynomial (S, m)."""
+    """Return s (S, n) after one Newton step towards a root of its scalar polynomial (S, m)."""
     vectors = coefficients[:, None, :, None]
     value, slope = (evaluate(differentiate(vectors, order), s)[..., 0] for order in (0, 1))
     useful = np.abs(slope) > np.abs(value)  # a longer step leaves [0, 1]
@@ -100,10 +98,10 @@ def _newton_step(coefficients: Array, s: Array) -> Array:
 
 
 def _roots(coefficients: Array) -> Array:
-    """Real parts of the roots of scalar polynomials, (S, m) rising powers -> (S, max(m - 1, 0)).
+    """Return real parts of the roots of scalar polynomials, (S, m) rising powers -> (S, max(m - 1, 0)).
 
-    Polynomials of lower true degree fill up with zeros. Eigenvalues of companion matrices, one batch
-    for each true degree, for a companion matrix needs a leading coefficient that is not zero.
+    Missing roots of polynomials of lower true degree are zero. The roots are eigenvalues of companion
+    matrices, one batch for each true degree, because a companion matrix needs a nonzero leading coefficient.
     """
     roots = np.zeros((len(coefficients), max(coefficients.shape[1] - 1, 0)))
     degrees = _true_degrees(coefficients)
@@ -117,7 +115,7 @@ def _roots(coefficients: Array) -> Array:
 
 
 def _true_degrees(coefficients: Array) -> NDArray[np.intp]:
-    """The highest power whose coefficient is not negligible, zero for constants: (S, m) -> (S,)."""
+    """Return the highest power whose coefficient is not negligible, zero for constants: (S, m) -> (S,)."""
     magnitudes = np.abs(coefficients)
     largest = magnitudes.max(axis=1, keepdims=True, initial=0.0)
     powers = np.arange(coefficients.shape[1])

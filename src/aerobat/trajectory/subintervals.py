@@ -1,4 +1,4 @@
-"""Intervals cut into halves: parts of segments or of sample intervals, until a proof goes through."""
+"""Repeatedly halved intervals: parts of segments or of sample intervals."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Rows = NDArray[np.bool_] | NDArray[np.intp] | slice
 
 @dataclass(frozen=True)
 class Subintervals:
-    """Parts of numbered intervals, in any order, each interval's own time running from 0 to 1."""
+    """Parts of numbered intervals in any order; the time of each interval runs from 0 to 1."""
 
     interval: NDArray[np.intp]  # (n,)
     start: Array  # in [0, 1), (n,)
@@ -24,12 +24,12 @@ class Subintervals:
 
     @classmethod
     def whole(cls, count: int) -> Subintervals:
-        """All of `count` intervals."""
+        """Return `count` whole intervals."""
         return cls(np.arange(count), np.zeros(count), np.ones(count))
 
     @classmethod
     def joined(cls, collections: Sequence[Subintervals]) -> Subintervals:
-        """All parts of several collections."""
+        """Return all parts of several collections."""
         names = ("interval", "start", "length")
         return cls(*(np.concatenate([getattr(parts, name) for parts in collections]) for name in names))
 
@@ -40,13 +40,13 @@ class Subintervals:
         return Subintervals(self.interval[rows], self.start[rows], self.length[rows])
 
     def halves(self) -> Subintervals:
-        """Both halves of every part: all first ones, then all second ones."""
+        """Return both halves of every part: all first halves, then all second halves."""
         half = self.length / 2
         starts = (self.start, self.start + half)
         return Subintervals.joined([Subintervals(self.interval, start, half) for start in starts])
 
     def rest(self, count: int) -> Subintervals:
-        """Return what is left of `count` intervals beside these parts, which do not overlap."""
+        """Return the remainder of `count` intervals without these parts, which must not overlap."""
         whole = Subintervals.whole(count)
         segment = np.concatenate([whole.interval, self.interval])
         start = np.concatenate([whole.start, self.start + self.length])
@@ -57,31 +57,31 @@ class Subintervals:
         return Subintervals(np.sort(segment), start, length)[length > 0.0]
 
     def order(self) -> NDArray[np.intp]:
-        """The rows in the order of intervals and starts, (n,)."""
+        """Return the row indices in the order of intervals and starts, (n,)."""
         return np.lexsort((self.start, self.interval))
 
     def in_order(self) -> Subintervals:
-        """The same parts in the order of intervals and starts."""
+        """Return the parts in the order of intervals and starts."""
         return self[self.order()]
 
     def seconds(self, trajectory: Trajectory) -> Array:
-        """Durations [s] of parts of a trajectory's segments, (n,)."""
+        """Return the durations [s] of parts of a trajectory's segments, (n,)."""
         return np.asarray(self.length * trajectory.durations[self.interval])
 
     def spans(self, trajectory: Trajectory) -> tuple[Array, Array]:
-        """Times [s] at which parts of a trajectory's segments begin and end, (n,) each."""
+        """Return the times [s] at which parts of a trajectory's segments begin and end, (n,) each."""
         return self.times(trajectory, np.array(-1.0)), self.times(trajectory, np.array(1.0))
 
     def positions(self, at: Array) -> Array:
-        """Return places (n,) in [-1, 1] on each part in the time of its interval, from 0 to 1, (parts, n)."""
+        """Return positions (n,) in [-1, 1] on each part as times of its interval in [0, 1], (parts, n)."""
         return np.asarray(self.start[:, None] + self.length[:, None] * (1 + at) / 2)
 
     def times_at(self, trajectory: Trajectory, at: Array) -> Array:
-        """Times [s] of places (n,) in [-1, 1] on each part of a trajectory's segments, (parts, n)."""
+        """Return the times [s] of positions (n,) in [-1, 1] on each part of segments, (parts, n)."""
         starts, durations = trajectory.knots[self.interval, None], trajectory.durations[self.interval, None]
         return np.asarray(starts + self.positions(at) * durations)
 
     def times(self, trajectory: Trajectory, position: Array) -> Array:
-        """Times [s] of positions in [-1, 1] on each part of a trajectory's segments, (n,) -> (n,)."""
+        """Return the times [s] of one position in [-1, 1] on each part of segments, (n,) -> (n,)."""
         s = self.start + self.length * (1 + position) / 2
         return np.asarray(trajectory.knots[self.interval] + s * trajectory.durations[self.interval])
