@@ -1,4 +1,4 @@
-"""The tracking controller's settings, the numbers that follow from them, and control laws of one's own."""
+"""Settings of the tracking controller, its kernel parameters, and custom control laws."""
 
 from aerobat.control.law import (
     CONTROL_LAWS,

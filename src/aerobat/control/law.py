@@ -1,8 +1,8 @@
-"""Control laws of one's own: what a law answers, and the register of them by name.
+"""Custom control laws: their interface, and the register of laws by name.
 
-A law says which force and moment the rotors shall give. Beside it stands what every law needs: it is mixed to
-rotor commands within their limits, tilt before yaw, ahead of the rotors' lag, and the reference has what an
-IMU feels of disturbances taken off it.
+A law computes the force and moment that the rotors shall produce. The surrounding loop does the rest for
+every law: it mixes rotor commands within their limits (tilt before yaw), compensates the rotors' lag, and
+corrects the reference by the disturbances that the IMU measures.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from aerobat.kernels.ops import Ops, PerRotor, Scalar
 from aerobat.kernels.rigid_body import Body, RotorWrench
 from aerobat.vehicle.controller import Controller
 
-CONTROLLERS = ("full", "paper")  # the names of the tracking controller: as a vehicle has it, and the paper's
+# names of the tracking controller: with the vehicle's settings, and with the paper's
+CONTROLLERS = ("full", "paper")
 L = TypeVar("L", bound="ControlLaw")
 
 
@@ -35,19 +36,22 @@ class Seen(NamedTuple):
 
 
 class ControlLaw(ABC):
-    """A law from what is seen to the force and the moment on the body.
+    """A law from the known state to the force and the moment on the body.
 
-    A law of one's own inherits from this class and is registered by `@controller("its-name")`. Its fields are
-    its gains. `init` and `step` are written in kernel arithmetic: + - * / and comparisons of scalars, and the
-    functions of `ops`, without `if` on values. Every engine flies such a law; any code is flown by `floats`.
+    A custom law inherits from this class and is registered by `@controller("its-name")`. Its fields are its
+    gains. `init` and `step` are written in kernel arithmetic: + - * / and comparisons of scalars, and the
+    functions of `ops`, without `if` on values. Every engine can run such a law; the engine `floats` runs any
+    code.
     """
 
-    kind: ClassVar[str] = ""  # its name, set when it is registered
-    TAKES_DISTURBANCES: ClassVar[bool] = True  # off the reference; a law that answers them itself says False
-    GIVES_RATES: ClassVar[bool] = False  # as `setpoint` of its state, a RateSetpoint, to an inner loop
+    kind: ClassVar[str] = ""  # its name, set by the registration
+    # whether the reference is corrected for disturbances; False for laws that reject them on their own
+    TAKES_DISTURBANCES: ClassVar[bool] = True
+    # whether the state has a `setpoint`, a RateSetpoint for an inner loop
+    GIVES_RATES: ClassVar[bool] = False
 
     def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> Any:
-        """Return the state before the first tick, a tree of tuples; by default there is none.
+        """Return the state before the first tick, a tree of tuples; by default empty.
 
         Args:
             ops: Of the arithmetic.
@@ -60,7 +64,7 @@ class ControlLaw(ABC):
     def step(
         self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
     ) -> tuple[Any, RotorWrench]:
-        """Return the state at a tick, and the thrust [N] and the moment [N·m, body] to be given.
+        """Return the state at a tick, and the required thrust [N] and moment [N·m, body].
 
         Args:
             ops: Of the arithmetic.
@@ -83,9 +87,9 @@ CONTROL_LAWS: Registry[ControlLaw] = Registry(
 @validated
 @dataclass_transform(frozen_default=True, field_specifiers=(Field,))
 def controller(name: Label) -> Callable[[type[L]], type[L]]:
-    """Declare the class that follows and register it: by `name`, flights and the command line know it.
+    """Declare the class that follows and register it by `name` for flights and the command line.
 
-    Raises SpecError for a name that another controller has.
+    SpecError is raised for a name that another controller has.
     """
 
     def register(cls: type[L]) -> type[L]:
@@ -100,9 +104,9 @@ def named_controller(
     name: str,
     own: Controller = Controller(),  # noqa: B008 - frozen
 ) -> Controller | ControlLaw:
-    """Return the controller of a name: full or paper, at the gains of `own`, or a law with its own gains.
+    """Return the controller of a name: full or paper, with the gains of `own`, or a law with its own gains.
 
-    Raises SpecError, with the closest name, for a name that nothing has.
+    SpecError, with the closest name, is raised for an unknown name.
     """
     if name == "full":
         return own
@@ -119,7 +123,7 @@ def named_controller(
 
 
 def as_controller(value: Any) -> Controller | ControlLaw | str | None:
-    """Return what a flight takes for its controller. Raises FieldError for anything else."""
+    """Return a valid controller argument of a flight. Raise FieldError for anything else."""
     if isinstance(value, str):
         named_controller(value)
     elif value is not None and not isinstance(value, Controller | ControlLaw):

@@ -1,4 +1,4 @@
-"""Vehicles, settings and environment as the numbers that kernels read, for many vehicles at once."""
+"""Kernel parameters of vehicles, settings and environment, for many vehicles at once."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from aerobat.kernels.rigid_body import EnvironmentParameters, MassProperties
 from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
-FREE_ERROR = 0.06  # [rad] of attitude that must not saturate a hovering vehicle's rotors
-_SLACK = 1e-12  # [-] of a rotor's range, for rounding
-_MIN_TIME_CONSTANT = 1e-9  # [s] a rotor without lag follows within it
+FREE_ERROR = 0.06  # [rad] attitude error that must not saturate a hovering vehicle's rotors
+_SLACK = 1e-12  # [-] of a rotor's range, tolerance for rounding
+_MIN_TIME_CONSTANT = 1e-9  # [s] time constant of a rotor without lag
 
 
 def airframe_parameters(fleet: Fleet, effectiveness: Array | None = None) -> Airframe:
-    """Airframes with leaves (vehicles,).
+    """Return airframes with leaves (vehicles,).
 
-    Thrusts of rotors with an `effectiveness` (vehicles, n) are those that nominal ones would give, and what
-    they do to the body is so many times as much.
+    With an `effectiveness` (vehicles, n), thrusts are those of nominal rotors, and their effect on the body
+    is multiplied by it.
     """
     mass_properties = MassProperties(
         fleet.mass,
@@ -32,7 +32,7 @@ def airframe_parameters(fleet: Fleet, effectiveness: Array | None = None) -> Air
         components(fleet.drag_body),
     )
     ranges = fleet.max_thrusts - fleet.min_thrusts
-    ranges = np.where(ranges > 0.0, ranges, ranges.max(axis=-1, keepdims=True))  # dead rotors have none
+    ranges = np.where(ranges > 0.0, ranges, ranges.max(axis=-1, keepdims=True))  # dead rotors have no range
     allocation = fleet.allocation if effectiveness is None else fleet.allocation * effectiveness[:, None]
     rotors = Rotors(
         components(fleet.min_thrusts),
@@ -45,13 +45,13 @@ def airframe_parameters(fleet: Fleet, effectiveness: Array | None = None) -> Air
 
 
 def environment_parameters(environment: Environment, vehicles: int) -> EnvironmentParameters:
-    """One environment for so many vehicles, leaves (vehicles,)."""
+    """Return one environment for all vehicles, leaves (vehicles,)."""
     wind = np.broadcast_to(environment.wind, (vehicles, 3))
     return EnvironmentParameters(np.full(vehicles, environment.gravity), components(wind))
 
 
 def controller_parameters(controller: Controller, fleet: Fleet, environment: Environment) -> ControllerModel:
-    """Nominal models with leaves (vehicles,).
+    """Return nominal models with leaves (vehicles,).
 
     Args:
         controller: the settings.
@@ -68,17 +68,17 @@ def controller_parameters(controller: Controller, fleet: Fleet, environment: Env
 
 
 def max_bandwidth(fleet: Fleet, environment: Environment, free_error: float = FREE_ERROR) -> Array:
-    """The highest frequencies [rad/s] of attitude loops that vehicles have the rotors for, (vehicles,).
+    """Return the highest bandwidth [rad/s] of attitude loops that the rotors allow, (vehicles,).
 
-    Hovering, they then meet their limits only at larger errors [rad] of roll or pitch than the free one. NaN
-    for a vehicle that cannot hover.
+    In hover the rotors then saturate only at errors of roll or pitch above `free_error` [rad]. The value is
+    NaN for a vehicle that cannot hover.
     """
     with np.errstate(invalid="ignore"):
         return np.asarray(np.sqrt(hover_authority(fleet, environment)[:, :2].min(axis=-1) / free_error))
 
 
 def hover_authority(fleet: Fleet, environment: Environment) -> Array:
-    """Angular accelerations [rad/s²] about body axes that hovering vehicles can have, (vehicles, 3)."""
+    """Return the angular accelerations [rad/s²] about body axes possible in hover, (vehicles, 3)."""
     hover = (fleet.mass * environment.gravity)[:, None] * fleet.mixer[..., 0]
     room = np.minimum(hover - fleet.min_thrusts, fleet.max_thrusts - hover)
     torque = (np.abs(fleet.allocation[:, 1:]) @ room[..., None])[..., 0]

@@ -1,4 +1,4 @@
-"""A recorded log through the filter: estimates, how far they may be off, and what became of each pose."""
+"""Replay of a recorded log through the filter: estimates, their uncertainty, and accepted poses."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ from aerobat.kernels.ekf.covariance import SIZE
 from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
 
 NO_SLOT = -1.0
-_SAMPLE, _EXPOSURE, _ARRIVAL = range(3)  # in this order where they are at the same time
-_ROWS = 10_000  # of the loop at once: their covariances take 10 MB
-_DIAGONAL = [row * SIZE - row * (row - 1) // 2 for row in range(SIZE)]  # in the upper triangle, row by row
+_SAMPLE, _EXPOSURE, _ARRIVAL = range(3)  # in this order where they have the same time
+_ROWS = 10_000  # rows that the loop runs at once: their covariances take 10 MB
+# indices of the diagonal in the upper triangle, stored row by row
+_DIAGONAL = [row * SIZE - row * (row - 1) // 2 for row in range(SIZE)]
 
 
 class FilterParameters(NamedTuple):
@@ -41,25 +42,25 @@ class FilterParameters(NamedTuple):
 
 
 class FilterInput(NamedTuple):
-    """Inputs of one row, which ends at its instant."""
+    """Inputs of one row of the loop, which ends at its instant."""
 
-    elapsed: Scalar  # [s] since the row before
-    sample: ImuSample  # of that while
-    exposed: Scalar  # slot of the pose that is exposed now, NO_SLOT for none
+    elapsed: Scalar  # [s] since the previous row
+    sample: ImuSample  # the IMU sample of that interval
+    exposed: Scalar  # slot of the pose exposed now, NO_SLOT for none
     arrived: Scalar  # slot of the pose that arrives now, NO_SLOT for none
-    measured: Pose  # that pose
+    measured: Pose  # the pose that arrives
 
 
 class Exposure(NamedTuple):
-    """Pose whose measurement has yet to arrive."""
+    """A pose whose measurement has not yet arrived."""
 
-    past: Pose  # the filter's own then, as it is known now
+    past: Pose  # the filter's own pose at that time, as known now
     age: Scalar  # [s]
 
 
 @lru_cache(maxsize=8)
 def filter_loop(slots: int) -> tuple[Init, Step]:
-    """The loop for as many poses on their way at once; its rows are the states (see `engines.Compile`)."""
+    """Return the loop for at most `slots` poses in transit; its rows are the filter's states."""
 
     def init(
         ops: Ops, parameters: FilterParameters, inputs: FilterInput
@@ -96,24 +97,24 @@ def _picked(ops: Ops, exposures: list[Exposure], wanted: Scalar) -> Exposure:
 
 
 def _is_slot(wanted: Scalar, slot: int) -> Scalar:
-    """True where a slot is the one that is wanted."""
+    """Return True where `slot` is the wanted one."""
     return (wanted > slot - 0.5) & (wanted < slot + 0.5)
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """Rows of a filter that begins at a log's first pose within its samples, and what they belong to."""
+    """The rows of a filter that begins at a log's first pose within the IMU samples."""
 
     first_pose: int
     inputs: FilterInput  # leaves (rows,)
-    slots: int  # poses on their way at once, at most, 1 or more
-    sample_rows: Indices  # the last row at the end of each sample that ends after the first pose
+    slots: int  # largest number of poses in transit at once, at least 1
+    sample_rows: Indices  # the last row of each sample that ends after the first pose
     sample_times: Array  # [s] of those ends
-    arrival_rows: Indices  # of each pose, -1 for those that are not fused
+    arrival_rows: Indices  # of each pose, -1 for poses that are not fused
 
 
 def schedule(log: SensorLog) -> Schedule:
-    """The rows of a log. Raises SpecError where it has no pose within its samples."""
+    """Return the schedule of a log. Raise SpecError where no pose lies within the IMU samples."""
     first = _first_pose(log)
     begin, end = log.pose_times[first], log.imu_times[-1]
     poses = np.arange(first + 1, len(log.pose_times))
@@ -148,7 +149,7 @@ def schedule(log: SensorLog) -> Schedule:
 
 
 def _first_pose(log: SensorLog) -> int:
-    """The first pose in the interval of a sample."""
+    """Return the index of the first pose within the IMU samples."""
     begin = 2.0 * log.imu_times[0] - log.imu_times[1]
     within = np.flatnonzero((log.pose_times >= begin) & (log.pose_times < log.imu_times[-1]))
     if not within.size:
@@ -160,7 +161,7 @@ def _first_pose(log: SensorLog) -> int:
 
 
 def _slots(log: SensorLog, poses: Indices) -> Indices:
-    """A slot for each pose, free again once its measurement has arrived, 0 for those that are not fused."""
+    """Return a slot for each pose, reused once a measurement has arrived; 0 for poses not fused."""
     slots = np.zeros(len(log.pose_times), dtype=np.intp)
     taken_until: list[float] = []
     for pose, exposure, arrival in zip(
@@ -192,7 +193,7 @@ class Estimates:
     coasting: tuple[TimeInterval, ...]  # from a pose's exposure to the next one's arrival, or to the end
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return a one-line summary."""
         fused = np.isfinite(self.nis)
         parts = [f"{self.times[-1] - self.times[0]:.3f} s with {fused.sum()} poses"]
         if (fused & ~self.accepted).any():
@@ -213,9 +214,9 @@ def estimate(
 ) -> Estimates:
     """Replay a log through the error-state Kalman filter, as it would have run on board.
 
-    Each pose is fused when it arrived, at the time of its exposure; what arrived after the last sample is
-    not. Between poses, and in outages, the state is carried on by the IMU alone. Raises SpecError where the
-    log has no pose within the IMU's samples.
+    Each pose is fused when it arrives, at the time of its exposure; poses that arrive after the last sample
+    are ignored. Between poses and in outages the filter propagates the state with the IMU alone. SpecError is
+    raised where the log has no pose within the IMU samples.
 
     Args:
         log: What was recorded.
@@ -250,7 +251,7 @@ _NOMINAL = ("position", "velocity", "q_world_body", "gyro_bias", "accelerometer_
 
 
 def _run(log: SensorLog, ekf: Ekf, gravity: float, velocity: Array, plan: Schedule) -> dict[str, Array]:
-    """What is kept of the state after every row."""
+    """Return the stored part of the state after every row."""
     init, step = filter_loop(plan.slots)
     first = Pose(
         components(log.position[plan.first_pose, None]), components(log.q_world_body[plan.first_pose, None])
@@ -267,14 +268,14 @@ def _run(log: SensorLog, ekf: Ekf, gravity: float, velocity: Array, plan: Schedu
 
 
 def _kept(states: EkfState) -> dict[str, Array]:
-    """States with leaves (1, rows) as arrays (rows, ...)."""
+    """Return states with leaves (1, rows) as arrays (rows, ...)."""
     kept = {name: from_components(getattr(states.nominal, name))[0] for name in _NOMINAL}
     kept["sigma"] = np.sqrt(from_components([states.covariance[i] for i in _DIAGONAL])[0])
     return kept | {name: getattr(states, name)[0] for name in ("jumps", "nis", "accepted")}
 
 
 def _coasting(log: SensorLog, accepted: Mask, max_gap: float) -> Iterator[TimeInterval]:
-    """The times after poses that were taken until the next one arrives, where that takes longer."""
+    """Yield the intervals from an accepted pose to the next one's arrival, if that takes over `max_gap`."""
     taken = np.flatnonzero(accepted)
     taken = taken[np.argsort(log.arrivals[taken])]
     arrivals = log.arrivals[taken]

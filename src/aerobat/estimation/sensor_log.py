@@ -1,4 +1,4 @@
-"""Records of an IMU and of motion capture of one vehicle, checked once."""
+"""Logs of an IMU and of motion capture for one vehicle, validated once."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from aerobat.arrays import Array, frozen
 from aerobat.declaration import by_value, short, validated
 from aerobat.errors import SpecError
 
-MAX_GAP = 0.05  # [s] between samples of an IMU: longer ones say too little of a turning vehicle
-MAX_AGE = 0.2  # [s] of a pose as it arrives: errors then and now are related to first order in it
-_UNIT = 1e-2  # [-] by which the norm of a quaternion may be off: what few decimals leave
+MAX_GAP = 0.05  # [s] between IMU samples; longer samples say too little about a turning vehicle
+MAX_AGE = 0.2  # [s] of a pose on arrival; the filter relates the errors then and now to first order
+_UNIT = 1e-2  # [-] error of a quaternion's norm: the rounding of a few decimals
 
 
 @validated
@@ -48,7 +48,7 @@ class SensorLog:
         self._check_arrivals()
 
     def _series(self, clock: str, *columns: tuple[str, int]) -> int:
-        """The number of rows of arrays that go together, each made read-only."""
+        """Check and write-protect arrays with a common clock; return their number of rows."""
         times = frozen(getattr(self, clock), clock, (None,))
         if times.ndim != 1 or not (np.diff(times) > 0.0).all():
             raise SpecError(f"{clock} must be one series of rising times; sort it and drop repetitions")
@@ -90,10 +90,10 @@ class SensorLog:
 
     @property
     def arrivals(self) -> Array:
-        """When poses arrived [s], (P,)."""
+        """The arrival times of poses [s], (P,)."""
         return self.pose_times if self.arrival_times is None else self.arrival_times
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return a one-line summary."""
         duration = self.imu_times[-1] - self.imu_times[0]
         return f"{duration:.3f} s of {len(self.imu_times)} samples and {len(self.pose_times)} poses"

@@ -1,4 +1,4 @@
-"""Settings of the filter: the errors that it reckons with, and what it believes."""
+"""Settings of the filter: sensor noise, initial uncertainty and outlier rejection."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from aerobat.environment import Imu, MotionCapture
 from aerobat.kernels.ekf import EkfParameters
 
 POSE_FREEDOMS = 6
-_MIN_POSITION_NOISE = 1e-4  # [m] what the filter's own rounding and first order are safely below
-_MIN_ATTITUDE_NOISE = 1e-3  # [rad] the same
+_MIN_POSITION_NOISE = 1e-4  # [m] safely above the filter's own rounding and first-order errors
+_MIN_ATTITUDE_NOISE = 1e-3  # [rad] likewise
 
 
 @declared
@@ -55,14 +55,14 @@ class Ekf:
 
     @property
     def max_nis(self) -> float:
-        """The normalized innovation squared that poses may have: chi² of 6 at `gate_probability`."""
+        """The largest accepted normalized innovation squared: chi² of 6 freedoms at `gate_probability`."""
         from scipy.special import chdtri  # imported when needed: it takes longer than the filter's settings
 
         return float(chdtri(POSE_FREEDOMS, 1.0 - self.gate_probability))
 
 
 def ekf_parameters(settings: Ekf, gravity: float, vehicles: int) -> EkfParameters:
-    """The numbers that the kernel reads, leaves (vehicles,); gravity in m/s²."""
+    """Return the numbers that the kernel reads, leaves (vehicles,); gravity in m/s²."""
     numbers = EkfParameters(
         gravity=gravity,
         gyro_noise=settings.gyro_noise**2,

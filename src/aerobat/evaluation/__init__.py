@@ -1,4 +1,4 @@
-"""Evaluation: how well flights went, and what that depends on."""
+"""Evaluation: scores of flights, and their sensitivity to parameters."""
 
 from aerobat.evaluation.opening import Opening, smallest_opening
 from aerobat.evaluation.score import LapTime, Score, score

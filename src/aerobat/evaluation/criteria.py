@@ -1,7 +1,7 @@
-"""Criteria that flights are judged by: a plan's passages, or a problem's where the set-points come nearest.
+"""Criteria for flights: the passages of a plan, or of a problem at the set-points' nearest approaches.
 
-Gates and waypoints say themselves how exactly they are to be passed. The goal, other stages, and the whole
-path where there is no gate or waypoint, are kept to the problem's tolerance.
+Gates and waypoints have their own tolerances. The problem's tolerance applies to the goal and to other
+stages, and to the whole path where there is no gate or waypoint.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from aerobat.simulation.passages.stage_attitude import PlannedAttitude
 from aerobat.simulation.passages.waypoint import waypoint_target
 from aerobat.so3 import thrust_axis
 
-GOAL = "the goal"  # the name of a path's end among what is come to
+GOAL = "the goal"  # the name of a path's end among the places to reach
 
 
 class SampledPath(NamedTuple):
@@ -43,12 +43,13 @@ class SampledPath(NamedTuple):
 
 
 def criteria_of(goal: Problem | Plan, path: SampledPath) -> Criteria:
-    """The criteria of flights: passages in the order of the stages, of all gates where no stage has a place.
+    """Return the criteria of flights: passages in the order of the stages, or of all gates.
 
-    The first lap begins with the path; a closed one's a whole round before the path's own last passage.
+    All gates are used where no stage has a place. The first lap begins at the start of the path. The first
+    lap of a closed course begins one path duration before the path's last passage.
 
-    When is said by a plan's stages; otherwise by the set-points' nearest approaches to the centres, those of
-    stages that follow one another in their order.
+    A plan's stages give the times of passages. Without a plan the times are those of the set-points' nearest
+    approaches to the centres, in the stages' order where they have one.
 
     Args:
         goal: the problem, or a plan for it.
@@ -75,10 +76,10 @@ def criteria_of(goal: Problem | Plan, path: SampledPath) -> Criteria:
 def _latest(
     gates: Sequence[PlannedPassage], waypoints: Sequence[PlannedWaypoint], path: SampledPath
 ) -> float:
-    """The instant of the path's own last passage [s], at a waypoint its nearest approach, as in flights."""
+    """Return the time of the path's last passage [s]; at a waypoint that is the nearest approach."""
     rows = log_rows(path.times, path.position, np.zeros_like(path.position), path.q_world_body)
     found = scan_log(approach, [waypoint_target(each) for each in waypoints], rows)
-    met = [float(each.time[0]) for each in found]  # infinite where the path is cut off before
+    met = [float(each.time[0]) for each in found]  # infinite where the path ends before
     met = [time if isfinite(time) else each.time for time, each in zip(met, waypoints, strict=True)]
     return max([*(gate.time for gate in gates), *met], default=0.0)
 
@@ -86,7 +87,7 @@ def _latest(
 def _places(
     others: Sequence[tuple[Stage, float]], problem: Problem, path: SampledPath
 ) -> Iterator[PlannedWaypoint]:
-    """Where other stages are, of those that say anything of it."""
+    """Yield the places of other stages that constrain the position."""
     for stage, time in others:
         if stage.where:
             ball = Ball(_between(path, path.position, time), problem.tolerance.position)
@@ -94,7 +95,7 @@ def _places(
 
 
 def _goal(problem: Problem, path: SampledPath) -> Iterator[PlannedWaypoint]:
-    """The end of the path; a closed course has none."""
+    """Yield the end of the path; a closed course has none."""
     if problem.ends:
         ball = Ball(path.position[-1], problem.tolerance.position)
         yield PlannedWaypoint(GOAL, ball, float(path.times[-1]))
@@ -103,7 +104,7 @@ def _goal(problem: Problem, path: SampledPath) -> Iterator[PlannedWaypoint]:
 def _attitudes(
     others: Sequence[tuple[Stage, float]], problem: Problem, path: SampledPath
 ) -> Iterator[PlannedAttitude]:
-    """The attitudes of other stages, of those that ask for one."""
+    """Yield the attitudes of other stages that require one."""
     axes = thrust_axis(path.q_world_body)
     for stage, time in others:
         if _asks_attitude(stage):
@@ -112,18 +113,18 @@ def _attitudes(
 
 
 def _asks_attitude(stage: Stage) -> bool:
-    """True for an attitude, and for a thrust without a component along some direction."""
+    """Return True for an attitude, or a specific thrust with one component fixed."""
     across = (c.quantity is Quantity.SPECIFIC_THRUST and c.lower == c.upper for c in stage.conditions)
     return stage.attitude is not None or any(across)
 
 
 def _between(path: SampledPath, values: Array, time: float) -> Array:
-    """The value (3,) at a time [s], straight between the set-points' values (T, 3)."""
+    """Return the value (3,) at a time [s], interpolated linearly between the set-points' values (T, 3)."""
     return np.array([np.interp(time, path.times, component) for component in values.T])
 
 
 def criterion(problem: Problem) -> str:
-    """Return what a flight that went well keeps to, in words."""
+    """Return the criteria of a successful flight, in words."""
     stages = problem.stages(1.0).stages
     tolerance = problem.tolerance
     passed = [
@@ -138,7 +139,7 @@ def criterion(problem: Problem) -> str:
 
 
 def _nearest_stages(problem: Problem, path: SampledPath) -> list[tuple[Stage, float]]:
-    """The stages that pass a gate or meet a ball, or all gates, each where the set-points come nearest."""
+    """Return the stages with a gate or a ball, or all gates, each at the nearest set-point."""
     sequence = problem.stages(1.0)
     stages = [stage for stage in sequence.stages if stage.gate is not None or stage.ball is not None]
     stages = stages or [Stage(gate.name, gate=gate.name) for gate in problem.gates]
@@ -148,7 +149,7 @@ def _nearest_stages(problem: Problem, path: SampledPath) -> list[tuple[Stage, fl
 
 
 def _centre(stage: Stage, problem: Problem, times: Array) -> Array:
-    """Where a gate or a ball is [m], (3,), or at times (T,), (T, 3)."""
+    """Return the centre of a gate or a ball [m], (3,), or of a moving gate at times (T,), (T, 3)."""
     if stage.gate is not None:
         return problem.gate(stage.gate).places(times)
     assert stage.ball is not None, "what is passed is a gate or a ball"
@@ -156,7 +157,9 @@ def _centre(stage: Stage, problem: Problem, times: Array) -> Array:
 
 
 def _nearest_instants(centres: Sequence[Array], times: Array, position: Array, in_order: bool) -> list[float]:
-    """The instants of the nearest approaches; in order those of the least sum of squared distances.
+    """Return the times of the nearest approaches [s].
+
+    With `in_order` they minimize the sum of squared distances over all ordered times, by dynamic programming.
 
     Args:
         centres: of what is passed [m], (3,), or at the times, (T, 3).
@@ -168,7 +171,8 @@ def _nearest_instants(centres: Sequence[Array], times: Array, position: Array, i
     if not in_order or not squares:
         return [float(times[int(np.argmin(square))]) for square in squares]
     gaps = [0.0, *(PASSAGE_WINDOW if (a == b).all() else 0.0 for a, b in pairwise(centres))]
-    before = [np.searchsorted(times, times - gap, side="right") for gap in gaps]  # rows that may come before
+    # number of rows that may come before each row
+    before = [np.searchsorted(times, times - gap, side="right") for gap in gaps]
     best = np.zeros(len(times) + 1)
     sums = []
     for square, rows in zip(squares, before, strict=True):

@@ -1,4 +1,4 @@
-"""smallest_opening(): which opening of a gate flights pass with a wanted probability, from many of them."""
+"""smallest_opening(): the opening of a gate that flights pass with a given probability."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Side = Literal["both", "width", "height"]
 
 @by_value
 class Opening:
-    """An opening about a gate's centre, and how far the flights at hand vouch for it."""
+    """An opening around a gate's centre, and the statistical confidence in it."""
 
     # of the upright box around it, infinite where more flights fail to cross the gate's plane than may
     width: float  # [m]
@@ -33,7 +33,7 @@ class Opening:
     flights: int
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return a one-line summary."""
         vouched = (
             f"passed with {100 * self.probability:.3g} % probability, says {100 * self.confidence:.3g} % "
             f"confidence from {self.flights} flights"
@@ -52,13 +52,13 @@ def smallest_opening(
     confidence: Probability = 0.95,
     side: Side = "both",
 ) -> Opening:
-    """Return the smallest opening about a gate's centre that a flight passes with a probability.
+    """Return the smallest opening around a gate's centre that a flight passes with a given probability.
 
-    Each flight needs some scale of the gate's opening: what its body swept over what the gate has; one that
-    did not cross the plane as planned needs an infinite one. The r-th smallest of the scales of n flights
-    bounds from above what a fraction p of all flights needs, whatever their distribution. The confidence of
-    that bound is P(B(n, p) < r), B binomial: an order statistic bounds a quantile (David and Nagaraja, Order
-    Statistics, 2003, section 7.1). The least r that reaches the confidence is taken.
+    Each flight needs a scale of the gate's opening: the size that its body swept, divided by the gate's size.
+    Flights that did not cross the plane as planned need an infinite scale. The r-th smallest of the scales of
+    n flights is an upper bound of the p-quantile of all flights, whatever their distribution. The confidence
+    of that bound is P(B(n, p) < r) with B binomial: an order statistic bounds a quantile (David and Nagaraja,
+    Order Statistics, 2003, section 7.1). The smallest r that reaches the confidence is used.
 
     Args:
         scores: of flights drawn independently of each other.
@@ -77,7 +77,7 @@ def smallest_opening(
 def opening_of(
     needed: Array, gate: Gate, probability: float, confidence: float, side: Side = "both"
 ) -> Opening:
-    """Return the smallest opening of flights whose needs are known, as `smallest_opening` does.
+    """Return the smallest opening for flights whose needed scales are known, as `smallest_opening` does.
 
     Args:
         needed: the scale of the gate that each flight needs, infinite where none will do, (flights,).
@@ -109,14 +109,14 @@ def opening_of(
 
 
 def _rank(count: int, probability: float, confidence: float) -> int:
-    """The rank of the order statistic that bounds a quantile from above, counted from 1."""
-    from scipy.stats import binom  # takes a quarter of a second
+    """Return the rank, from 1, of the order statistic that bounds the quantile from above."""
+    from scipy.stats import binom  # importing takes a quarter of a second
 
     return min(int(binom.ppf(confidence, count, probability)) + 1, count)
 
 
 def _needed(scores: Score, gate: Gate, side: Side) -> Array:
-    """The scale of the opening that each flight needs, infinite where none will do, (flights,)."""
+    """Return the scale of the opening that each flight needs, infinite where none is enough, (flights,)."""
     passages = [passage for passage in scores.passages if passage.gate == gate.name]
     if not passages:
         raise unknown_name("gate", gate.name, [passage.gate for passage in scores.passages])

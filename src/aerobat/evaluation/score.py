@@ -1,4 +1,4 @@
-"""Scores: tracking errors, the passage of each gate, saturation, and what a flight came to."""
+"""Scores of flights: tracking errors, passages of gates, saturation, and the outcome."""
 
 from __future__ import annotations
 
@@ -35,9 +35,10 @@ from aerobat.simulation.passages import (
 from aerobat.simulation.passages.passage import PerFlight
 from aerobat.vehicle import Vehicle, as_vehicle
 
-OTHER_PATH = 0.5  # [m] from a flight's set-points at the median: clocks that differ make less
-COASTING = 0.1  # [s] without a pose: several periods of any motion capture
-_FELT = {  # by the plant
+# [m] median distance from the set-points that shows another path; clock differences make less
+OTHER_PATH = 0.5
+COASTING = 0.1  # [s] without a pose from which a filter coasts: several periods of any motion capture
+_FELT = {  # outcomes of contacts detected by the plant
     Contact.GROUND: Outcome.TOUCHED_GROUND,
     Contact.GATE: Outcome.TOUCHED_GATE,
     Contact.OBSTACLE: Outcome.HIT_OBSTACLE,
@@ -46,40 +47,37 @@ _FELT = {  # by the plant
 
 @dataclass(frozen=True)
 class ObserverScore:
-    """A filter in numbers: its errors, and the longest time that it had to do without poses."""
+    """The errors of a state estimator, and its longest time without poses."""
 
     max_position_error_m: float
     rms_position_error_m: float
     max_attitude_error_deg: float
     rms_attitude_error_deg: float
     longest_without_pose_s: float
-    until_s: float  # when that was over
+    until_s: float  # the end of that time
 
     @property
     def coasted(self) -> bool:
-        """True if it had to go by the IMU alone for long."""
+        """True if the estimator had to rely on the IMU alone for long."""
         return self.longest_without_pose_s > COASTING
 
 
 @dataclass(frozen=True)
 class LapTime:
-    """A lap of a course as it was flown, to the last of its gates and waypoints.
+    """A lap of a course as flown, up to the last of its gates and waypoints.
 
-    One of a closed course goes all the way round: it ends as long after that as is planned to its seam.
+    A lap of a closed course ends later than that, by the planned time from the last passage to the seam.
     """
 
-    lap: int  # counted from 1
-    end: float  # [s] when it ended; NaN where one of the lap was not
-    duration: float  # [s] since the lap before, or the start
+    lap: int  # numbered from 1
+    end: float  # [s] end of the lap; NaN where a passage of the lap is missing
+    duration: float  # [s] since the end of the previous lap, or the start
 
 
 @in_notebooks
 @by_value
 class Score(PerFlight):
-    """A flight in numbers, or a batch of flights: then numbers are arrays (flights,).
-
-    `score[k]` is the score of one flight of a batch.
-    """
+    """The score of one flight, or of a batch of flights: then the numbers are arrays (flights,)."""
 
     max_position_error_m: float
     rms_position_error_m: float
@@ -107,12 +105,12 @@ class Score(PerFlight):
         return bool(np.ndim(self.stop))
 
     def __len__(self) -> int:
-        """The number of flights of a batch."""
+        """Return the number of flights of a batch."""
         return np.size(self.stop)
 
     @validated
     def __getitem__(self, k: int) -> Score:
-        """The score of one flight of a batch. Raises SpecError for one flight."""
+        """Return the score of one flight of a batch. Raise SpecError for the score of one flight."""
         if not self.is_batch:
             raise SpecError("this is the score of one flight, not of a batch: use it without an index")
         if not -len(self) <= k < len(self):
@@ -123,7 +121,7 @@ class Score(PerFlight):
         return (self[k] for k in range(len(self)))
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return a one-line summary."""
         error = f"position error {length(float(np.max(self.max_position_error_m)))} at most"
         if self.is_batch:
             return f"{len(self)} flights: {counted(self.outcomes)}; {error}"
@@ -134,7 +132,7 @@ class Score(PerFlight):
 
     @property
     def outcome(self) -> Outcome:
-        """The first thing that went wrong, if anything did. Raises SpecError for a batch."""
+        """The first failure, else success. Raises SpecError for a batch."""
         return self._end[0]
 
     @property
@@ -144,17 +142,17 @@ class Score(PerFlight):
 
     @cached_property
     def outcomes(self) -> tuple[Outcome, ...]:
-        """Outcome of each flight."""
+        """The outcome of each flight."""
         return tuple(score.outcome for score in self) if self.is_batch else (self.outcome,)
 
     @property
     def succeeded(self) -> NDArray[np.bool_]:
-        """True of flights that did all that was asked, (flights,)."""
+        """True for flights without any failure, (flights,)."""
         return np.array([outcome.is_success for outcome in self.outcomes])
 
     @property
     def laps(self) -> tuple[LapTime, ...]:
-        """The laps of a closed course or of one of several; none where it has no gates or waypoints."""
+        """The laps of a closed or repeated course; empty without gates or waypoints."""
         passed = [(gate.lap, gate.time) for gate in self.passages]
         passed += [(waypoint.lap, waypoint.time) for waypoint in self.waypoints]
         numbers = sorted({lap for lap, _ in passed})
@@ -166,9 +164,9 @@ class Score(PerFlight):
 
     @cached_property
     def _end(self) -> tuple[Outcome, str]:
-        """The first thing that went wrong, else through all gates, else flown to the end.
+        """The outcome and its sentence: the first failure, else through all gates, else complete.
 
-        What gates, waypoints, obstacles, ground and plant say comes before what is kept to a tolerance.
+        Divergence, contacts and failures at gates and waypoints take precedence over violated tolerances.
         """
         if self.is_batch:
             raise SpecError("outcome is asked of one flight; of a batch, ask score[k].outcome or outcomes")
@@ -192,7 +190,7 @@ class Score(PerFlight):
         return Outcome.THROUGH_GATES, Outcome.THROUGH_GATES.sentence(**numbers)
 
     def _endings(self) -> Iterator[FlightFailure]:
-        """The divergence of a flight, and what it touched."""
+        """Yield the divergence of a flight and its contacts."""
         if isfinite(self.stop):
             yield FlightFailure(self.stop, Outcome.DIVERGED if self.is_finite else Outcome.STATE_NOT_FINITE)
         if isfinite(self.ground_time):
@@ -204,19 +202,19 @@ class Score(PerFlight):
             yield FlightFailure(self.contact_time, _FELT[self.contact], {"obstacle": obstacle})
 
     def _departure(self) -> Iterator[FlightFailure]:
-        """When a flight left its path, if it did."""
+        """Yield the time at which a flight left its path, if it did."""
         if isfinite(self.off_path_time):
             error, allowed = length(self.max_position_error_m), length(self.path_radius_m)
             yield FlightFailure(self.off_path_time, Outcome.OFF_PATH, {"allowed": allowed, "error": error})
 
 
 def _failures(judged: Iterable[Passage | WaypointPassage | StageAttitude]) -> Iterator[FlightFailure]:
-    """What went wrong at gates, waypoints and other stages."""
+    """Yield the failures at gates, waypoints and other stages."""
     yield from (each.failure for each in judged if each.failure is not None)
 
 
 def _require_own_plan(times: Array, asked: Array, plan: Plan) -> None:
-    """Refuse a plan whose path is not that of the set-points (T, 3) at these times [s]."""
+    """Raise SpecError for a plan whose path is not that of the set-points (T, 3) at these times [s]."""
     path = plan.trajectory.evaluate(np.clip(times, 0.0, plan.duration))
     off = float(np.median(np.linalg.norm(asked - path, axis=1)))
     if off > OTHER_PATH:
@@ -228,12 +226,13 @@ def _require_own_plan(times: Array, asked: Array, plan: Plan) -> None:
 
 @validated
 def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | None = None) -> Score:
-    """Score one flight; with the vehicle, by default the plan's, its clearance in the gates too.
+    """Score one flight.
 
-    Errors are against the set-points in the flight: position as a distance [m], attitude as the angle of
-    the relative rotation [deg]. With a plan, gates are to be passed at its stages' instants; with the
-    problem alone, at the set-points' nearest approaches. Raises SpecError for a batch of flights, and for
-    the plan of another flight.
+    The vehicle, by default the plan's, gives the size of the body for its clearance in gates. Errors are
+    relative to the flight's set-points: position as a distance [m], attitude as the angle of the relative
+    rotation [deg]. With a plan, gates are to be passed at the instants of its stages. With a problem only,
+    the set-points' nearest approaches are used. SpecError is raised for a batch of flights, and for the plan
+    of another flight.
     """
     if flight.is_batch:
         raise SpecError("score takes one flight at a time; of a batch, score flight[k]")
@@ -258,7 +257,7 @@ def score(flight: Flight, goal: Problem | Plan | str, vehicle: Vehicle | str | N
 
 
 def _observer(flight: Flight) -> ObserverScore | None:
-    """How well the filter knew the flight, if there was one."""
+    """Return the errors of the estimator, or None for a flight without one."""
     if not flight.is_observed:
         return None
     off = np.linalg.norm(flight.observed_position - flight.states.position, axis=-1)
@@ -275,7 +274,7 @@ def _observer(flight: Flight) -> ObserverScore | None:
 
 
 def score_of(metrics: RunningMetrics, criteria: Criteria, nearest: NearestObstacle | None = None) -> Score:
-    """The score of flights from their last metrics, leaves (flights,), and what of obstacles is nearest."""
+    """Return the score of flights from their last metrics, leaves (flights,), and the nearest obstacle."""
     ticks = np.maximum(metrics.ticks, 1.0)
     stop = np.where(metrics.flying < 0.5, metrics.stop, np.nan)
     targets = (*criteria.waypoints, *criteria.places)
@@ -308,5 +307,5 @@ def score_of(metrics: RunningMetrics, criteria: Criteria, nearest: NearestObstac
 
 
 def _if_ever(times: Array) -> Array:
-    """Times that are infinite where something never happened, NaN instead."""
+    """Return times with NaN in place of infinity (never)."""
     return np.where(np.isinf(times), np.nan, times)

@@ -1,4 +1,4 @@
-"""score_flights(): many flights scored as they are flown, none of them kept."""
+"""score_flights(): many flights scored during the simulation, without logs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def score_flights(
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
     **changes: Unpack[FlightChanges],
 ) -> Score:
-    """Fly as `fly` does with the same arguments, and score each flight as it is flown; nothing is logged.
+    """Fly as `fly` does with the same arguments, and score each flight during the simulation, without a log.
 
     Args:
         plan: what is flown; a bare trajectory needs vehicles and a problem.
@@ -56,7 +56,7 @@ def score_flights(
 
 @dataclass(frozen=True, eq=False)
 class ErrorsOverTime:
-    """Errors of flights, RMS over the intervals that end at some times, held after a divergence."""
+    """RMS errors of flights over the intervals that end at some times, held after a divergence."""
 
     times: Array  # [s], (T,)
     position: Array  # [m], (flights, T)
@@ -64,7 +64,7 @@ class ErrorsOverTime:
 
     @classmethod
     def of(cls, times: Array, sums: RunningMetrics | PoseRow) -> ErrorsOverTime:
-        """Compute the errors from their running sums at those times [s], leaves (flights, T)."""
+        """Compute the errors from their running sums at these times [s], leaves (flights, T)."""
         ticks = np.diff(sums.ticks, axis=1, prepend=0.0)
         latest = np.maximum.accumulate(np.where(ticks > 0.0, np.arange(len(times)), 0), axis=1)
 
@@ -83,7 +83,7 @@ def score_over_time(
     config: FlightConfig,
     stride: int | None = None,
 ) -> tuple[Score, ErrorsOverTime]:
-    """Score flights as `score_flights` does, and return their errors over time too.
+    """Score flights as `score_flights` does, and also return their errors over time.
 
     Args:
         plan: what is flown.
@@ -120,9 +120,9 @@ def score_over_time(
 
 
 def _past_obstacles(setup: FlightSetup) -> tuple[RunningMetrics, PoseRow, NearestObstacle]:
-    """The last metrics of flights, leaves (vehicles,), every row, and what is nearest on the way.
+    """Return the last metrics of flights, leaves (vehicles,), all rows, and the nearest obstacles.
 
-    Rows take 88 bytes a tick and vehicle.
+    Rows take 88 bytes for each tick and vehicle.
     """
     rows, states = setup.scan(pose_row, 1)
     metrics = next(state for state in states if isinstance(state, RunningMetrics))

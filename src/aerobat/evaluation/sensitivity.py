@@ -1,4 +1,4 @@
-"""sensitivity(): how the errors of a flight change with gains, vehicle and start, exact to rounding."""
+"""sensitivity(): exact derivatives of a flight's errors with respect to gains, vehicle and start."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from aerobat.simulation.setup import FlightSetup
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-# the lead's filter also sets how far ahead set-points are read, which may jump from piece to piece
+# lead_time_constant also sets how far ahead set-points are read, which may jump between pieces
 _NUMBERS = (name for name, kind in get_type_hints(Controller).items() if kind is float)
 _GAINS = tuple(name for name in _NUMBERS if name not in ("lead_time_constant", "disturbance_filter"))
 _EACH_ROTOR = 0
@@ -59,9 +59,9 @@ _SHAPES: Mapping[str, tuple[int, ...]] = {
 @short
 @by_value
 class Gradient:
-    """A number that a flight comes to, and its slopes in named quantities.
+    """A result of a flight, and its derivatives with respect to named quantities.
 
-    Of a batch, all arrays have a leading axis of vehicles.
+    For a batch, all arrays have a leading axis of vehicles.
     """
 
     value: Array  # (...)
@@ -70,7 +70,7 @@ class Gradient:
 
 @by_value
 class Sensitivity:
-    """The errors of a flight against its set-points, and how they change."""
+    """The errors of a flight relative to its set-points, and their derivatives."""
 
     mean_square_position_error: Gradient  # [m²] over the ticks up to the end or divergence, as in a score
     mean_square_attitude_error: Gradient  # [rad²] likewise
@@ -78,7 +78,7 @@ class Sensitivity:
 
 
 class _Sums(NamedTuple):
-    """The loop's row."""
+    """The row that the loop returns."""
 
     square: Scalar  # [m²]
     square_angle: Scalar  # [rad²]
@@ -157,9 +157,9 @@ def _known(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _flown(setup: FlightSetup, directions: Sequence[list[Array]]) -> tuple[_Sums, _Sums]:
-    """The last row of the loop, and its slopes; leaves (vehicles, directions).
+    """Return the last row of the loop, and its derivatives; leaves (vehicles, directions).
 
-    Each vehicle flies once for each direction, side by side.
+    Each vehicle flies once for each direction, all side by side.
     """
     count, vehicles = len(directions), len(setup.fleet)
     along = (np.stack(each, axis=-1).ravel() for each in zip(*directions, strict=True))
@@ -167,7 +167,7 @@ def _flown(setup: FlightSetup, directions: Sequence[list[Array]]) -> tuple[_Sums
     parameters = (tree_map(lambda leaf: np.repeat(leaf, count), setup.parameters), tangents)
 
     def paired(inputs: LoopInput) -> Tree:
-        """Inputs that have no slopes, each vehicle's as often as there are directions."""
+        """Return inputs without derivatives, repeated for each direction."""
         repeated = tree_map(lambda leaf: leaf if leaf.ndim == 1 else np.repeat(leaf, count, axis=-1), inputs)
         return repeated, tuple(() for _ in tree_leaves(inputs))
 
@@ -185,7 +185,7 @@ def _flown(setup: FlightSetup, directions: Sequence[list[Array]]) -> tuple[_Sums
 
 @lru_cache(maxsize=32)
 def _summed(init: Init, step: Step) -> tuple[Init, Step]:
-    """The loop whose rows are sums, of one whose rows are metrics."""
+    """Return a loop whose rows are error sums, from a loop whose rows are metrics."""
 
     def advance(ops: Ops, parameters: Tree, carry: Tree, inputs: LoopInput) -> tuple[Tree, _Sums]:
         carry, metrics = step(ops, parameters, carry, inputs)
@@ -210,7 +210,7 @@ def _sensitivity(
 
     def each(array: Array) -> Array:
         own = np.array(array if batch else array[0])
-        own.flags.writeable = False  # a diverged vehicle's may be no numbers
+        own.flags.writeable = False  # a diverged vehicle's values may be NaN
         return own
 
     return Sensitivity(
@@ -221,7 +221,7 @@ def _sensitivity(
 
 
 def _tangent(setup: FlightSetup, name: str, unit: Array) -> LoopParameters:
-    """Derivative of the loop's parameters in a quantity, along `unit`; leaves (vehicles,)."""
+    """Return the derivative of the loop's parameters in a quantity along `unit`; leaves (vehicles,)."""
     still: LoopParameters = tree_map(np.zeros_like, setup.parameters)
     observer, controller, plant, metrics = still.own
     if name in _GAINS:
@@ -288,5 +288,5 @@ def _rotors(still: Airframe, setup: FlightSetup, name: str, unit: Array) -> Airf
 
 
 def _alike(vector: Array, vehicles: int) -> Tree:
-    """Components (vehicles,) of a vector that is the same for all."""
+    """Return the components (vehicles,) of a vector that is the same for all vehicles."""
     return components(np.broadcast_to(vector, (vehicles, len(vector))))

@@ -37,12 +37,12 @@ def register_limits(family: Family) -> Family:
 
 
 def limits_along(
-    vehicle: Vehicle | None,  # Return all limits that must hold along a whole path.
+    vehicle: Vehicle | None,
     environment: Environment,
     limits: Limits,
     conditions: tuple[Condition, ...],
 ) -> tuple[Limit, ...]:
-    """Return everything that must hold all along a path.
+    """Return all limits that must hold along a whole path.
 
     Args:
         vehicle: What flies it; without one, rotors and body rates have no limits and there is no drag.

@@ -218,8 +218,7 @@ class Trajectory:
         return float(np.sum(per_segment / self.durations ** (2 * derivative - 1)))
 
     def peak(self, derivative: int) -> Extremum:
-        """Return the largest |d^k p/dt^k| over continuous time, from roots of the derivative of its
-        square."""
+        """Return the largest |d^k p/dt^k| over continuous time, from roots of the square's derivative."""
         return self._extrema(self._rates(derivative))[1]
 
     def component_range(self, derivative: int) -> tuple[Array, Array]:

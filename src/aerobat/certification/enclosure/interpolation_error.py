@@ -107,8 +107,8 @@ def accuracy(
     turned = MagnitudeBounds(none, none, around.magnitudes.omega, around.magnitudes.omega_dot)
     per_radian = quantities.errors(vehicle, around.magnitudes, turned)
     per_radian[:, 1:][~around.regular[:, 1:]] = np.inf
-    away = (RHO[1:] + 1 / RHO[1:]) / 2 - 1  # of an ellipse from the piece, by Cauchy's inequality
-    per_second = 2 / seconds[:, None]  # distance of an ellipse from the piece, for Cauchy's inequality
+    away = (RHO[1:] + 1 / RHO[1:]) / 2 - 1  # distance of an ellipse from the piece, for Cauchy's inequality
+    per_second = 2 / seconds[:, None]
     return InterpolationError(
         magnitude=bounds[:, 0],
         remainder=(bounds[:, 1:] * decay[:, None]).min(axis=1),

@@ -1,1 +1,1 @@
-"""Control laws that come with Aerobat beside its own, one a file."""
+"""Control laws that come with Aerobat besides its tracking controller, one a file."""

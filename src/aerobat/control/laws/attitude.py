@@ -1,4 +1,4 @@
-"""Steps that the laws share: how a body is off an attitude, and the moment that turns it as it shall."""
+"""Shared steps of the laws: the attitude error, and the moment that corrects it."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from aerobat.kernels.ops import Axes, Ops, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, to_body
 from aerobat.kernels.vectors import add, add_scaled, cross, dot, norm, scale, subtract, transform
 
-_SHORTEST = 1e-3  # [m/s²], or [-] of unit vectors: shorter ones have no direction to follow
+_SHORTEST = 1e-3  # [m/s²], or [-] of unit vectors: shorter vectors have no usable direction
 
 
 def axes_along(ops: Ops, thrust: Vector, reference: ReferencePoint) -> Axes:
-    """Return the axes with the third along a specific thrust [m/s²], and the first as near the reference's.
+    """Return axes with the third along a specific thrust [m/s²] and the first near the reference's.
 
-    Those of the reference where the thrust vanishes or lies along its first axis.
+    The reference's axes are returned where the thrust vanishes or lies along its first axis.
     """
     first, second, third = axes(reference.q_world_body)
     b3 = scale(1.0 / ops.maximum(norm(ops, thrust), _SHORTEST), thrust)
@@ -57,11 +57,11 @@ def attitude_feedback(
 def moment_for(
     model: ControllerModel, body_axes: Axes, reference: ReferencePoint, acceleration: Vector
 ) -> Vector:
-    """Return the moment [N·m, body] of the reference and of an angular acceleration [rad/s²] beside it."""
+    """Return the moment [N·m, body] of the reference plus that of an angular acceleration [rad/s²]."""
     inertia = model.airframe.mass_properties.inertia
     return add(reference_moment(inertia, body_axes, reference), transform(inertia, acceleration))
 
 
 def collective(model: ControllerModel, body_axes: Axes, thrust: Vector) -> Scalar:
-    """Return the collective thrust [N] that gives a specific thrust's part along the body's third axis."""
+    """Return the collective thrust [N] for the component of a specific thrust along the body's third axis."""
     return model.airframe.mass_properties.mass * dot(thrust, body_axes[2])

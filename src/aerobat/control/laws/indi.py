@@ -26,7 +26,7 @@ from aerobat.kernels.vectors import (
 
 
 class Increments(NamedTuple):
-    """Measured quantities, low-passed alike, so that both tell of the same instant."""
+    """Measured quantities with the same low-pass filter, so that they refer to the same instant."""
 
     omega: Vector  # [rad/s] body, at the last tick
     angular_acceleration: Vector  # [rad/s²] body
@@ -37,10 +37,10 @@ class Increments(NamedTuple):
 
 @controller("indi")
 class Indi(ControlLaw):
-    """The moment of the rotors, changed by what the angular acceleration that is measured lacks.
+    """Incremental inversion: the rotors' moment is changed by the missing angular acceleration.
 
-    M = M_f + J (α − α_f): what turns the body beside the rotors needs no model. Attitude and position are
-    held as in Lee et al. (2010), with an integral of the position error.
+    M = M_f + J (α − α_f), where f marks filtered measurements. Other moments on the body need no model.
+    Attitude and position are controlled as in Lee et al. (2010), with an integral of the position error.
     """
 
     TAKES_DISTURBANCES: ClassVar[bool] = False  # of moments by itself, of forces by the integral
@@ -55,7 +55,7 @@ class Indi(ControlLaw):
     filter_time: Positive = 0.02  # [s] of what is measured
 
     def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> Increments:
-        """Return what is measured before the first tick."""
+        """Return the measurements before the first tick."""
         turned = to_body(axes(seen.body.q_world_body), seen.reference.omega_dot)
         moment = motors.wrench(model.airframe.rotors, seen.thrusts).moment_body
         return Increments(seen.body.omega_body, turned, moment, ZERO, 0.0)
@@ -87,7 +87,7 @@ class Indi(ControlLaw):
     def _measured(
         self, ops: Ops, model: ControllerModel, state: Increments, seen: Seen, elapsed: Scalar
     ) -> Increments:
-        """Return what is measured, a tick later."""
+        """Return the measurements a tick later."""
         turned = scale(1.0 / elapsed, subtract(seen.body.omega_body, state.omega))
         turned = select_tree(ops, state.has_omega > 0.5, turned, state.angular_acceleration)
         moment = motors.wrench(model.airframe.rotors, seen.thrusts).moment_body

@@ -1,8 +1,8 @@
-"""A linear-quadratic regulator about the trajectory, its gains those of the vehicle frozen at each instant.
+"""A linear-quadratic regulator about the trajectory, with gains for the vehicle frozen at each instant.
 
-About a reference that is followed, in its axes and with its specific thrust f, an error evolves as
-ẍ = f θ_y, ÿ = −f θ_x, z̈ = δf and θ̈ = δα: chains of four, two and two integrators. Of the chain in fθ the
-regulator is the same for every f, so that the gains on θ are constant, those on x fall as 1/f.
+About a reference with specific thrust f, in its axes, the error dynamics are ẍ = f θ_y, ÿ = −f θ_x, z̈ = δf
+and θ̈ = δα: chains of four, two and two integrators. The regulator of the chain in fθ does not depend on f.
+Therefore the gains on θ are constant and the gains on x fall as 1/f.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from aerobat.kernels.quaternions import axes, to_body
 from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import clamp_norm, dot, norm, subtract
 
-_MIN_THRUST = 3.0  # [m/s²] with less, turning hardly moves the vehicle: position waits
-_TUNED_FOR = 25.0  # [rad/s] of the attitude loop; a vehicle that allows less is regulated more slowly
+_MIN_THRUST = 3.0  # [m/s²] thrust in the gains at least: with less, turning hardly moves the vehicle
+_TUNED_FOR = 25.0  # [rad/s] bandwidth of the attitude loop; vehicles that allow less get slower gains
 
 
 @lru_cache(maxsize=32)
@@ -44,7 +44,7 @@ def regulator(sizes: tuple[float, ...], effort: float) -> tuple[float, ...]:
 
 @controller("lqr")
 class Lqr(ControlLaw):
-    """The linear-quadratic regulator of the errors about the trajectory, weighed by Bryson's rule."""
+    """The linear-quadratic regulator of the errors about the trajectory, weighted by Bryson's rule."""
 
     position: Positive = 0.1  # [m] an error that weighs as much as each of the others
     velocity: Positive = 0.8  # [m/s]

@@ -1,4 +1,4 @@
-"""Collective thrust and body rates: the outer loop of a vehicle whose flight controller holds the rates."""
+"""Collective thrust and body rates (CTBR): the outer loop for a flight controller with a rate loop."""
 
 from __future__ import annotations
 
@@ -32,26 +32,27 @@ from aerobat.kernels.vectors import (
     transform,
 )
 
-_YAW_OF_GAIN = 1.0 / 3.0  # [-] of the inner loop's gain of yaw: a faster outer loop is not damped
+_YAW_OF_GAIN = 1.0 / 3.0  # [-] of the inner loop's yaw gain; a faster outer loop is underdamped
 _TILT_OF_FREQUENCY = 0.215  # [-] of the frequency of the inner loop's poles, likewise
-_FULL_THRUST = 9.8  # [m/s²] of less specific thrust, which small errors swing about, less is corrected
+# [m/s²] below this specific thrust corrections are reduced, because small errors swing its direction
+_FULL_THRUST = 9.8
 
 
 class RatesState(NamedTuple):
-    """State of the outer loop from tick to tick, its set-point among it."""
+    """State of the outer loop from tick to tick, including its set-point."""
 
     outer: PositionLoopState
-    integral: Vector  # [rad] that feed-forward has left in the inner loop's integral
+    integral: Vector  # [rad] integral that feed-forward has left in the inner loop
     setpoint: RateSetpoint
 
 
 @controller("rates")
 class Rates(ControlLaw):
-    """Body rates and collective thrust for an inner loop (CTBR), which a flight controller has.
+    """Body rates and collective thrust (CTBR) for the inner loop of a flight controller.
 
-    Position and attitude are held as by the tracking controller, at the position gains of the vehicle. The
-    moment that the reference asks, ahead of the rotors' lag, is fed forward through the inverse of the inner
-    loop's PID. The inner loop is `kernels.rate_loop`, or a real flight controller's.
+    Position and attitude are controlled as by the tracking controller, with the vehicle's position gains. The
+    reference's moment, with compensated rotor lag, is fed forward through the inverse of the inner loop's
+    PID. The inner loop is `kernels.rate_loop`, or that of a real flight controller.
     """
 
     GIVES_RATES: ClassVar[bool] = True
@@ -62,7 +63,7 @@ class Rates(ControlLaw):
     max_rate: Positive = 34.0  # [rad/s] of each axis: gyros tell 35, which are 2000°/s
 
     def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> RatesState:
-        """Return the state before the first tick, the reference's own rates and thrust its set-point."""
+        """Return the state before the first tick, with the reference's rates and thrust as set-point."""
         outer = init_position_loop(ops, model.gains, seen.body, seen.reference)
         omega = to_body(axes(seen.body.q_world_body), seen.reference.omega)
         demand = thrust_demand(model.airframe.mass_properties, model.environment, seen.reference)
@@ -109,7 +110,7 @@ class Rates(ControlLaw):
     def _fed_forward(
         self, model: ControllerModel, body_axes: Any, reference: ReferencePoint, steps: Scalar
     ) -> Vector:
-        """Return the reference's moment over the inertia [rad/s²], so many steps of the controller ahead."""
+        """Return the reference's moment divided by the inertia [rad/s²], `steps` controller steps ahead."""
         properties = model.airframe.mass_properties
         now, change = moment_and_change(properties.inertia, body_axes, reference)
         return transform(properties.inverse_inertia, add_scaled(now, steps, change))
