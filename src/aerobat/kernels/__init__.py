@@ -1,1 +1,1 @@
-"""Computations of every tick, written once in scalar components, whatever the numbers are."""
+"""Computations of every tick, written once in scalar components for all number types."""

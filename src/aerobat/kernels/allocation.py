@@ -1,4 +1,4 @@
-"""Rotor thrusts that fit within limits, at every tick."""
+"""Control allocation at every tick: rotor thrusts within limits."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from aerobat.kernels.motors import Rotors, clamp
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip, magnitude
 from aerobat.kernels.rigid_body import RotorWrench
 
-_BEARING = 1e-9  # [-] a rotor with a smaller fraction of the collective thrust bears nothing
+_BEARING = 1e-9  # [-] a rotor with a smaller fraction of the collective thrust counts as carrying none
 
 
 class Mixer(NamedTuple):
-    """The least-norm inverse of the allocation: what each rotor adds for a unit of each part of a load."""
+    """The least-norm inverse of the allocation: each rotor's thrust per unit of each component of a load."""
 
     collective: PerRotor
     roll: PerRotor  # [1/m]
     pitch: PerRotor  # [1/m]
     yaw: PerRotor  # [1/m]
-    min_collective: Scalar  # [N] of collective thrust that the rotors can hold without any moment
+    min_collective: Scalar  # [N] collective thrusts that the rotors can hold without any moment
     max_collective: Scalar  # [N]
 
 
 def mix(mixer: Mixer, load: RotorWrench) -> PerRotor:
-    """The least-norm rotor thrusts [N] that make a load, limits ignored."""
+    """Return the least-norm rotor thrusts [N] for a load, without limits."""
     mx, my, mz = load.moment_body
     columns = zip(mixer.collective, mixer.roll, mixer.pitch, mixer.yaw, strict=True)
     return tuple(c * load.thrust + a * mx + b * my + d * mz for c, a, b, d in columns)
 
 
 def within_limits(rotors: Rotors, thrusts: PerRotor) -> Scalar:
-    """True where thrusts [N] are within all limits."""
+    """Return True where thrusts [N] are within all limits."""
     inside: Scalar = True
     for f, low, high, slack in zip(thrusts, rotors.min_thrust, rotors.max_thrust, rotors.slack, strict=True):
         inside = inside & (f >= low - slack) & (f <= high + slack)
@@ -39,11 +39,11 @@ def within_limits(rotors: Rotors, thrusts: PerRotor) -> Scalar:
 
 
 def desaturate(ops: Ops, rotors: Rotors, mixer: Mixer, load: RotorWrench) -> PerRotor:
-    """Thrusts within limits [N] that make, of a load that does not fit, what can be had; yaw is shed first.
+    """Return thrusts [N] within limits for a load that exceeds them; yaw is reduced first.
 
-    Next, collective thrust is lowered until roll and pitch fit: a vehicle that cannot tilt is lost, one that
-    sinks recovers. It is never raised for them. What of roll and pitch still does not fit is scaled down,
-    and of yaw what then fits is given.
+    Then the collective thrust is lowered until roll and pitch fit: a vehicle that cannot tilt is lost, one
+    that sinks recovers. The thrust is never raised for them. Roll and pitch are then scaled down to fit, and
+    yaw gets the remaining range.
     """
     mx, my, mz = load.moment_body
     tilting = tuple(a * mx + b * my for a, b in zip(mixer.roll, mixer.pitch, strict=True))
@@ -56,9 +56,10 @@ def desaturate(ops: Ops, rotors: Rotors, mixer: Mixer, load: RotorWrench) -> Per
 
 
 def _lowered(ops: Ops, rotors: Rotors, mixer: Mixer, thrust: Scalar, tilting: PerRotor) -> Scalar:
-    """The collective thrust, low enough for no rotor to exceed its upper limit while tilting.
+    """Return the collective thrust, low enough that tilting exceeds no rotor's upper limit.
 
-    Tilting counts as far as it fits about some collective thrust; for more it would be lowered in vain.
+    Tilting is first scaled to the part that fits at some collective thrust; lowering the thrust for more is
+    useless.
     """
     slopes, ceilings = [], []
     for c, df, high in zip(mixer.collective, tilting, rotors.max_thrust, strict=True):
@@ -73,7 +74,7 @@ def _lowered(ops: Ops, rotors: Rotors, mixer: Mixer, thrust: Scalar, tilting: Pe
 
 
 def _as_far_as_fits(ops: Ops, rotors: Rotors, base: PerRotor, change: PerRotor) -> PerRotor:
-    """base + s·change with the largest s in [0, 1] within limits, for a base within them."""
+    """Return base + s·change with the largest s in [0, 1] within limits, for a base within them."""
     limits = zip(rotors.min_thrust, rotors.max_thrust, rotors.slack, strict=True)
     fraction: Scalar = 1.0
     for f, df, (low, high, slack) in zip(base, change, limits, strict=True):

@@ -1,4 +1,4 @@
-"""A battery that rotors empty by their induced power, and thrust ceilings that fall with its voltage."""
+"""A battery that rotors discharge by their induced power; its voltage lowers their maximum thrust."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from aerobat.kernels.ops import Ops, PerRotor, Scalar, magnitude
 
 
 class BatteryParameters(NamedTuple):
-    """A battery, by what a vehicle's rotors take from it."""
+    """A battery and the discharge by a vehicle's rotors."""
 
-    start: Scalar  # [-] charge, of a full one
-    usage: PerRotor  # [1/(s·N^1.5)] charge used a second, a thrust to the power of 1.5 (momentum theory)
-    sag: Scalar  # [-] by which the ceiling falls from full to empty
+    start: Scalar  # [-] initial charge, as a fraction of a full one
+    usage: PerRotor  # [1/(s·N^1.5)] discharge rate per thrust to the power of 1.5 (momentum theory)
+    sag: Scalar  # [-] fall of the maximum thrust from full to empty, as a fraction
 
 
 class BatteryState(NamedTuple):
-    """Charge, and what it means."""
+    """The charge, and the thrust limits at this charge."""
 
     charge: Scalar  # [-] of a full battery
-    ceiling: Scalar  # [-] thrust limits, over those with a full battery
+    ceiling: Scalar  # [-] thrust limits as a fraction of those with a full battery
 
 
 def init(parameters: BatteryParameters) -> BatteryState:
-    """The battery before the flight."""
+    """Return the battery before the flight."""
     return _shown(parameters, parameters.start)
 
 
 def step(
     ops: Ops, parameters: BatteryParameters, state: BatteryState, thrusts: PerRotor, dt: Scalar
 ) -> BatteryState:
-    """The battery after `dt` [s] at these rotor thrusts [N]."""
+    """Return the battery after `dt` [s] at these rotor thrusts [N]."""
     used = (
         usage * magnitude(ops, f) * ops.sqrt(magnitude(ops, f))
         for usage, f in zip(parameters.usage, thrusts, strict=True)

@@ -28,7 +28,8 @@ from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, RotorWrench
 from aerobat.kernels.vectors import ZERO, add, dot, norm
 
-_MIN_PART = 0.3  # [-] of the commanded specific thrust, kept where the vehicle points away from it
+# [-] smallest thrust, as a fraction of the commanded specific thrust, where the vehicle points away from it
+_MIN_PART = 0.3
 
 
 class FeatureFlags(NamedTuple):
@@ -40,7 +41,7 @@ class FeatureFlags(NamedTuple):
 
 
 class ControllerModel(NamedTuple):
-    """The nominal vehicle, which the controller takes to be flying, and the gains for it."""
+    """The nominal vehicle that the controller assumes, and the gains for it."""
 
     airframe: Airframe
     environment: EnvironmentParameters
@@ -63,16 +64,16 @@ class AttitudePursuit(NamedTuple):
 
 
 class ControllerState(NamedTuple):
-    """State of the controller from tick to tick, its commands among it."""
+    """State of the controller from tick to tick, including its commands."""
 
     outer: PositionLoopState
     attitude_integral: Vector  # [rad·s]
-    thrusts: PerRotor  # [N] that the rotors give, by the nominal model
+    thrusts: PerRotor  # [N] rotor thrusts predicted by the nominal model
     commands: Commands  # the last ones
 
 
 def init(ops: Ops, model: ControllerModel, body: Body, reference: ReferencePoint) -> ControllerState:
-    """The state before the first tick, with the rotors at what the trajectory asks there."""
+    """Return the state before the first tick, with the rotor thrusts that the reference requires there."""
     mass_properties, rotors = model.airframe
     moment = reference_moment(mass_properties.inertia, axes(body.q_world_body), reference)
     demand = thrust_demand(mass_properties, model.environment, reference)
@@ -91,7 +92,7 @@ def step(
     reference: ReferencePoint,
     elapsed: Scalar,
 ) -> ControllerState:
-    """The state, new commands included, `elapsed` [s] after the last tick."""
+    """Return the state, including new commands, `elapsed` [s] after the last tick."""
     outer = step_position_loop(ops, model.gains, state.outer, body, reference, elapsed)
     demand = thrust_demand(model.airframe.mass_properties, model.environment, reference)
     attitude = attitude_command(ops, outer, demand, reference)
@@ -114,7 +115,7 @@ def track_attitude(
     rates: ReferencePoint,
     elapsed: Scalar,
 ) -> ControllerState:
-    """The inner loop: the state, new commands included, that turns the body to an attitude.
+    """Return the state, including new commands, of the inner loop, which turns the body to an attitude.
 
     Args:
         ops: of the arithmetic.
@@ -145,11 +146,11 @@ def track_attitude(
 
 @runtime_checkable
 class Controlling(Protocol):
-    """The part of a controller's state that others see, whichever controller it is."""
+    """The part of any controller's state that other code uses."""
 
     @property
     def thrusts(self) -> PerRotor:
-        """The thrusts [N] that the rotors give, by the nominal model."""
+        """The rotor thrusts [N] predicted by the nominal model."""
 
     @property
     def commands(self) -> Commands:
@@ -159,9 +160,10 @@ class Controlling(Protocol):
 def predicted(
     ops: Ops, model: ControllerModel, state: Controlling, body: Body, elapsed: Scalar, delay: Scalar
 ) -> Body:
-    """The body when new commands take effect, `delay` [s] from now, by the nominal model (Smith's predictor).
+    """Return the predicted body when new commands take effect, `delay` [s] from now (Smith predictor).
 
-    Until then the rotors follow the last commands, which took effect `elapsed` less `delay` ago.
+    Until then the rotors of the nominal model follow the last commands, which took effect `elapsed` − `delay`
+    ago.
 
     Args:
         ops: of the arithmetic.
@@ -179,9 +181,9 @@ def predicted(
 
 
 def collective(ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand) -> Scalar:
-    """The collective thrust [N]: the commanded specific thrust along b3, whichever way the vehicle points.
+    """Return the collective thrust [N]: the commanded specific thrust projected on b3, times the mass.
 
-    Pointing away it would vanish, and with it the means to turn back: a part of |f| is kept.
+    A vehicle that points away keeps a fraction of |f|, because without thrust it could not turn back.
     """
     f = attitude.specific_thrust
     return mass * ops.maximum(dot(f, b3), _MIN_PART * norm(ops, f))
@@ -196,10 +198,10 @@ def rotor_commands(
     decay_factors: PerRotor,
     period: Scalar,
 ) -> Commands:
-    """Commands for a load, and for the change that the reference makes of it until the next tick.
+    """Return commands for a load, and for its change by the reference until the next tick.
 
-    The load is brought within limits first, and the lead then clipped rotor by rotor: it exceeds them for
-    moments only, in which each rotor does best to hurry.
+    The load is first brought within the limits. The lead is then clipped for each rotor: a lead beyond the
+    limits only comes from moments, which every rotor should build up as fast as possible.
 
     Args:
         ops: of the arithmetic.
@@ -226,12 +228,11 @@ def rotor_commands(
 def _leading(
     thrusts: PerRotor, desired: PerRotor, changes: PerRotor, decay_factors: PerRotor, fraction: Scalar
 ) -> PerRotor:
-    """Commands [N] that bring the rotors, in one period, a `fraction` of the way from `thrusts` to `desired`.
+    """Return commands [N] that move the rotors in one period by a `fraction` of `desired` − `thrusts`.
 
-    And further by the reference's `changes`: along a reference that is followed they are u = f + τ f', and
-    what differs from it stands behind a low-pass of time constant T, with fraction = 1 − e^(−period/T).
-    Written about where the rotors are believed to be, it goes on pushing after a saturation until they have
-    got there.
+    The reference's `changes` are added. On the reference the commands are u = f + τ f'. Deviations pass a
+    low-pass filter of time constant T, with fraction = 1 − e^(−period/T). As the commands are relative to the
+    predicted thrusts, they continue after a saturation until the rotors reach `desired`.
     """
     return tuple(
         f + ((w - f) * fraction + change) / (1.0 - left)

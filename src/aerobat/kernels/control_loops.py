@@ -1,4 +1,4 @@
-"""The two loops of the tracking controller (paper, Section III): position and attitude errors to a wrench."""
+"""The two loops of the tracking controller (paper, Section III): from tracking errors to a wrench."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from aerobat.kernels.vectors import (
     transform,
 )
 
-_MIN_THRUST = 1e-3  # [m/s²] a specific thrust below it has no direction to follow
+_MIN_THRUST = 1e-3  # [m/s²] a smaller specific thrust has no usable direction
 
 
 class Gains(NamedTuple):
@@ -42,13 +42,13 @@ class Gains(NamedTuple):
 
 
 class Lookahead(NamedTuple):
-    """Reference at the controller's next step, when this one's commands have taken effect.
+    """Reference at the controller's next step, when the commands of this step have taken effect.
 
-    Its rates are taken along its own axes and then given in world axes as if those stood as now: the rotors
-    turn with the body.
+    Its rates are components along its own axes, given in world axes as if these axes stood as now, because
+    the rotors turn with the body.
     """
 
-    thrust_change: Scalar  # [m/s²] of the collective over the mass, from now to then
+    thrust_change: Scalar  # [m/s²] change of the collective thrust per mass until the next step
     omega: Vector  # [rad/s] world
     omega_dot: Vector  # [rad/s²] world
 
@@ -75,7 +75,7 @@ class PositionLoopState(NamedTuple):
 
 
 def init_position_loop(ops: Ops, gains: Gains, body: Body, reference: ReferencePoint) -> PositionLoopState:
-    """The state before the first tick: no integral, and an answer that has stood for long."""
+    """Return the state before the first tick: no integral and no feedback jerk."""
     return PositionLoopState(ZERO, _feedback_acceleration(ops, gains, ZERO, body, reference), ZERO)
 
 
@@ -87,7 +87,7 @@ def step_position_loop(
     reference: ReferencePoint,
     elapsed: Scalar,
 ) -> PositionLoopState:
-    """The answer `elapsed` [s] after the last one."""
+    """Return the state of the outer loop `elapsed` [s] after the last tick."""
     error = subtract(reference.position, body.position)
     integral = clamp_norm(ops, add_scaled(state.integral, elapsed, error), gains.max_integral)
     acceleration = _feedback_acceleration(ops, gains, integral, body, reference)
@@ -115,10 +115,10 @@ class ThrustDemand(NamedTuple):
 def thrust_demand(
     mass_properties: MassProperties, environment: EnvironmentParameters, reference: ReferencePoint
 ) -> ThrustDemand:
-    """The reference's specific thrust, the drag that is expected along the trajectory made up for.
+    """Return the reference's specific thrust plus compensation of the expected drag.
 
-    With u = Rᵀ (v − w) and C = D/m, the demand is a + g e₃ + R C u. The rate of the demand is
-    j + R (C u' + ω × C u), where u' = Rᵀ a − ω × u.
+    With u = Rᵀ (v − w) and C = D/m, the demand is a + g e₃ + R C u. The rate of the demand is j + R (C u' + ω
+    × C u), where u' = Rᵀ a − ω × u.
     """
     body_axes = axes(reference.q_world_body)
     x, y, z = reference.specific_thrust
@@ -134,7 +134,7 @@ def thrust_demand(
 
 
 def _over_mass(mass_properties: MassProperties, airspeed: Vector) -> Vector:
-    """The drag at an airspeed over the mass, against it; body axes."""
+    """Return the negative drag per mass at an airspeed, body axes."""
     (dx, dy, dz), (u, v, w) = mass_properties.drag_body, airspeed
     return scale(1.0 / mass_properties.mass, (dx * u, dy * v, dz * w))
 
@@ -148,7 +148,7 @@ class AttitudeCommand(NamedTuple):
 
 
 class AttitudeError(NamedTuple):
-    """Distance of the body from its desired attitude; body axes."""
+    """Attitude and rate error of the body; body axes."""
 
     rotation: Vector  # sign(q_w)·q_vec of q* ⊗ q_des, half the angle where it is small
     omega: Vector  # [rad/s]
@@ -157,10 +157,10 @@ class AttitudeError(NamedTuple):
 def attitude_command(
     ops: Ops, outer: PositionLoopState, demand: ThrustDemand, reference: ReferencePoint
 ) -> AttitudeCommand:
-    """The reference attitude, turned by the smallest rotation from its thrust axis to the commanded one.
+    """Return the reference attitude, turned by the smallest rotation to the commanded thrust axis.
 
-    Rates: ω = b3 × f'/|f| with the rates of demand and feedback in f', and the reference's spin about b3.
-    Where the commanded specific thrust vanishes the reference attitude is kept.
+    The rates are ω = b3 × f'/|f|, with f' the sum of the demand's rate and the feedback jerk, plus the
+    reference's spin about b3. Where the commanded specific thrust vanishes, the reference attitude is kept.
 
     Args:
         ops: of the arithmetic.
@@ -180,7 +180,7 @@ def attitude_command(
 
 
 def attitude_error(ops: Ops, body: Body, body_axes: Axes, attitude: AttitudeCommand) -> AttitudeError:
-    """Distance of the body from its desired attitude and rates; the same for q and −q."""
+    """Return the attitude and rate error of the body; the same for q and −q."""
     w, x, y, z = multiply(conjugate(body.q_world_body), attitude.q_world_body)
     omega = to_body(body_axes, attitude.omega)
     sign = ops.select(w < 0.0, -1.0, 1.0)
@@ -190,27 +190,24 @@ def attitude_error(ops: Ops, body: Body, body_axes: Axes, attitude: AttitudeComm
 def integrate_attitude_error(
     ops: Ops, gains: Gains, integral: Vector, error: AttitudeError, elapsed: Scalar
 ) -> Vector:
-    """The integral of the attitude error [rad·s], `elapsed` [s] later."""
+    """Return the integral of the attitude error [rad·s], `elapsed` [s] later."""
     longer = add_scaled(integral, 2.0 * elapsed, error.rotation)
     return clamp_norm(ops, longer, gains.max_attitude_integral)
 
 
 def feedback_moment(gains: Gains, inertia: Matrix, error: AttitudeError, integral: Vector) -> Vector:
-    """The feedback moment [N·m], body axes: eq. (2) as a PID, with gains per unit of inertia.
-
-    M = J (2 ω_n² sign(q_w) q_vec + 2 ζ ω_n (ω_des − ω) + K_i ∫).
-    """
+    """Return the feedback moment [N·m], body axes: eq. (2) as a PID, with gains per unit of inertia."""
     acceleration = add_scaled(scale(gains.stiffness, error.rotation), gains.damping, error.omega)
     return transform(inertia, add_scaled(acceleration, gains.attitude_integral, integral))
 
 
 def reference_moment(inertia: Matrix, body_axes: Axes, rates: ReferencePoint | Lookahead) -> Vector:
-    """The moment that the reference asks [N·m], J ω' + ω × Jω, with its rates in the body's own axes."""
+    """Return the moment of the reference [N·m], J ω' + ω × Jω, with its rates in the body's own axes."""
     omega, omega_dot = to_body(body_axes, rates.omega), to_body(body_axes, rates.omega_dot)
     return flatness.moment(inertia, omega, omega_dot)
 
 
 def moment_and_change(inertia: Matrix, body_axes: Axes, reference: ReferencePoint) -> tuple[Vector, Vector]:
-    """The moment that the reference asks [N·m], and its change until the controller's next step."""
+    """Return the moment of the reference [N·m], and its change until the controller's next step."""
     now, then = (reference_moment(inertia, body_axes, each) for each in (reference, reference.ahead))
     return now, subtract(then, now)

@@ -3,12 +3,12 @@
 Let v be the velocity relative to the air, f = a + g e3 + (d/m) v with its derivatives, n = |f| and b3 = f/n.
 Then
 
-    ω = b3 × f'/n,   ω' = b3 × f''/n − 2 (b3·f'/n) ω     no spin about b3, in whichever axes f is;
+    ω = b3 × f'/n,   ω' = b3 × f''/n − 2 (b3·f'/n) ω     no spin about b3, in any axes of f;
     M = J ω' + ω × J ω                                   body axes;
     T = m (n + (d_z − d)/m b3·v).
 
-ω' is b3 × b3'': what b3'' has along b3 drops out, and n'' with it. No step divides by 1 + b3_z, save the way
-into axes that are given relative to the upright ones.
+ω' is b3 × b3'', so the component of b3'' along b3 and n'' cancel. Only `tilted`, which changes to axes
+relative to the upright ones, divides by 1 + b3_z.
 """
 
 from __future__ import annotations
@@ -22,49 +22,49 @@ from aerobat.kernels.vectors import add, add_scaled, cross, dot, scale, transfor
 def specific_thrust(
     weight: Scalar, drag: Scalar, airspeed: Scalar, acceleration: Scalar, jerk: Scalar, snap: Scalar
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """Return f, f' and f'' of components, or of whole vectors of an engine that adds and scales them."""
+    """Return f, f' and f'', from components or from whole vectors of an engine that adds and scales them."""
     return acceleration + drag * airspeed + weight, jerk + drag * acceleration, snap + drag * jerk
 
 
 def body_rates(b3: Vector, jerk: Vector, snap: Vector) -> tuple[Vector, Vector]:
-    """Return ω [rad/s] and ω' [rad/s²] of a body that keeps b3 along f; `jerk` and `snap` are f'/n, f''/n.
+    """Return ω [rad/s] and ω' [rad/s²] of a body that keeps b3 along f; `jerk` is f'/n, `snap` f''/n.
 
-    f itself with f'/n² and f''/n² gives the same.
+    The arguments f, f'/n² and f''/n² give the same result.
     """
     omega = cross(b3, jerk)
     return omega, add_scaled(cross(b3, snap), -2.0 * dot(b3, jerk), omega)
 
 
 def spun(omega: Vector, omega_dot: Vector, yaw: Sequence[Scalar]) -> tuple[Vector, Vector]:
-    """Return ω and ω' of a body that also turns about b3, from those across b3 in its axes.
+    """Return ω and ω' of a body that also yaws about b3, from its rates across b3, in body axes.
 
-    `yaw` is the rate [rad/s] at which it turns, and the rate's derivative [rad/s²].
+    `yaw` is the yaw rate [rad/s] and its derivative [rad/s²].
     """
     (x, y, _), (dx, dy, _), (rate, acceleration) = omega, omega_dot, yaw
     return (x, y, rate), (dx + rate * y, dy - rate * x, acceleration)
 
 
 def tilted(b3: Vector, across: Vector) -> tuple[Scalar, Scalar]:
-    """Components x, y of a vector `across` b3, in axes tilted with e3 by the smallest rotation to b3."""
+    """Return components x, y of a vector `across` b3, in axes tilted from e3 to b3 without twist."""
     share = across[2] / (1.0 + b3[2])
     return across[0] - b3[0] * share, across[1] - b3[1] * share
 
 
 def moment(inertia: Matrix, omega: Vector, omega_dot: Vector) -> Vector:
-    """The moment J ω' + ω × Jω [N·m] that makes a body turn so; body axes."""
+    """Return the moment J ω' + ω × Jω [N·m] of a body's rates; body axes."""
     return add(transform(inertia, omega_dot), cross(omega, transform(inertia, omega)))
 
 
 def collective(mass: Scalar, axial_drag: Scalar, norm: Scalar, b3: Vector, airspeed: Vector) -> Scalar:
-    """The collective thrust [N] behind a specific thrust of this norm, drag along b3 made up for."""
+    """Return the collective thrust [N] for a specific thrust of norm `norm`, plus the axial drag."""
     return mass * (norm + axial_drag * dot(b3, airspeed))
 
 
 def turning(b3: Vector, jerk: Vector, snap: Vector, crackle: Vector) -> tuple[Vector, Vector, Vector]:
     """Return ω and ω' of `body_rates`, and ω'' [rad/s³] along the body's axes; `crackle` is f'''/n.
 
-    ω'' is the derivative of the components of ω' in axes that turn with ω, so that a moment's rate is that of
-    its components.
+    ω'' is the derivative of the components of ω' in axes that turn with ω. The rate of a moment then follows
+    from its components.
     """
     omega, omega_dot = body_rates(b3, jerk, snap)
     world = add(cross(jerk, snap), cross(b3, crackle))
@@ -86,7 +86,7 @@ def moment_and_rate(
 def collective_rate(
     mass: Scalar, axial_drag: Scalar, b3: Vector, thrust: tuple[Scalar, Vector], air: tuple[Vector, Vector]
 ) -> Scalar:
-    """The derivative of `collective` [N/s]; `thrust` is |f| and f', `air` airspeed and acceleration."""
+    """Return the derivative of `collective` [N/s], from |f| and f', and airspeed and acceleration."""
     norm, thrust_jerk = thrust
     airspeed, acceleration = air
     along = dot(b3, thrust_jerk)

@@ -1,7 +1,8 @@
-"""An inertial measurement unit: noisy, biased, bounded means of angular rate and specific force.
+"""An inertial measurement unit: noisy, biased and saturated means of angular rate and specific force.
 
-A sample stands for the interval that it ends: the trapezoid of what is felt at both ends of it. A sample of
-the instant would be off by half an interval's change, which during a flip is several times the noise.
+A sample is the mean over the interval that it ends, computed from both ends by the trapezoidal rule. An
+instantaneous sample would differ by half of the interval's change, which during a flip is several times the
+noise.
 """
 
 from __future__ import annotations
@@ -29,15 +30,15 @@ class ImuParameters(NamedTuple):
 
 
 class ImuState(NamedTuple):
-    """The last sample, and what its interval ended with."""
+    """The last sample, and the true values at its end."""
 
     sample: ImuSample
-    felt: ImuSample  # without errors, at the instant
+    felt: ImuSample  # true values at the instant
     has_felt: Scalar  # 1, or 0 before the first sample
 
 
 class BiasParameters(NamedTuple):
-    """Biases that walk."""
+    """Random walk of the biases."""
 
     start: ImuSample
     gyro_walk: Scalar  # [rad/s] 1σ of a step: density times the square root of its interval
@@ -45,7 +46,7 @@ class BiasParameters(NamedTuple):
 
 
 def init() -> ImuState:
-    """The state before the first sample."""
+    """Return the state before the first sample."""
     nothing = ImuSample(ZERO, ZERO)
     return ImuState(nothing, nothing, 0.0)
 
@@ -53,7 +54,7 @@ def init() -> ImuState:
 def step(
     ops: Ops, parameters: ImuParameters, state: ImuState, felt: ImuSample, bias: ImuSample, noise: ImuSample
 ) -> ImuState:
-    """The next sample, of the interval since the last one; the first is of its instant.
+    """Return the next sample, over the interval since the last one; the first is instantaneous.
 
     Args:
         ops: the arithmetic.
@@ -77,7 +78,7 @@ def step(
 
 
 def walk(parameters: BiasParameters, bias: ImuSample, noise: ImuSample) -> ImuSample:
-    """Biases a step later, by independent standard normals."""
+    """Return the biases a step later, given independent standard normals."""
     return ImuSample(
         add_scaled(bias.omega, parameters.gyro_walk, noise.omega),
         add_scaled(bias.specific_force, parameters.accelerometer_walk, noise.specific_force),

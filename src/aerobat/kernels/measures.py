@@ -1,8 +1,8 @@
 """Measures at one instant of a motion, in which limits are linear: wrench, its rate and magnitudes.
 
-All is written in scalar components. A motion is given in axes that the body's are near to. The given axes
-are carried to the body's by the smallest rotation, which is exact where they are the body's own, and exact to
-first order beside.
+Everything is written in scalar components. A motion is given in axes near the body's. The smallest rotation
+takes these axes to the body's. This is exact for the body's own axes, and exact to first order for axes near
+them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from aerobat.kernels.ops import Matrix, Ops, Scalar, Vector
 from aerobat.kernels.unequal_drag import BodyMotion
 from aerobat.kernels.vectors import add, add_scaled, dot, scale
 
-STILL = 1e-12  # [rad²/s²] beside the square of a rate, which a body at rest has with a slope
+STILL = 1e-12  # [rad²/s²] added to the square of a rate, so that the rate of a body at rest is differentiable
 
 
 class InertiaAndDrag(NamedTuple):
@@ -22,9 +22,9 @@ class InertiaAndDrag(NamedTuple):
 
     mass: Scalar  # [kg]
     inertia: Matrix  # [kg·m²]
-    lateral_drag: Scalar  # [1/s] over the mass, across the thrust axis
-    axial_drag: Scalar  # [1/s] along it, beside that
-    unequal: Vector | None  # [1/s] along body x, y and z, where x and y differ
+    lateral_drag: Scalar  # [1/s] per mass, across the thrust axis
+    axial_drag: Scalar  # [1/s] per mass, along the axis minus across it
+    unequal: Vector | None  # [1/s] per mass along body x, y and z, where x and y differ
 
 
 def measures(ops: Ops, airframe: InertiaAndDrag, motion: BodyMotion, up: Vector) -> tuple[Scalar, ...]:

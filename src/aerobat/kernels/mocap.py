@@ -1,4 +1,4 @@
-"""Motion capture of two camera systems: poses with noise, a misfit beyond a plane, outliers and gaps."""
+"""Motion capture by two camera systems: poses with noise, a misfit between systems, outliers and gaps."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from aerobat.kernels.vectors import add, add_scaled, dot, scale, subtract
 
 
 class PoseSample(NamedTuple):
-    """A pose as it was measured, if it was."""
+    """A measured pose, or a gap."""
 
     pose: Pose
     is_valid: Scalar  # 1, or 0 for a gap
 
 
 class Seam(NamedTuple):
-    """The plane where the second system takes over, and its misfit."""
+    """The plane at which the second system takes over, and the misfit there."""
 
     point: Vector  # [m] of the plane
-    normal: Vector  # to the second system
-    offset: Pose  # of the second system's axes, turned about the point
-    warp: Vector  # [m] displacement at the plane, of either system
-    inverse_depth: Scalar  # [1/m] over which the warp fades
+    normal: Vector  # unit vector towards the second system
+    offset: Pose  # offset of the second system's axes, turned about the point
+    warp: Vector  # [m] displacement at the plane, in both systems
+    inverse_depth: Scalar  # [1/m] inverse of the distance over which the warp fades
 
 
 class MocapParameters(NamedTuple):
@@ -37,11 +37,11 @@ class MocapParameters(NamedTuple):
     outlier_size: Scalar  # [m]
     outage: tuple[Scalar, Scalar]  # [s] from, to before
     seam: Seam
-    first_error: tuple[Vector, Vector]  # [m], [rad] of the pose before the flight
+    first_error: tuple[Vector, Vector]  # [m], [rad] errors of the pose before the flight
 
 
 class MocapInput(NamedTuple):
-    """Time and chance at a sample."""
+    """Time and random numbers of a sample."""
 
     time: Scalar  # [s] since the flight's start
     position: Vector  # standard normals
@@ -51,15 +51,15 @@ class MocapInput(NamedTuple):
 
 
 def first_pose(ops: Ops, parameters: MocapParameters, body: Body) -> Pose:
-    """The pose known before the flight, with an error of its own."""
+    """Return the pose known before the flight, with its own error."""
     seen = as_seen(ops, parameters.seam, Pose(body.position, body.q_world_body))
     return _with_errors(ops, seen, *parameters.first_error)
 
 
 def sample(ops: Ops, parameters: MocapParameters, body: Body, inputs: MocapInput) -> PoseSample:
-    """The pose that is taken of a body."""
+    """Return the measured pose of a body."""
     seen = as_seen(ops, parameters.seam, Pose(body.position, body.q_world_body))
-    is_outlier = 1.0 - parameters.outlier <= inputs.chance  # and a gap at the other end
+    is_outlier = 1.0 - parameters.outlier <= inputs.chance  # gaps are at the other end of the range
     mistaken = ops.select(is_outlier, parameters.outlier_size, 0.0)
     error = add_scaled(scale(parameters.position_noise, inputs.position), mistaken, inputs.outlier)
     pose = _with_errors(ops, seen, error, scale(parameters.attitude_noise, inputs.attitude))
@@ -70,7 +70,7 @@ def sample(ops: Ops, parameters: MocapParameters, body: Body, inputs: MocapInput
 
 
 def as_seen(ops: Ops, seam: Seam, pose: Pose) -> Pose:
-    """The pose that a system without noise shows: of the second one beyond the plane, warped near it."""
+    """Return the noise-free measured pose: of the second system beyond the plane, warped near it."""
     from_point = subtract(pose.position, seam.point)
     distance = dot(seam.normal, from_point)
     moved = add(add(seam.point, rotate(seam.offset.q_world_body, from_point)), seam.offset.position)
@@ -82,6 +82,6 @@ def as_seen(ops: Ops, seam: Seam, pose: Pose) -> Pose:
 
 
 def _with_errors(ops: Ops, pose: Pose, position: Vector, attitude: Vector) -> Pose:
-    """The pose with small errors [m] world and [rad] about body axes."""
+    """Return the pose with small errors [m] world and [rad] about body axes."""
     small_rotation = normalize(ops, (1.0, *scale(0.5, attitude)))
     return Pose(add(pose.position, position), multiply(pose.q_world_body, small_rotation))

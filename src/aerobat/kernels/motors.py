@@ -1,6 +1,6 @@
 """Rotors that follow clamped commands with a first-order lag, and the body that they move.
 
-Body and rotors are advanced together: apart from each other, RK4 would be of first order.
+Body and rotors are integrated together: integrated separately, the order of RK4 would fall to one.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from aerobat.kernels import rigid_body
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, RotorWrench
 
-LEAST_STEP = 1e-12  # in time constants, of one that divides
+LEAST_STEP = 1e-12  # smallest step as a divisor, in time constants
 
 
 class Rotors(NamedTuple):
@@ -21,13 +21,13 @@ class Rotors(NamedTuple):
 
     min_thrust: PerRotor  # [N]
     max_thrust: PerRotor  # [N]
-    slack: PerRotor  # [N] by which rounding may push a thrust past a limit
+    slack: PerRotor  # [N] tolerance for rounding at the limits
     inverse_time_constant: PerRotor  # [1/s], 1/τ
-    allocation: tuple[PerRotor, PerRotor, PerRotor, PerRotor]  # collective, Mx, My, Mz a newton of thrust
+    allocation: tuple[PerRotor, PerRotor, PerRotor, PerRotor]  # collective, Mx, My, Mz per newton of thrust
 
 
 def clamp(ops: Ops, rotors: Rotors, thrusts: PerRotor) -> PerRotor:
-    """Thrusts [N] held within the limits of each rotor."""
+    """Return thrusts [N] clipped to the limits of each rotor."""
     return tuple(
         clip(ops, f, low, high)
         for f, low, high in zip(thrusts, rotors.min_thrust, rotors.max_thrust, strict=True)
@@ -35,25 +35,25 @@ def clamp(ops: Ops, rotors: Rotors, thrusts: PerRotor) -> PerRotor:
 
 
 def decay_factors(ops: Ops, rotors: Rotors, dt: Scalar) -> PerRotor:
-    """Fraction that is left of each rotor's distance from a held command after `dt` [s], e^(−dt/τ)."""
+    """Return the factor e^(−dt/τ) by which each rotor's distance from a held command decays in `dt` [s]."""
     return tuple(ops.exp(-dt * rate) for rate in rotors.inverse_time_constant)
 
 
 def first_order_response(thrusts: PerRotor, commands: PerRotor, decay_factors: PerRotor) -> PerRotor:
-    """Thrusts [N] a while later, by f' = (u − f)/τ under held commands u [N].
+    """Return thrusts [N] after an interval, by f' = (u − f)/τ with held commands u [N].
 
-    The exact solution, stable for any lag, however short.
+    This is the exact solution, stable for any lag.
     """
     return tuple(u + (f - u) * left for f, u, left in zip(thrusts, commands, decay_factors, strict=True))
 
 
 def collective_thrust(rotors: Rotors, thrusts: PerRotor) -> Scalar:
-    """The collective thrust [N] that rotor thrusts [N] make."""
+    """Return the collective thrust [N] of rotor thrusts [N]."""
     return _weighted_sum(rotors.allocation[0], thrusts)
 
 
 def wrench(rotors: Rotors, thrusts: PerRotor) -> RotorWrench:
-    """The collective thrust and the moments that rotor thrusts [N] make."""
+    """Return the collective thrust and the moments of rotor thrusts [N]."""
     collective, mx, my, mz = (_weighted_sum(row, thrusts) for row in rotors.allocation)
     return RotorWrench(collective, (mx, my, mz))
 
@@ -63,14 +63,14 @@ def _weighted_sum(weights: PerRotor, values: PerRotor) -> Scalar:
 
 
 class Airframe(NamedTuple):
-    """A vehicle as the kernels see it."""
+    """The parameters of a vehicle for the kernels."""
 
     mass_properties: MassProperties
     rotors: Rotors
 
 
 class VehicleState(NamedTuple):
-    """All that evolves in a flying vehicle."""
+    """The complete state of a flying vehicle."""
 
     body: Body
     thrusts: PerRotor  # [N]
@@ -84,11 +84,12 @@ def advance(
     commands: PerRotor,
     dt: Scalar,
 ) -> VehicleState:
-    """The motion after `dt` [s] under held rotor commands [N].
+    """Return the motion after `dt` [s] with held rotor commands [N].
 
-    The rotors are solved exactly, so RK4 sees their true load halfway and at the end. At the start it sees
-    the load with which Simpson's rule gives the step's impulse exactly. That differs from the true one by
-    dt⁴ where rotors lag, so that body and rotors are of order four jointly; without lag it is the command.
+    The rotors are solved exactly, so RK4 uses their true load in the middle and at the end. At the start it
+    uses the load for which Simpson's rule gives the exact impulse of the step. With lag, this load differs
+    from the true one by dt⁴, so body and rotors together are of order four. Without lag, it equals the
+    command.
     """
     rotors = airframe.rotors
     wanted = clamp(ops, rotors, commands)
@@ -103,7 +104,7 @@ def advance(
 
 
 def _mean_factors(ops: Ops, rotors: Rotors, halfway: PerRotor, dt: Scalar) -> PerRotor:
-    """What is left of each rotor's distance from a held command, the mean over `dt` [s]."""
+    """Return the mean of each rotor's decay factor over `dt` [s]."""
     return tuple(
         (1.0 - left * left) / ops.maximum(dt * rate, LEAST_STEP)
         for left, rate in zip(halfway, rotors.inverse_time_constant, strict=True)

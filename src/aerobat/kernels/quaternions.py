@@ -1,4 +1,4 @@
-"""Unit quaternions in components: rotations of any arithmetic; `aerobat.so3` is their face for arrays.
+"""Unit quaternions in components, for any arithmetic; `aerobat.so3` is their interface for arrays.
 
 Hamilton's convention, (w, x, y, z), body to world: Solà, arXiv:1711.02508.
 """
@@ -31,7 +31,7 @@ _EIGHTH = 0.4142135623730951  # tan(π/8)
 
 
 def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
-    """The Hamilton product p ⊗ q."""
+    """Return the Hamilton product p ⊗ q."""
     pw, px, py, pz = p
     qw, qx, qy, qz = q
     return (
@@ -43,14 +43,14 @@ def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def quaternion_rate(q: Quaternion, omega_body: Vector) -> Quaternion:
-    """The rate of change of an attitude, q' = ½ q ⊗ (0, ω)."""
+    """Return the time derivative of an attitude, q' = ½ q ⊗ (0, ω)."""
     w, x, y, z = q
     a, b, c = scale(0.5, omega_body)
     return -x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a
 
 
 def exp_of_small(phi: Vector) -> Quaternion:
-    """The quaternion of a rotation vector [rad], by its series: to rounding up to 0.2, to 1e-9 up to 1."""
+    """Return the quaternion of a rotation vector [rad] by series, to rounding up to 0.2, to 1e-9 up to 1."""
     square = 0.25 * dot(phi, phi)  # of half the angle
     cosine = 1.0 - square * (1.0 / 2.0 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40320.0)))
     sinc = 1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square / 362880.0)))
@@ -59,19 +59,19 @@ def exp_of_small(phi: Vector) -> Quaternion:
 
 
 def conjugate(q: Quaternion) -> Quaternion:
-    """The inverse rotation q*."""
+    """Return the inverse rotation q*."""
     return q[0], -q[1], -q[2], -q[3]
 
 
 def normalize(ops: Ops, q: Quaternion) -> Quaternion:
-    """q / |q|."""
+    """Return q / |q|."""
     w, x, y, z = q
     inverse = 1.0 / ops.sqrt(w * w + x * x + y * y + z * z)
     return w * inverse, x * inverse, y * inverse, z * inverse
 
 
 def rotate(q: Quaternion, a: Vector) -> Vector:
-    """q ⊗ a ⊗ q*: a body vector in the world for q = q_world_body."""
+    """Return q ⊗ a ⊗ q*: a body vector in world axes for q = q_world_body."""
     w, x, y, z = q
     u = (x, y, z)
     t = scale(2.0, cross(u, a))
@@ -79,7 +79,7 @@ def rotate(q: Quaternion, a: Vector) -> Vector:
 
 
 def axes(q: Quaternion) -> Axes:
-    """The body axes b1, b2, b3 in the world, for q = q_world_body: columns of the rotation matrix."""
+    """Return the body axes b1, b2, b3 in the world for q = q_world_body: columns of the rotation matrix."""
     w, x, y, z = q
     x2, y2, z2 = 2.0 * x, 2.0 * y, 2.0 * z
     xx, yy, zz = x * x2, y * y2, z * z2
@@ -93,25 +93,25 @@ def axes(q: Quaternion) -> Axes:
 
 
 def to_body(body_axes: Axes, a: Vector) -> Vector:
-    """A world vector in body axes, Rᵀ·a."""
+    """Return a world vector in body axes, Rᵀ·a."""
     b1, b2, b3 = body_axes
     return dot(b1, a), dot(b2, a), dot(b3, a)
 
 
 def to_world(body_axes: Axes, a: Vector) -> Vector:
-    """A body vector in world axes, R·a."""
+    """Return a body vector in world axes, R·a."""
     b1, b2, b3 = body_axes
     return add_scaled(add_scaled(scale(a[0], b1), a[1], b2), a[2], b3)
 
 
 def angle_between(ops: Ops, p: Quaternion, q: Quaternion) -> Scalar:
-    """The angle of the rotation from attitude p to attitude q [rad], in [0, π]."""
+    """Return the angle of the rotation from attitude p to attitude q [rad], in [0, π]."""
     w, x, y, z = multiply(conjugate(p), q)
     return 2.0 * atan2(ops, norm(ops, (x, y, z)), ops.maximum(w, -w))
 
 
 def atan2(ops: Ops, y: Scalar, x: Scalar) -> Scalar:
-    """The angle [rad] in [0, π/2] whose tangent is y/x, for y and x of zero or more, not both zero."""
+    """Return the angle [rad] in [0, π/2] whose tangent is y/x, for nonnegative y and x, not both zero."""
     ratio = ops.minimum(x, y) / ops.maximum(x, y)
     large = ratio > _EIGHTH
     t = ops.select(large, (ratio - 1.0) / (ratio + 1.0), ratio)
@@ -122,9 +122,10 @@ def atan2(ops: Ops, y: Scalar, x: Scalar) -> Scalar:
 
 
 def smallest_rotation(ops: Ops, a: Vector, b: Vector, normal: Vector) -> Quaternion:
-    """The smallest rotation that takes unit vector a to unit vector b.
+    """Return the smallest rotation that takes unit vector a to unit vector b.
 
-    Opposite vectors leave its axis open: the half turn about `normal`, a unit vector normal to a, is taken.
+    For opposite vectors the axis is not unique: the half turn about `normal`, a unit vector normal to a, is
+    returned.
     """
     # half-way vector h = (a + b)/|a + b|: q = (a·h, a × h) with a·h = |a + b|/2, which stays accurate where
     # a + b is hardly more than rounding

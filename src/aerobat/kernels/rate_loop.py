@@ -1,8 +1,8 @@
-"""The inner loop of a flight controller: body rates and collective thrust to rotor commands.
+"""The inner loop of a flight controller: from body rates and collective thrust to rotor commands.
 
-A PID on the filtered gyro, its derivative on the measurement alone, mixed so that moments come before thrust.
-With rotors of lag τ and a moment of J (p e + i ∫e − d ω'), rates follow τ ω'' + (1 + d) ω' + p ω = p ω_set.
-The gains below place that pair of poles.
+A PID on the filtered gyro, with the derivative of the measurement only; moments have priority over thrust.
+With rotors of lag τ and a moment J (p e + i ∫e − d ω'), rates follow τ ω'' + (1 + d) ω' + p ω = p ω_set. The
+gains below place this pair of poles.
 """
 
 from __future__ import annotations
@@ -28,18 +28,20 @@ from aerobat.kernels.vectors import (
     transform,
 )
 
-_FREQUENCY = 75.0  # [rad/s] of the poles in roll and pitch, which the filters' delays let pass, at most
-# [s/rad] of all the moment of roll or pitch, that an error of its rate asks for at most: more of it saturates
-# weak rotors, and with less slow ones are late (lab book)
+# [rad/s] highest frequency of the poles in roll and pitch that the delays of the filters allow
+_FREQUENCY = 75.0
+# [s/rad] largest roll or pitch gain, as a fraction of the maximum moment per rate error: with more, weak
+# rotors saturate; with less, slow ones respond late (lab book)
 _TILT_SHARE = 0.15
-_DAMPING = 0.8  # [-] ratio of all poles
-# [s/rad] of all the moment of yaw, that an error of yaw rate asks for: with a quarter of it rotors 3 % apart
-# turned vehicles by 30° within a flip, with twice as much they held it no better (lab book)
+_DAMPING = 0.8  # [-] damping ratio of all poles
+# [s/rad] yaw gain, as a fraction of the maximum moment per rate error: with a quarter of it, rotors 3 % apart
+# turned vehicles by 30° within a flip; twice as much was no better (lab book)
 _YAW_SHARE = 0.04
-_INTEGRAL = 8.0  # [1/s] integral gain over the proportional one, at most
-_INTEGRAL_SHARE = 0.125  # [-] of a proportional gain, which that ratio is at most: the loop stays damped
-_SHORTEST_LAG = 0.01  # [s] of rotors: faster ones leave the loop's own delays
-_MAX_INTEGRAL = 0.25  # [rad] of the rate error, per axis
+_INTEGRAL = 8.0  # [1/s] largest ratio of the integral gain to the proportional gain
+_INTEGRAL_SHARE = 0.125  # [-] largest ratio of that to the proportional gain, which keeps the loop damped
+# [s] smallest rotor lag in the design: with faster rotors the loop's own delays dominate
+_SHORTEST_LAG = 0.01
+_MAX_INTEGRAL = 0.25  # [rad] limit of the integral of the rate error, per axis
 
 
 class RateSetpoint(NamedTuple):
@@ -68,7 +70,7 @@ class RateLoopModel(NamedTuple):
 
 
 class RateLoopState(NamedTuple):
-    """State of the inner loop from tick to tick, its commands among it."""
+    """State of the inner loop from tick to tick, including its commands."""
 
     gyro: Vector  # [rad/s] filtered
     derivative: Vector  # [rad/s²] filtered
@@ -77,10 +79,10 @@ class RateLoopState(NamedTuple):
 
 
 def rate_gains(ops: Ops, airframe: Airframe) -> RateGains:
-    """Gains that suit the slowest rotor of a vehicle, and its moments.
+    """Return gains for the slowest rotor and the maximum moments of a vehicle.
 
-    Roll and pitch have a derivative, and so poles faster than the rotors' lag alone allows. Yaw has none, and
-    less gain where its moment is weak: it must leave the rotors to roll and pitch.
+    Roll and pitch use a derivative, so their poles can be faster than the rotors' lag alone allows. Yaw uses
+    none, and less gain where its moment is weak, because roll and pitch need the rotors.
     """
     (_, inertia), rotors = airframe.mass_properties[:2], airframe.rotors
     lag = reduce(ops.maximum, (1.0 / rate for rate in rotors.inverse_time_constant), _SHORTEST_LAG)
@@ -97,7 +99,7 @@ def rate_gains(ops: Ops, airframe: Airframe) -> RateGains:
 
 
 def init(thrusts: PerRotor, gyro: Vector) -> RateLoopState:
-    """The state before the first tick, with the rotors' thrusts [N] commanded as they are."""
+    """Return the state before the first tick, with the present thrusts [N] as commands."""
     return RateLoopState(gyro, ZERO, ZERO, Commands(thrusts, False))
 
 
@@ -109,7 +111,7 @@ def step(
     gyro: Vector,
     elapsed: Scalar,
 ) -> RateLoopState:
-    """The state, new commands included, `elapsed` [s] after the last tick.
+    """Return the state, including new commands, `elapsed` [s] after the last tick.
 
     Args:
         ops: of the arithmetic.
@@ -135,12 +137,13 @@ def step(
 
 
 def times(a: Vector, b: Vector) -> Vector:
-    """Products of components."""
+    """Return the products of components."""
     return a[0] * b[0], a[1] * b[1], a[2] * b[2]
 
 
 def _mixed(ops: Ops, model: RateLoopModel, load: RotorWrench) -> Commands:
-    """Commands within limits: moments are scaled to fit, then the collective thrust is moved to suit them."""
+    """Return commands within limits: moments scaled to fit, then the collective thrust shifted to fit. : [-]
+    limit of that ratio as a fraction of the proportional gain, which keeps the loop damped"""
     rotors = model.airframe.rotors
     turning = mix(model.mixer, load._replace(thrust=0.0))
     high, low = reduce(ops.minimum, rotors.max_thrust), reduce(ops.maximum, rotors.min_thrust)

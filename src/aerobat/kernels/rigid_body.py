@@ -1,4 +1,4 @@
-"""The nonlinear dynamics of a rigid body (paper, eqs. (3) and (4)), and one step of RK4 along them."""
+"""Nonlinear dynamics of a rigid body (paper, eqs. (3) and (4)), and one RK4 step."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class MassProperties(NamedTuple):
 
 
 class EnvironmentParameters(NamedTuple):
-    """Gravity and wind, which act on every body; see `aerobat.environment.Environment`."""
+    """Gravity and wind; see `aerobat.environment.Environment`."""
 
     gravity: Scalar  # [m/s²] along −z
     wind: Vector  # [m/s] velocity of the air, world
@@ -51,11 +51,10 @@ class RotorWrench(NamedTuple):
 def derivative(
     mass_properties: MassProperties, environment: EnvironmentParameters, body: Body, load: RotorWrench
 ) -> Body:
-    """The time derivative of a body's state.
+    """Return the time derivative of a body's state.
 
-    Eq. (3) in the Hamilton convention, body to world: v' = q ⊗ F ⊗ q* / m − g·e3, with the drag in F, by the
-    velocity relative to the wind.
-    Eq. (4): ω' = J⁻¹ (M − ω × Jω). Attitude: q' = ½ q ⊗ (0, ω).
+    Eq. (3) in the Hamilton convention, body to world: v' = q ⊗ F ⊗ q* / m − g·e3, where F includes the drag
+    at the velocity relative to the wind. Eq. (4): ω' = J⁻¹ (M − ω × Jω). Attitude: q' = ½ q ⊗ (0, ω).
     """
     body_axes = axes(body.q_world_body)
     force_body = _force_body(mass_properties, environment, body_axes, body.velocity, load.thrust)
@@ -73,7 +72,7 @@ def derivative(
 def specific_force(
     mass_properties: MassProperties, environment: EnvironmentParameters, body: Body, thrust: Scalar
 ) -> Vector:
-    """All forces but gravity over mass [m/s²], body axes: what an accelerometer feels at an instant."""
+    """Return all forces except gravity over mass [m/s²], body axes: the reading of an ideal accelerometer."""
     body_axes = axes(body.q_world_body)
     force_body = _force_body(mass_properties, environment, body_axes, body.velocity, thrust)
     return scale(1.0 / mass_properties.mass, force_body)
@@ -86,7 +85,7 @@ def _force_body(
     velocity: Vector,
     thrust: Scalar,
 ) -> Vector:
-    """Thrust and drag [N], body axes."""
+    """Return thrust and drag [N], body axes."""
     u, v, w = to_body(body_axes, subtract(velocity, environment.wind))
     dx, dy, dz = mass_properties.drag_body
     return -dx * u, -dy * v, thrust - dz * w
@@ -100,9 +99,9 @@ def step(
     loads: tuple[RotorWrench, RotorWrench, RotorWrench],
     dt: Scalar,
 ) -> Body:
-    """The state after `dt` [s] of classical RK4, under the loads at its start, middle and end.
+    """Return the state after a classical RK4 step of `dt` [s] with the loads at its start, middle and end.
 
-    Of order four if the loads are exact there; the quaternion is normalised once, at the end.
+    The step is of order four if the loads are exact there. The quaternion is normalised once, at the end.
     """
     start, middle, end = loads
     k1 = derivative(mass_properties, environment, body, start)
@@ -120,7 +119,7 @@ def step(
 
 
 def _along(body: Body, dt: Scalar, rate: Body) -> Body:
-    """The state `dt` [s] along a rate; its position, on which no rate depends, is left behind."""
+    """Return the state `dt` [s] along a rate. Its position is not updated, because no rate depends on it."""
     w, x, y, z = body.q_world_body
     dw, dx, dy, dz = rate.q_world_body
     return Body(

@@ -1,4 +1,4 @@
-"""Metrics of a flight, added up tick by tick: errors, saturation, divergence, the crossing of each gate."""
+"""Metrics of a flight, accumulated tick by tick: errors, saturation, divergence and gate crossings."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from aerobat.kernels.vectors import ZERO, dot, subtract
 
 
 class Ground(NamedTuple):
-    """The ground as flights hit it: a slow vehicle that comes down near it has landed."""
+    """The ground; a slow vehicle near it has landed, a fast one below it has crashed."""
 
-    height: Scalar  # [m] below which a fast vehicle has hit it, −infinity where there is none
-    landing_height: Scalar  # [m] below which a slow vehicle has hit it, too
+    height: Scalar  # [m] below which a slow vehicle counts as having hit the ground
+    landing_height: Scalar  # [m²/s²] largest squared speed of a slow vehicle
     landing_speed_sq: Scalar  # [m²/s²] of squared speed, up to which a vehicle is slow
 
 
 class MetricsParameters(NamedTuple):
-    """Criteria by which a flight is judged."""
+    """The criteria for a flight."""
 
     divergence_radius_sq: Scalar  # [m²] of squared position error, beyond which a vehicle has diverged
     path_radius_sq: Scalar  # [m²] of squared position error, beyond which it has left its path
@@ -40,19 +40,19 @@ class MetricsParameters(NamedTuple):
 
 
 class RunningMetrics(NamedTuple):
-    """A flight so far. The last tick that counts is the first beyond the divergence radius, if any is."""
+    """Metrics of a flight so far. The first tick beyond the divergence radius is the last that counts."""
 
     flying: Scalar  # 1 until the vehicle has diverged, then 0
-    is_finite: Scalar  # 0 once something was not a number
-    stop: Scalar  # [s] the last tick that counts, once it has diverged
-    ground_time: Scalar  # [s] when it was below ground first, infinite if never
-    off_path_time: Scalar  # [s] when it had left its path first, infinite if never
-    ticks: Scalar  # that count
+    is_finite: Scalar  # 0 once a value was not finite
+    stop: Scalar  # [s] time of the last counted tick, once the vehicle has diverged
+    ground_time: Scalar  # [s] first time below the ground, infinite if never
+    off_path_time: Scalar  # [s] first time off the path, infinite if never
+    ticks: Scalar  # number of counted ticks
     max_square: Scalar  # [m²] of the position error
     sum_square: Scalar  # [m²]
     max_angle: Scalar  # [rad] of the attitude error
     sum_square_angle: Scalar  # [rad²]
-    saturated: Scalar  # ticks
+    saturated: Scalar  # number of saturated ticks
     last: Snapshot
     gates: tuple[GateProgress, ...]
     waypoints: tuple[Approach, ...]
@@ -60,7 +60,7 @@ class RunningMetrics(NamedTuple):
 
 
 def init(parameters: MetricsParameters) -> RunningMetrics:
-    """Metrics before the first tick of a flight."""
+    """Return the metrics before the first tick of a flight."""
     nowhere = Snapshot(0.0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
     gates = tuple(progress.init((plane, parameters.ellipsoid)) for plane in parameters.gates)
     waypoints = tuple(approach.init(target) for target in parameters.waypoints)
@@ -79,7 +79,7 @@ def step(
     actuation: tuple[PerRotor, PerRotor, Scalar],
     time: Scalar,
 ) -> RunningMetrics:
-    """Metrics one tick later.
+    """Return the metrics one tick later.
 
     Args:
         ops: of the arithmetic.
@@ -138,6 +138,6 @@ def lowest_height(ops: Ops, ground: Ground, velocity: Vector) -> Scalar:
 
 
 def _is_finite(body: Body, thrusts: PerRotor, commands: PerRotor) -> Scalar:
-    """True while everything is a number: zero times it is then zero."""
+    """Return True while all numbers are finite: zero times them is then zero."""
     numbers = (x for part in (*body, thrusts, commands) for x in part)
     return reduce(plus, (0.0 * x for x in numbers)) <= 0.0

@@ -1,17 +1,17 @@
-"""Flatness of a body whose drag along its x differs from that along its y, in scalar components.
+"""Differential flatness of a body whose drag differs between body x and body y, in scalar components.
 
-Let v be the airspeed, c the drag per mass in body axes and h = a + g e3. Thrust is along b3 alone where
+Let v be the airspeed, c the drag per mass in body axes and h = a + g e3. The rotors' force is along b3 if
 
     b1·α = 0,   b2·β = 0,     α = h + c_x v,   β = h + c_y v.
 
-Both equations leave one angle open. Unless it is told to, the body never spins about b3: b1' = −ω_y b3,
-b2' = ω_x b3, and in body axes
+These equations leave one angle open. Without a yaw rate the body does not spin about b3: b1' = −ω_y b3, b2' =
+ω_x b3, and in body axes
 
     ω_x = −β'_y/β_z,   ω_y = α'_x/α_z,   ω_z = 0,   T = m γ_z,     γ = h + c_z v.
 
-With a yaw rate ω_z = s, α'_x has s α_y more, and β'_y has s β_x less.
+With a yaw rate ω_z = s, s α_y is added to α'_x, and s β_x is subtracted from β'_y.
 
-Vectors below are in body axes and come with their derivatives in the world: α, α', α'', …
+Vectors below are in body axes. Their derivatives α, α', α'', … are world derivatives in body components.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from aerobat.kernels.vectors import add, add_scaled, cross, dot, scale
 
 
 def nearest_axes(sqrt: Callable[[Scalar], Scalar], alpha: Vector, beta: Vector) -> Axes:
-    """Return b1, b2 and b3 with b1·α = b2·β = 0 and b1 across y, in axes that the body's are near to."""
+    """Return b1, b2, b3 with b1·α = b2·β = 0 and b1 normal to y, in axes near the body's."""
     x, _, z = alpha
     shrink = 1.0 / sqrt(x * x + z * z)
     b1 = (z * shrink, 0.0 * z, -x * shrink)
@@ -136,7 +136,7 @@ class DraggedBody(NamedTuple):
 
 
 class BodyMotion(NamedTuple):
-    """A motion at one instant, in axes that the body's are near to."""
+    """A motion at one instant, in axes near the body's."""
 
     weight: Vector  # [m/s²] g e3
     airspeed: Vector  # [m/s]
@@ -147,19 +147,20 @@ class BodyMotion(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """Demand of a motion on a vehicle."""
+    """The requirements of a motion on a vehicle."""
 
     wrench: tuple[Scalar, Scalar, Scalar, Scalar]  # collective thrust [N] and moment [N·m], body axes
     rate: tuple[Scalar, Scalar, Scalar, Scalar]  # their derivatives
-    specific_thrust: Scalar  # [m/s²] along b3, what drag asks across it counted
+    specific_thrust: Scalar  # [m/s²] along b3, including the compensation of lateral drag
     omega: Vector  # [rad/s] body axes
     b3: Vector  # in the axes of the motion
 
 
 def demand(sqrt: Callable[[Scalar], Scalar], airframe: DraggedBody, motion: BodyMotion) -> Demand:
-    """Return what a motion asks; exact where the body has the axes that the motion is given in.
+    """Return the requirements of a motion; exact where the body has the axes of the motion.
 
-    Beside it the body's axes are `nearest_axes`, which is exact to first order but for the angle about b3.
+    For other axes near the body's, the body's axes are `nearest_axes`. They are exact to first order except
+    for the angle about b3.
     """
     lifted = add(motion.acceleration, motion.weight), motion.jerk, motion.snap, motion.crackle
     dragged = motion.airspeed, motion.acceleration, motion.jerk, motion.snap

@@ -1,11 +1,11 @@
-"""Wind: a mean, and Dryden turbulence swept past the vehicle (MIL-F-8785C, 3.7.1.2).
+"""Wind: a mean, and Dryden turbulence (MIL-F-8785C, 3.7.1.2).
 
 Let T = L/V, and σ² be the variance of a component. With white noise as input, the forming filters are
 
     along the mean wind     σ √(2T) / (1 + T s);
     across it, vertical     σ √T (1 + √3 T s) / (1 + T s)² = σ √T (√3/(1 + T s) + (1 − √3)/(1 + T s)²).
 
-The second is a sum of two first-order filters in a row, so that both are solved exactly from tick to tick.
+The second is a sum of two first-order filters in series, so both are solved exactly from tick to tick.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import NamedTuple
 from aerobat.kernels.ops import Scalar, Vector
 from aerobat.kernels.vectors import add
 
-_FIRST = 1.7320508075688772  # √3: of the first filter in a component across
-_SECOND = 1.0 - _FIRST  # of the second one
+_FIRST = 1.7320508075688772  # √3, weight of the first filter in a component across
+_SECOND = 1.0 - _FIRST  # weight of the second filter
 
 
 class GustState(NamedTuple):
@@ -40,8 +40,9 @@ class GustFilter(NamedTuple):
 
     decay: Scalar  # e^(−dt/T)
     coupling: Scalar  # dt/T e^(−dt/T), of the first filter into the second
-    along: Scalar  # of the input
-    across: tuple[Scalar, Scalar, Scalar]  # of the inputs: lower triangle of the square root of a covariance
+    along: Scalar  # gain of the input
+    # gains of the inputs: lower triangle of the square root of a covariance
+    across: tuple[Scalar, Scalar, Scalar]
 
 
 class WindParameters(NamedTuple):
@@ -55,19 +56,19 @@ class WindParameters(NamedTuple):
 
 
 class WindState(NamedTuple):
-    """The wind, and what it goes on from."""
+    """The wind velocity, and the state of its filters."""
 
     velocity: Vector  # [m/s] of the air, world
     gust: GustState
 
 
 def init(parameters: WindParameters) -> WindState:
-    """The wind at the start."""
+    """Return the wind at the start."""
     return _shown(parameters, parameters.start)
 
 
 def step(parameters: WindParameters, state: WindState, noise: GustNoise) -> WindState:
-    """The wind one period later."""
+    """Return the wind one period later."""
     forming, gust = parameters.filter, state.gust
     return _shown(
         parameters,

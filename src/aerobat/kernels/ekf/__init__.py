@@ -1,9 +1,9 @@
-"""Error-state extended Kalman filter: motion and the biases of an IMU, from its samples and from poses.
+"""Error-state extended Kalman filter for motion and IMU biases, from IMU samples and poses.
 
-Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv:1711.02508, sections 5 and 6. The
-error of 15: position, velocity, attitude in body axes, biases of gyro and accelerometer. At every sample of
-the IMU `propagate`; at every one or every few `predict_covariance`, and always before `fuse`, which takes a
-pose that may be late. It knows nothing of what it observes.
+Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv:1711.02508, sections 5 and 6. The error
+has 15 components: position, velocity, attitude in body axes, biases of gyro and accelerometer. Call
+`propagate` at every IMU sample, `predict_covariance` at every or every few samples and always before `fuse`,
+which fuses a possibly late pose. The filter does not depend on the vehicle.
 """
 
 from aerobat.kernels.ekf.fusion import carried_back, fuse

@@ -1,7 +1,7 @@
-"""Covariance of the error of 15: only its upper triangle is kept, so that it is symmetric by construction.
+"""Covariance of the 15-dimensional error; only the upper triangle is stored, so it stays symmetric.
 
-Linear maps of the error are given as functions of it, which say themselves what is zero: the same function
-maps an error, and from both sides its covariance.
+Linear maps of the error are given as functions of the error, so zero blocks cost nothing. The same function
+maps an error vector, and both sides of its covariance.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Rows: TypeAlias = Sequence[Sequence[Scalar]]  # 15 x 15
 
 
 class ErrorState(NamedTuple):
-    """True state less the nominal one, of the attitude as a rotation vector: q_true = q ⊗ exp(rotation)."""
+    """True state minus nominal state, with the attitude as a rotation vector: q_true = q ⊗ exp(rotation)."""
 
     position: Vector  # [m] world
     velocity: Vector  # [m/s] world
@@ -27,7 +27,7 @@ class ErrorState(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """Estimate of the error by the measurements so far."""
+    """The estimated error after the measurements so far."""
 
     error: ErrorState  # its mean
     rows: Rows  # its covariance
@@ -35,7 +35,7 @@ class Correction(NamedTuple):
 
 
 def error_state(components: Sequence[Scalar]) -> ErrorState:
-    """The error of 15 components in its parts."""
+    """Return the parts of an error of 15 components."""
     x = components
     return ErrorState(
         (x[0], x[1], x[2]),
@@ -47,24 +47,24 @@ def error_state(components: Sequence[Scalar]) -> ErrorState:
 
 
 def unpack(covariance: Covariance) -> Rows:
-    """All 15 x 15 components."""
+    """Return all 15 x 15 components."""
     start = [row * SIZE - row * (row + 1) // 2 for row in range(SIZE)]
     return [[covariance[start[min(i, j)] + max(i, j)] for j in range(SIZE)] for i in range(SIZE)]
 
 
 def pack(rows: Rows) -> Covariance:
-    """The upper triangle of all components."""
+    """Return the upper triangle of all components."""
     return tuple(rows[i][j] for i in range(SIZE) for j in range(i, SIZE))
 
 
 def diagonal(variances: ErrorState) -> Rows:
-    """The covariance of errors that have nothing to do with each other."""
+    """Return the covariance of independent errors."""
     components = [variance for part in variances for variance in part]
     return [[components[i] if i == j else 0.0 for j in range(SIZE)] for i in range(SIZE)]
 
 
 def add_diagonal(rows: Rows, variances: dict[str, Scalar]) -> Rows:
-    """The covariance with independent noise, of one variance for each axis of the parts that are named."""
+    """Return the covariance plus independent noise, with one variance for each named part of the error."""
     new = [list(row) for row in rows]
     for part, variance in variances.items():
         for i in _indices(part):
@@ -73,14 +73,14 @@ def add_diagonal(rows: Rows, variances: dict[str, Scalar]) -> Rows:
 
 
 def uncorrelated(rows: Rows, part: str, variance: Scalar) -> Rows:
-    """The covariance with one part of the error replaced by noise of its own."""
+    """Return the covariance with one part of the error replaced by independent noise."""
     replaced = _indices(part)
     new = [[0.0 if i in replaced or j in replaced else rows[i][j] for j in range(SIZE)] for i in range(SIZE)]
     return add_diagonal(new, {part: variance})
 
 
 def transform_part(rows: Rows, part: str, change: Callable[[ErrorState], Vector]) -> Rows:
-    """The covariance after one part of the error has become `change(error)`, a linear function."""
+    """Return the covariance after one part of the error has become `change(error)`, a linear function."""
     changed = [change(error_state(row)) for row in rows]  # covariance of the new part with each component
     new = [list(row) for row in rows]
     replaced = _indices(part)
@@ -99,7 +99,7 @@ def transform_part(rows: Rows, part: str, change: Callable[[ErrorState], Vector]
 def correct(
     correction: Correction, measured: Callable[[ErrorState], Scalar], innovation: Scalar, variance: Scalar
 ) -> Correction:
-    """The correction by one scalar measurement more: P − c cᵀ/s, c = P h, s = h·c + r.
+    """Return the correction after one more scalar measurement: P − c cᵀ/s, c = P h, s = h·c + r.
 
     Args:
         correction: what is known before it.

@@ -1,4 +1,4 @@
-"""Measured poses, late or not: gated, fused at their own time, and believed at last when they have jumped."""
+"""Fusion of measured poses, possibly late, with outlier rejection and detection of jumps."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ def fuse(
     age: Scalar,
     arrived: Scalar = True,
 ) -> EkfState:
-    """The state after a measured pose, or the same state where none has arrived.
+    """Return the state after a measured pose, or the unchanged state where none has arrived.
 
-    The error then, at the exposure, is the error now mapped back: δp − T δv and, in the axes of now,
-    δθ + T δb_g; what noise the IMU added in the age T meanwhile is neglected. A pose whose normalized
-    innovation squared is above `max_nis` is rejected; the `max_rejections`-th in a row is a jump, and the
-    pose begins anew there. The covariance must be that of now (`predict_covariance`).
+    The error at the exposure is the present error mapped back: δp − T δv and, in present body axes, δθ + T
+    δb_g. The noise of the IMU during the age T is neglected. A pose whose normalized innovation squared
+    exceeds `max_nis` is rejected. The `max_rejections`-th rejection in a row counts as a jump: the filter
+    restarts at that pose. The covariance must be predicted to the present (`predict_covariance`).
 
     Args:
         ops: of the arithmetic.
@@ -82,9 +82,9 @@ def fuse(
 
 
 def carried_back(before: EkfState, after: EkfState, past: Pose, age: Scalar) -> Pose:
-    """An earlier pose of the filter's own, corrected by what a fusion has said since.
+    """Return an earlier pose of the filter, corrected by a later fusion.
 
-    For an exposure whose measurement has yet to arrive when another one's is fused.
+    This is needed for an exposure whose measurement arrives after the fusion of another measurement.
 
     Args:
         before: the state before the fusion.
@@ -99,7 +99,7 @@ def carried_back(before: EkfState, after: EkfState, past: Pose, age: Scalar) -> 
 
 
 def pose_innovation(ops: Ops, nominal: NominalState, measured: Pose, past: Pose) -> tuple[Vector, Vector]:
-    """Measured less predicted position [m], world, and rotation [rad], in the body axes of now."""
+    """Return measured minus predicted position [m], world, and rotation [rad], in present body axes."""
     w, x, y, z = multiply(conjugate(past.q_world_body), measured.q_world_body)
     rotation = scale(ops.select(w < 0.0, -2.0, 2.0), (x, y, z))
     world = to_world(axes(past.q_world_body), rotation)
@@ -109,7 +109,7 @@ def pose_innovation(ops: Ops, nominal: NominalState, measured: Pose, past: Pose)
 def _correction(
     parameters: EkfParameters, rows: Rows, innovation: tuple[Vector, Vector], age: Scalar
 ) -> Correction:
-    """Six scalar updates, one after another: their noises are independent."""
+    """Return the correction by six scalar updates in sequence, as their noises are independent."""
     correction = Correction(_NONE, rows, 0.0)
     for axis in range(3):
         measured = position_then(axis, age)
@@ -121,20 +121,20 @@ def _correction(
 
 
 def position_then(axis: int, age: Scalar) -> Callable[[ErrorState], Scalar]:
-    """The error of position along an axis, `age` [s] ago, as a function of the error now."""
+    """Return the position error along an axis `age` [s] ago, as a function of the present error."""
     return lambda error: error.position[axis] - age * error.velocity[axis]
 
 
 def rotation_then(axis: int, age: Scalar) -> Callable[[ErrorState], Scalar]:
-    """The error of attitude about a body axis of now, `age` [s] ago, as a function of the error now."""
+    """Return the attitude error about a present body axis `age` [s] ago, from the present error."""
     return lambda error: error.rotation[axis] + age * error.gyro_bias[axis]
 
 
 def _injected(ops: Ops, nominal: NominalState, error: ErrorState) -> NominalState:
-    """The nominal state with the error's mean taken in.
+    """Return the nominal state with the mean of the error injected.
 
-    The axes of the remaining attitude error turn by half the correction with it, which is left out: by a
-    thousandth as a rule, and by 2 % when a hand-off is corrected.
+    The correction also turns the axes of the remaining attitude error by half of it, which is neglected:
+    usually a thousandth, and 2 % when the hand-over between camera systems is corrected.
     """
     q = multiply(nominal.q_world_body, exp_of_small(error.rotation))
     return NominalState(
@@ -155,10 +155,10 @@ def _jumped(
     past: Pose,
     age: Scalar,
 ) -> EkfState:
-    """The state with its pose begun anew at the measured one, brought from its exposure to now.
+    """Return the state with its pose restarted at the measured one, propagated from its exposure to now.
 
-    A frame turned by δ against the one before has velocity and gravity turned too: so much is added to the
-    variances of velocity and, since gravity is known, of the accelerometer's bias.
+    If the frame of the measurements turned by δ, velocity and gravity are turned too. The variances of the
+    velocity and, as gravity is known, of the accelerometer bias are increased accordingly.
     """
     nominal, angle_sq = state.nominal, dot(innovation[1], innovation[1])
     turned = multiply(measured.q_world_body, conjugate(past.q_world_body))

@@ -1,4 +1,4 @@
-"""Prediction from samples of an IMU: the nominal state, and the covariance of its error."""
+"""Prediction from IMU samples: the nominal state, and the covariance of its error."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from aerobat.kernels.quaternions import (
 )
 from aerobat.kernels.vectors import add, add_scaled, cross, scale, subtract
 
-_SHORTEST = 1e-9  # [s] stands for no time where one divides by it
+_SHORTEST = 1e-9  # [s] divisor in place of zero time
 
 Change: TypeAlias = tuple[str, Callable[[ErrorState], Vector]]
 
@@ -29,10 +29,10 @@ Change: TypeAlias = tuple[str, Callable[[ErrorState], Vector]]
 def propagate(
     ops: Ops, parameters: EkfParameters, state: EkfState, sample: ImuSample, elapsed: Scalar
 ) -> EkfState:
-    """The nominal state after an interval; its covariance is left where it was.
+    """Return the nominal state after an interval; the covariance is not yet predicted.
 
-    The sample is a mean over the interval, so that attitude turns by exp(ω T) and the specific force is
-    rotated by the attitude half-way.
+    The sample is a mean over the interval. Therefore the attitude turns by exp(ω T), and the specific force
+    is rotated by the attitude in the middle of the interval.
 
     Args:
         ops: of the arithmetic.
@@ -61,7 +61,7 @@ def propagate(
 
 
 def predict_covariance(ops: Ops, parameters: EkfParameters, state: EkfState) -> EkfState:
-    """The covariance brought from its anchor to now, whatever lies between."""
+    """Return the state with its covariance predicted from the anchor to now."""
     elapsed = state.anchor.elapsed
     rows = unpack(state.covariance)
     for part, change in transition(ops, parameters, state):
@@ -76,15 +76,15 @@ def predict_covariance(ops: Ops, parameters: EkfParameters, state: EkfState) -> 
 
 
 def anchored(state: EkfState) -> EkfState:
-    """The state whose covariance is said to be that of now."""
+    """Return the state with its anchor at the present, which the covariance must already refer to."""
     return state._replace(anchor=Anchor(state.nominal.velocity, state.nominal.q_world_body, 0.0))
 
 
 def transition(ops: Ops, parameters: EkfParameters, state: EkfState) -> tuple[Change, Change, Change]:
-    """Return maps of the error's parts from the anchor to now, applied in turn, to first order in time T.
+    """Return first-order maps of the error's parts from the anchor to now, to be applied in this order.
 
-    δp ← δp + T δv, δv ← δv − T R (f × δθ + δb_a), δθ ← Γ δθ − T δb_g. R is the attitude at the anchor, T f
-    the change of velocity but for gravity's, in its axes, Γ = R_nowᵀ R.
+    δp ← δp + T δv, δv ← δv − T R (f × δθ + δb_a), δθ ← Γ δθ − T δb_g. R is the attitude at the anchor. T f is
+    the change of velocity without gravity's, in the anchor's axes. Γ = R_nowᵀ R.
     """
     nominal, anchor, elapsed = state.nominal, state.anchor, state.anchor.elapsed
     body_axes = axes(anchor.q_world_body)

@@ -12,7 +12,7 @@ from aerobat.kernels.vectors import ZERO, subtract
 
 
 class EkfParameters(NamedTuple):
-    """Variances that the filter reckons with; see `aerobat.estimation.Ekf`."""
+    """Variances of the filter; see `aerobat.estimation.Ekf`."""
 
     gravity: Scalar  # [m/s²] along −z
     gyro_noise: Scalar  # [rad²/s] density
@@ -20,16 +20,16 @@ class EkfParameters(NamedTuple):
     gyro_walk: Scalar  # [rad²/s³] density of its bias's rate
     accelerometer_walk: Scalar  # [m²/s⁵] density of its bias's rate
     velocity_variance: Scalar  # [m²/s²] at first, each axis
-    gyro_bias_variance: Scalar  # [rad²/s²] at first
-    accelerometer_bias_variance: Scalar  # [m²/s⁴] at first
-    position_variance: Scalar  # [m²] of poses
+    gyro_bias_variance: Scalar  # [m²/s²] initial, each axis
+    accelerometer_bias_variance: Scalar  # [rad²/s²] initial
+    position_variance: Scalar  # [m²/s⁴] initial
     attitude_variance: Scalar  # [rad²] of poses, about each axis
-    max_nis: Scalar  # [-] of a pose that is believed
-    max_rejections: Scalar  # [-] in a row, the last of which is believed to be a jump and taken
+    max_nis: Scalar  # [-] largest normalized innovation squared of an accepted pose
+    max_rejections: Scalar  # [-] rejections in a row, the last of which is accepted as a jump
 
 
 class NominalState(NamedTuple):
-    """State as it is estimated."""
+    """The estimated state."""
 
     position: Vector  # [m] world
     velocity: Vector  # [m/s] world
@@ -39,11 +39,11 @@ class NominalState(NamedTuple):
 
 
 class Anchor(NamedTuple):
-    """Instant up to which the covariance is predicted."""
+    """Instant to which the covariance refers."""
 
-    velocity: Vector  # [m/s] nominal then, world
+    velocity: Vector  # [m/s] nominal at that instant, world
     q_world_body: Quaternion
-    elapsed: Scalar  # [s] since then
+    elapsed: Scalar  # [s] since that instant
 
 
 class EkfState(NamedTuple):
@@ -52,15 +52,15 @@ class EkfState(NamedTuple):
     nominal: NominalState
     covariance: Covariance  # of the error at the anchor
     anchor: Anchor
-    since_pose: Scalar  # [s] since the last pose that was taken, from its exposure: it coasts
+    since_pose: Scalar  # [s] since the exposure of the last accepted pose
     rejections: Scalar  # poses rejected in a row
-    jumps: Scalar  # poses taken as jumps so far
-    nis: Scalar  # of the last pose, of 6 degrees of freedom
-    accepted: Scalar  # 1 if the last pose was taken, else 0
+    jumps: Scalar  # poses accepted as jumps so far
+    nis: Scalar  # normalized innovation squared of the last pose, with 6 degrees of freedom
+    accepted: Scalar  # 1 if the last pose was accepted, else 0
 
 
 def init(parameters: EkfParameters, pose: Pose, velocity: Vector = ZERO) -> EkfState:
-    """The state at a first pose and its instant; biases are unknown, the velocity is guessed."""
+    """Return the state at a first pose; biases are unknown, the velocity is guessed."""
     variances = ErrorState(
         _each_axis(parameters.position_variance),
         _each_axis(parameters.velocity_variance),
@@ -85,12 +85,12 @@ def _each_axis(variance: Scalar) -> Vector:
 
 
 def pose_of(state: EkfState) -> Pose:
-    """The estimated pose, to be kept at an exposure as the `past` of `fuse`."""
+    """Return the estimated pose, to be stored at an exposure as the `past` of `fuse`."""
     return Pose(state.nominal.position, state.nominal.q_world_body)
 
 
 def estimated_body(state: EkfState, sample: ImuSample) -> Body:
-    """The estimate as a controller takes it, its rates those of the latest sample less their bias."""
+    """Return the estimate for a controller, with the rates of the latest sample minus the gyro bias."""
     nominal = state.nominal
     omega = subtract(sample.omega, nominal.gyro_bias)
     return Body(nominal.position, nominal.velocity, nominal.q_world_body, omega)

@@ -1,1 +1,1 @@
-"""Gates as flights meet them, tick by tick: the crossing of their plane, and the body's section there."""
+"""Passages of gates, tick by tick: the crossing of the gate's plane, and the body's section there."""

@@ -1,4 +1,4 @@
-"""A flight about a place that it is to come near, tick by tick, straight between ticks."""
+"""The nearest approach of a flight to a place, tick by tick, with straight motion between ticks."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from aerobat.kernels.vectors import ZERO, dot, subtract
 
 
 class Target(NamedTuple):
-    """A place to come near at a time."""
+    """A place to approach at a planned time."""
 
     centre: Vector  # [m]
     planned: Scalar  # [s]
-    window: Scalar  # [s] by which the approach may be earlier or later
+    window: Scalar  # [s] largest deviation of the approach from that time
 
 
 class Approach(NamedTuple):
-    """The nearest that a flight has come so far."""
+    """The nearest approach so far."""
 
     square: Scalar  # [m²] of the distance, infinite before the window
     time: Scalar  # [s]
@@ -27,12 +27,12 @@ class Approach(NamedTuple):
 
 
 def init(target: Target) -> Approach:
-    """Before the first tick."""
+    """Return the state before the first tick."""
     return Approach(inf, inf, ZERO)
 
 
 def _nearest(ops: Ops, last: Snapshot, now: Snapshot) -> Approach:
-    """The nearest between two snapshots, positions from the place."""
+    """Return the nearest approach between two snapshots with positions relative to the place."""
     way = subtract(now.position, last.position)
     square = dot(way, way)
     toward = -dot(last.position, way) / ops.select(square > 0.0, square, 1.0)
@@ -47,7 +47,7 @@ def step(
     snapshots: tuple[Snapshot, Snapshot],
     counted: tuple[Scalar, Scalar],
 ) -> Approach:
-    """The nearest a tick later.
+    """Return the nearest approach a tick later.
 
     Args:
         ops: of the arithmetic.

@@ -1,4 +1,4 @@
-"""A flight's thrust axis beside a direction that it is to point along, tick by tick."""
+"""The angle between a flight's thrust axis and a required direction, tick by tick."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from aerobat.kernels.ops import Ops, Scalar, Vector, clip, magnitude, select_tre
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.vectors import add_scaled, dot, norm, subtract
 
-_STRAIGHT = 1e-12  # [-] of the cosine's curvature, less is rounding
+_STRAIGHT = 1e-12  # [-] smallest curvature of the cosine; less is rounding
 
 
 class Direction(NamedTuple):
-    """A direction for the thrust axis at a time."""
+    """A required direction of the thrust axis at a planned time."""
 
     up: Vector  # unit vector, world
     planned: Scalar  # [s]
-    window: Scalar  # [s] by which the thrust axis may point there earlier or later
+    window: Scalar  # [s] largest deviation from that time
 
 
 class Pointing(NamedTuple):
-    """The nearest that the thrust axis has come to the direction so far."""
+    """The smallest angle between the thrust axis and the direction so far."""
 
     cosine: Scalar  # [-] of the angle between them, −infinite before the window
     time: Scalar  # [s]
@@ -34,9 +34,10 @@ def init(direction: Direction) -> Pointing:
 
 
 def _nearest(ops: Ops, direction: Direction, last: Snapshot, now: Snapshot) -> Pointing:
-    """Return the nearest between two snapshots, of thrust axes straight between them.
+    """Return the smallest angle between two snapshots, with linear motion of the thrust axis between them.
 
-    The cosine (p + q s) / |a + s d|, of the axes a and a + d, has one extremum along s, in closed form.
+    The cosine (p + q s) / |a + s d|, with the axes a and a + d at both ends, has one extremum in s, in closed
+    form.
     """
     before, after = axes(last.q_world_body)[2], axes(now.q_world_body)[2]
     way = subtract(after, before)
@@ -59,7 +60,7 @@ def step(
     snapshots: tuple[Snapshot, Snapshot],
     counted: tuple[Scalar, Scalar],
 ) -> Pointing:
-    """Return the nearest a tick later.
+    """Return the smallest angle a tick later.
 
     Args:
         ops: of the arithmetic.

@@ -1,4 +1,4 @@
-"""A flight before, in and behind a gate's plane, tick by tick, straight between ticks."""
+"""The passage of a gate's plane, tick by tick, with straight motion between ticks."""
 
 from __future__ import annotations
 
@@ -14,31 +14,32 @@ from aerobat.kernels.vectors import ZERO, dot
 
 
 class GatePlane(NamedTuple):
-    """A gate as a plane to be crossed at a time."""
+    """A gate as a plane to be crossed at a planned time."""
 
     centre: Vector  # [m]
     normal: Vector  # unit vector in the direction of passage
-    directions: tuple[PlaneDirection, ...]  # along which a body is measured; none of a body that is not known
-    radius: Scalar  # [m] of the circle about the opening
-    planned: Scalar  # [s] when it is to be crossed
-    window: Scalar  # [s] by which the crossing may be earlier or later
-    depth: Scalar  # [m] beyond the plane that makes a crossing a passage
-    motion: PlaceMotion | tuple[()] = ()  # of one that moves
+    # directions in which a body is measured; empty for an unknown body
+    directions: tuple[PlaneDirection, ...]
+    radius: Scalar  # [m] radius of the circle around the opening
+    planned: Scalar  # [s] planned time of the crossing
+    window: Scalar  # [s] largest deviation of the crossing from that time
+    depth: Scalar  # [m] distance beyond the plane that makes a crossing a passage
+    motion: PlaceMotion | tuple[()] = ()  # motion of a moving gate
 
 
 class GateProgress(NamedTuple):
-    """A flight about a gate's plane so far; offsets from the opening's centre as positions."""
+    """The progress of a flight at a gate's plane; positions are relative to the opening's centre."""
 
     latest: Snapshot  # the last crossing in the direction of passage
-    crossing: Snapshot  # of those after which it got far enough beyond, the nearest to the planned instant
-    backward: Scalar  # [s] the crossing against the direction next to that instant, infinite if there is none
-    max_distance: Scalar  # [m] beyond the plane, of ticks in the window; −infinite before it
+    crossing: Snapshot  # the crossing nearest to the planned time among those followed by a passage
+    backward: Scalar  # [s] the crossing against the direction nearest to the planned time, infinite if none
+    max_distance: Scalar  # [m] beyond the plane, over ticks in the window; −infinite before the window
     min_distance: Scalar  # [m] likewise
-    swath: SwathProgress  # of the body through the plane
+    swath: SwathProgress  # swath of the body through the plane
 
 
 def init(gate: tuple[GatePlane, BoundingEllipsoid]) -> GateProgress:
-    """Progress before the first tick."""
+    """Return the progress before the first tick."""
     never = Snapshot(inf, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
     return GateProgress(never, never, inf, -inf, inf, swath.init(len(gate[0].directions)))
 
@@ -50,7 +51,7 @@ def step(
     snapshots: tuple[Snapshot, Snapshot],
     counted: tuple[Scalar, Scalar],
 ) -> GateProgress:
-    """Progress a tick later.
+    """Return the progress a tick later.
 
     Args:
         ops: of the arithmetic.

@@ -1,10 +1,10 @@
-"""The section of an ellipsoid by a gate's plane: how far it reaches along a direction in that.
+"""The section of an ellipsoid by a gate's plane, and its extent along a direction in the plane.
 
 The ellipsoid is x = c + R A w, |w| ≤ 1, with attitude R and A = diag(semi-axes). For a unit vector d of the
-world d' = A Rᵀ d. The ellipsoid reaches σ = |n'| from its centre along the plane's normal n. With the centre
-at a height h = n·c above the plane, the section is the ellipse of points w with n'·w = −h, |w| ≤ 1. The
-section's centre is at d·c − h (d'·n')/σ² along any d in the plane. From there the section reaches
-H √(1 − h²/σ²) with H² = d'·d' − (d'·n')²/σ².
+world let d' = A Rᵀ d. The ellipsoid extends by σ = |n'| from its centre along the plane's normal n. With the
+centre at a height h = n·c above the plane, the section is the ellipse of points w with n'·w = −h, |w| ≤ 1.
+The section's centre is at d·c − h (d'·n')/σ² along any d in the plane. From its centre the section extends by
+H √(1 − h²/σ²), with H² = d'·d' − (d'·n')²/σ².
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from aerobat.kernels.ops import TINY, Ops, Quaternion, Scalar, Vector, clip, mag
 from aerobat.kernels.quaternions import axes, normalize, to_body
 from aerobat.kernels.vectors import dot, norm
 
-_ROUNDING = 1e-9  # [m] from the middle, where neither side is the nearer; of a rise that is none
+_ROUNDING = 1e-9  # [m] position from the middle within which no side is nearer, and smallest change of height
 
 
 class BoundingEllipsoid(NamedTuple):
@@ -29,21 +29,21 @@ class PlaneDirection(NamedTuple):
     """A direction in a gate's plane along which a body is measured, unit vectors in the world."""
 
     along: Vector
-    beside: Vector  # in the plane too, a quarter of a turn on
-    both_ways: Scalar  # 1 where against it counts too
-    radial: Scalar  # 1 where the distance of the point that reaches the farthest counts, not how far
+    beside: Vector  # also in the plane, a quarter turn further
+    both_ways: Scalar  # 1 where the opposite direction counts too
+    radial: Scalar  # 1 where the radial distance of the farthest point is measured, not its component
 
 
 class Section(NamedTuple):
-    """An ellipsoid above a plane, its section, and a direction in that plane with the one beside it."""
+    """An ellipsoid and a plane, its section, and a direction in the plane with its perpendicular."""
 
     height: Scalar  # [m] of the centre above the plane
     reach: Scalar  # [m] of the ellipsoid along the normal
     along: Scalar  # [m] of the centre
     beside: Scalar  # [m] likewise
-    shear_along: Scalar  # by which the section's centre moves with the height
+    shear_along: Scalar  # change of the section's centre with the height
     shear_beside: Scalar  # likewise
-    half: Scalar  # [m] that the section reaches along the direction, through the centre
+    half: Scalar  # [m] half extent of the section along the direction, through the centre
     covariance: Scalar  # [m²] of along and beside there
 
 
@@ -61,7 +61,7 @@ def section(
     offset: Vector,
     q_world_body: Quaternion,
 ) -> Section:
-    """The section of an ellipsoid by a plane.
+    """Return the section of an ellipsoid by a plane.
 
     Args:
         ops: of the arithmetic.
@@ -92,20 +92,20 @@ def section(
 
 
 def extent(ops: Ops, ellipsoid: BoundingEllipsoid) -> Scalar:
-    """The distance [m] from the centre of mass that no point of the ellipsoid exceeds."""
+    """Return an upper bound [m] of the distance of the ellipsoid's points from the centre of mass."""
     x, y, z = ellipsoid.semi_axes
     return norm(ops, ellipsoid.centre) + ops.maximum(ops.maximum(x, y), z)
 
 
 def gap(ops: Ops, at: Section) -> Scalar:
-    """The distance between ellipsoid and plane [m]; negative where they meet."""
+    """Return the distance between ellipsoid and plane [m]; negative where they meet."""
     return magnitude(ops, at.height) - at.reach
 
 
 def farthest(ops: Ops, at: Section, both_ways: Scalar) -> PlanePoint:
-    """The section's point farthest along the direction; both ways, to the side where the section's centre is.
+    """Return the section's point farthest along the direction, or on its own side with `both_ways`.
 
-    Where the plane is not met, of the point of the ellipsoid next to it.
+    Where ellipsoid and plane do not meet, the ellipsoid's point nearest to the plane is returned.
     """
     relative = at.height / at.reach
     size = ops.sqrt(ops.maximum(1.0 - relative * relative, 0.0))
@@ -121,10 +121,10 @@ def fraction_of_farthest(
     within: tuple[Scalar, Scalar],
     both_ways: Scalar,
 ) -> Scalar:
-    """The fraction of a straight way, its end at `at`, at which a section reaches the farthest.
+    """Return the fraction of a straight path, with end `at`, at which a section has its largest extent.
 
-    With the attitude as at the end the section reaches a linear function of the height h more or less
-    H √(1 − h²/σ²): a concave function, with its maximum in closed form.
+    With the attitude of the end, the extent is a linear function of the height h plus or minus H √(1 −
+    h²/σ²). This concave function has its maximum in closed form.
 
     Args:
         ops: of the arithmetic.
@@ -144,11 +144,11 @@ def fraction_of_farthest(
 
 
 def _is_against(along: Scalar, both_ways: Scalar) -> Scalar:
-    """True where the other way counts, and the section's centre lies there."""
+    """Return True where the opposite direction counts and the section's centre lies there."""
     return (along < -_ROUNDING) & (both_ways > 0.5)
 
 
 def _stretched(ellipsoid: BoundingEllipsoid, direction: Vector) -> Vector:
-    """A Rᵀ d, for a direction d in body axes."""
+    """Return A Rᵀ d for a direction d in body axes."""
     x, y, z = (axis * part for axis, part in zip(ellipsoid.semi_axes, direction, strict=True))
     return x, y, z

@@ -1,4 +1,4 @@
-"""A vehicle at an instant, and between two."""
+"""The state of a vehicle at an instant, and interpolation between two instants."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from aerobat.kernels.vectors import add_scaled, subtract
 
 
 class Snapshot(NamedTuple):
-    """A vehicle at an instant."""
+    """The state of a vehicle at an instant."""
 
     time: Scalar  # [s]
     position: Vector  # [m]
     velocity: Vector  # [m/s]
-    q_world_body: Quaternion  # between two ticks not quite of unit length
+    q_world_body: Quaternion  # interpolated attitudes are not of unit length
 
 
 class Bend(NamedTuple):
-    """An instant at which the velocity of something jumps."""
+    """An instant at which the velocity of a place jumps."""
 
     time: Scalar  # [s]
     change: Vector  # [m/s]
 
 
 class PlaceMotion(NamedTuple):
-    """The motion of a place from where it is at first."""
+    """The motion of a place from its initial position."""
 
     velocity: Vector  # [m/s] before all bends
     bends: tuple[Bend, ...]
 
 
 def beside(ops: Ops, snapshot: Snapshot, centre: Vector, motion: PlaceMotion | tuple[()]) -> Snapshot:
-    """The snapshot as it is seen from a centre that may move; () for one that does not."""
+    """Return the snapshot relative to a centre, which moves by `motion` (() for a fixed one)."""
     seen = relative(snapshot, centre)
     if not motion:
         return seen
@@ -46,12 +46,12 @@ def beside(ops: Ops, snapshot: Snapshot, centre: Vector, motion: PlaceMotion | t
 
 
 def relative(snapshot: Snapshot, centre: Vector) -> Snapshot:
-    """The snapshot with its position from a centre."""
+    """Return the snapshot with its position relative to a fixed centre."""
     return snapshot._replace(position=subtract(snapshot.position, centre))
 
 
 def between(a: Snapshot, b: Snapshot, fraction: Scalar) -> Snapshot:
-    """The snapshot at a fraction of the way from one to another, straight."""
+    """Return the linear interpolation at a fraction of the way between two snapshots."""
     w, x, y, z = (p + fraction * (q - p) for p, q in zip(a.q_world_body, b.q_world_body, strict=True))
     return Snapshot(
         a.time + fraction * (b.time - a.time),

@@ -1,9 +1,9 @@
-"""The swath of a body through a gate's plane, tick by tick: how far it reached along some directions.
+"""The swath of a body through a gate's plane, tick by tick: its largest extents along some directions.
 
-What counts is the stay about the opening in which the gate is crossed: while the body, or the centre within
-the gate's depth, is at the plane, and near enough to touch the circle about the opening. A body that comes
-into the plane beside the opening, and is in it without a break until it is through, has met the frame,
-however thin that is. What the body does in the plane beyond that circle says nothing of the frame.
+Only the stay at the opening counts during which the gate is crossed. A stay lasts while the body, or its
+centre within the gate's depth, is at the plane and near enough to touch the circle around the opening. A body
+that enters the plane beside the opening, and stays in it until it is through, has touched the frame, even an
+infinitely thin one. Beyond the circle the plane does not count as frame.
 """
 
 from __future__ import annotations
@@ -27,31 +27,31 @@ from aerobat.kernels.vectors import dot, norm, subtract
 
 
 class Extreme(NamedTuple):
-    """A point of the body in a gate's plane, from the centre of the opening, and when."""
+    """A point of the body in a gate's plane, relative to the centre of the opening, and its time."""
 
-    time: Scalar  # [s] infinite where there is none
-    reach: Scalar  # [m] by which it is the farthest; −infinite where there is none
-    point: PlanePoint  # along and beside the direction
+    time: Scalar  # [s] infinite where there is no such point
+    reach: Scalar  # [m] largest extent; −infinite where there is no such point
+    point: PlanePoint  # components along and beside the direction
 
 
-Swath = tuple[Extreme, ...]  # the farthest that a body reached in a gate's plane, by directions
+Swath = tuple[Extreme, ...]  # the farthest points of a body in a gate's plane, one for each direction
 
 
 class SwathProgress(NamedTuple):
-    """A body about a gate's plane so far."""
+    """The progress of a body through a gate's plane."""
 
     gap: Scalar  # [m] between body and plane, negative where they meet
-    is_about: Scalar  # 1 while the vehicle is about the opening
-    is_crossing: Scalar  # 1 while that stay is the one in which the gate is crossed
-    stay: Swath  # of this stay, none where there is none
-    crossing: Swath  # of the one in which the gate is crossed
+    is_about: Scalar  # 1 while the vehicle is at the opening
+    is_crossing: Scalar  # 1 during the stay in which the gate is crossed
+    stay: Swath  # the extremes of this stay, NOWHERE outside a stay
+    crossing: Swath  # the extremes of the stay in which the gate is crossed
 
 
 NOWHERE = Extreme(inf, -inf, PlanePoint(0.0, 0.0))
 
 
 def init(directions: int) -> SwathProgress:
-    """Progress before the first tick, along so many directions."""
+    """Return the progress before the first tick, for a number of directions."""
     nothing = directions * (NOWHERE,)
     return SwathProgress(inf, 0.0, 0.0, nothing, nothing)
 
@@ -65,7 +65,7 @@ def step(
     crosses: Scalar,
     crossed: tuple[Scalar, Scalar],
 ) -> SwathProgress:
-    """Progress a tick later.
+    """Return the progress a tick later.
 
     Args:
         ops: of the arithmetic.
@@ -109,9 +109,9 @@ def swept_between(
     gaps: tuple[Scalar, Scalar],
     crosses: Scalar,
 ) -> tuple[Scalar, Swath]:
-    """True where the body meets the plane between two ticks, and the farthest that it reaches there.
+    """Return True where the body meets the plane between two ticks, and its farthest points there.
 
-    Where it reaches the farthest is said by the attitude at the second tick, how far by the one there.
+    The attitude at the second tick determines the time of the extremes, the attitude at that time their size.
 
     Args:
         ops: of the arithmetic.
@@ -140,7 +140,7 @@ def _extreme(
     snapshots: tuple[Snapshot, Snapshot],
     within: tuple[Scalar, Scalar],
 ) -> Extreme:
-    """The farthest along a direction, within fractions of the way between two ticks.
+    """Return the farthest point along a direction, within fractions of the way between two ticks.
 
     Args:
         ops: of the arithmetic.
@@ -165,5 +165,5 @@ def _extreme(
 
 
 def _wider(ops: Ops, condition: Scalar, a: Swath, b: Swath) -> Swath:
-    """Of all extremes the farther, `a`'s only where the condition holds."""
+    """Return the farther of each pair of extremes; `a`'s only where the condition holds."""
     return tuple(select_tree(ops, condition & (p.reach > q.reach), p, q) for p, q in zip(a, b, strict=True))
