@@ -1,4 +1,4 @@
-"""Engines: kernels run as they stand in plain floats, or traced, as machine code or as arrays on a GPU."""
+"""Engines that run kernels: plain floats, machine code, or arrays on a GPU."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from aerobat.engines.engine import CompiledLoop, Engine, logged_ticks, run_whole
 from aerobat.engines.floats import FLOATS
 from aerobat.errors import BackendMissing, SpecError
 
-_PLACES = {  # each imported when it is chosen
+_PLACES = {  # modules and names; each is imported when it is chosen
     "floats": ("floats", "FLOATS"),
     "compiled": ("llvm", "ENGINE"),
     "jax": ("jax", "ENGINE"),
     "jax-float32": ("jax", "SINGLE"),
 }
 ENGINE_NAMES = tuple(_PLACES)
-_TRACING = 300  # vehicle-ticks that floats fly in the time that it takes to trace
+_TRACING = 300  # vehicle-ticks that the engine `floats` computes in the time of a trace
 
 __all__ = [
     "ENGINE_NAMES",
@@ -31,9 +31,9 @@ __all__ = [
 
 
 def choose(name: str, vehicles: int, ticks: int) -> Engine:
-    """The engine of that name; "auto" takes the fastest for so many vehicles and ticks.
+    """Return the engine of that name; "auto" chooses the fastest for this number of vehicles and ticks.
 
-    Raises SpecError for an unknown name, BackendMissing for one whose library is not installed.
+    SpecError is raised for an unknown name, BackendMissing for an engine whose library is not installed.
     """
     if name == "auto":
         name = "floats" if vehicles * ticks <= _TRACING else "compiled"

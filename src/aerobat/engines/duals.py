@@ -1,10 +1,10 @@
-"""Exact derivatives: kernels run on dual numbers, whatever those are made of.
+"""Exact derivatives by forward-mode differentiation: kernels run on dual numbers of any arithmetic.
 
-A dual number is a value and its tangent along one direction. Kernels never ask what their numbers are, so an
-engine that runs a kernel runs its derivative too: the loop over time is wrapped, not the engine. Several
-directions are several vehicles, side by side.
+A dual number is a value and its tangent along one direction. Kernels do not depend on the type of their
+numbers, so every engine can also run their derivatives: the loop over time is wrapped, not the engine.
+Several directions are run as several vehicles, side by side.
 
-Where a function has a kink, a tangent is that of one side; at zero the square root's is taken to be zero.
+At a kink the tangent is one-sided; the tangent of the square root at zero is defined as zero.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from aerobat.kernels.ops import Ops, Scalar
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Dual:
-    """A value and its tangent, None where it has none whatever the values are."""
+    """A value and its tangent; None for a tangent that is always zero."""
 
     value: Scalar
     tangent: Scalar | None = None
 
-    __array_ufunc__ = None  # NumPy leaves arithmetic with it to it
+    __array_ufunc__ = None  # makes NumPy use the operators of this class
 
     def __neg__(self) -> Dual:
         return Dual(-self.value, None if self.tangent is None else -self.tangent)
@@ -85,18 +85,18 @@ class Dual:
 
 
 def dual(x: Any) -> Dual:
-    """A dual number as it is; any other without a tangent."""
+    """Return a dual number unchanged, or any other number without a tangent."""
     return x if isinstance(x, Dual) else Dual(x)
 
 
 @dataclass(frozen=True)
 class DualOps:
-    """Arithmetic of dual numbers over that of their parts."""
+    """The operations of kernels on dual numbers, over those of their parts."""
 
     ops: Ops
 
     def sqrt(self, x: Any) -> Dual:
-        """The square root."""
+        """Return the square root."""
         value, tangent = _parts(x)
         root = self.ops.sqrt(value)
         if tangent is None:
@@ -106,28 +106,28 @@ class DualOps:
         return Dual(root, self.ops.select(positive, rate * tangent, 0.0))
 
     def exp(self, x: Any) -> Dual:
-        """The exponential."""
+        """Return the exponential."""
         value, tangent = _parts(x)
         power = self.ops.exp(value)
         return Dual(power, _product(tangent, power))
 
     def minimum(self, x: Any, y: Any) -> Dual:
-        """The smaller of two; the tangent is the second's where they are equal."""
+        """Return the smaller of two; the tangent is the second's where they are equal."""
         x, y = dual(x), dual(y)
         return Dual(self.ops.minimum(x.value, y.value), self._either(x < y, x, y))
 
     def maximum(self, x: Any, y: Any) -> Dual:
-        """The larger of two; the tangent is the second's where they are equal."""
+        """Return the larger of two; the tangent is the second's where they are equal."""
         x, y = dual(x), dual(y)
         return Dual(self.ops.maximum(x.value, y.value), self._either(x > y, x, y))
 
     def select(self, condition: Any, x: Any, y: Any) -> Dual:
-        """`x` if the condition holds, else `y`."""
+        """Return `x` if the condition holds, else `y`."""
         condition, x, y = _parts(condition)[0], dual(x), dual(y)
         return Dual(self.ops.select(condition, x.value, y.value), self._either(condition, x, y))
 
     def _either(self, condition: Any, x: Dual, y: Dual) -> Scalar | None:
-        """Tangent of `x` if the condition holds, else that of `y`."""
+        """Return the tangent of `x` if the condition holds, else that of `y`."""
         if x.tangent is None and y.tangent is None:
             return None
         return self.ops.select(condition, _number(x.tangent), _number(y.tangent))
@@ -135,10 +135,10 @@ class DualOps:
 
 @lru_cache(maxsize=32)
 def differentiated(init: Init, step: Step) -> tuple[Init, Step]:
-    """The loop whose rows are pairs: those of the given one, and their tangents along one direction.
+    """Return the loop whose rows are pairs: the rows of the given loop, and their tangents.
 
-    Its parameters are pairs too, (values, tangents), and so are its inputs. Tangents are a tuple with an
-    entry for each leaf of the values, from left to right; of parameters and inputs it may be `()`, for none.
+    Its parameters and inputs are pairs (values, tangents), too. Tangents are a tuple with an entry for each
+    leaf of the values, from left to right. For parameters and inputs an entry may be `()`, for no tangent.
     """
 
     def begin(ops: Ops, parameters: Tree, row: Tree) -> Tree:
@@ -152,20 +152,20 @@ def differentiated(init: Init, step: Step) -> tuple[Init, Step]:
 
 
 def _together(pair: Tree) -> Tree:
-    """Values and tangents as dual numbers."""
+    """Return values and tangents as dual numbers."""
     values, tangents = pair
     given = (None if isinstance(tangent, tuple) else tangent for tangent in tangents)
     return tree_unflatten(values, map(Dual, tree_leaves(values), given))
 
 
 def _apart(tree: Tree) -> Tree:
-    """Dual numbers as values and tangents."""
+    """Return dual numbers as values and tangents."""
     numbers = [value_and_tangent(leaf) for leaf in tree_leaves(tree)]
     return tree_unflatten(tree, (value for value, _ in numbers)), tuple(tangent for _, tangent in numbers)
 
 
 def value_and_tangent(x: Any) -> tuple[Scalar, Scalar]:
-    """Both parts of a number, zero where it has no tangent."""
+    """Return both parts of a number, with zero for a missing tangent."""
     value, tangent = _parts(x)
     return value, _number(tangent)
 

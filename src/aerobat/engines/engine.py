@@ -1,4 +1,4 @@
-"""Engines: arithmetic, and loops over time that are compiled once, then stepped, cut and resumed at will."""
+"""The interface of engines: arithmetic, and loops over time that are compiled once and run in parts."""
 
 from __future__ import annotations
 
@@ -20,48 +20,48 @@ Step: TypeAlias = Callable[[Ops, Tree, Tree, Tree], tuple[Tree, Tree]]
 
 
 class Held(NamedTuple):
-    """Inputs that stay for several ticks, of which each is told once; kernels see the tree of its values."""
+    """Inputs that stay constant for several ticks, each stored once; kernels see the tree of values."""
 
-    row: Any  # of `values` at each tick, (ticks,), whole numbers; () for one tick, whose values are its own
+    row: Any  # indices into `values` for each tick, (ticks,); () for one tick with its own values
     values: Tree  # leaves (samples,) or (samples, vehicles)
 
     def expanded(self) -> Tree:
-        """The values of each tick."""
+        """Return the values at each tick."""
         if isinstance(self.row, tuple):
             return expanded(self.values)
         return tree_map(lambda leaf: leaf[self.row], expanded(self.values))
 
 
 class Coded(NamedTuple):
-    """Inputs that are entries of a table, told by their places in it; kernels see the tree of the entries."""
+    """Inputs that are entries of a table, stored as indices; kernels see the tree of entries."""
 
     codes: (
         Tree  # leaves (ticks, vehicles), or (vehicles,) for one tick, in a `Held` (samples, vehicles); uint16
     )
-    table: Array  # (65536,), one for all `Coded` inputs of a loop
+    table: Array  # (65536,), shared by all `Coded` inputs of a loop
 
     def expanded(self) -> Tree:
-        """The entries."""
+        """Return the entries."""
         return tree_map(lambda leaf: self.table[leaf], self.codes)
 
 
 class CompiledLoop(ABC):
-    """A loop over time, `carry, row = step(ops, parameters, carry, inputs)`, for parameters once given.
+    """A loop over time, `carry, row = step(ops, parameters, carry, inputs)`, for given parameters.
 
-    A carry is a plain tree of read-only arrays (vehicles,): it can be kept, pickled, and gone on from as
-    often as one likes. However the ticks are cut into scans and steps, the bits are the same.
+    A carry is a plain tree of read-only arrays (vehicles,). It can be stored, pickled, and continued any
+    number of times. The results are bitwise the same, however the ticks are divided into scans and steps.
     """
 
     @abstractmethod
     def init(self, inputs: Tree) -> Tree:
-        """The carry before the first tick; leaves of its `inputs` are numbers or arrays (vehicles,).
+        """Return the carry before the first tick; leaves of `inputs` are numbers or arrays (vehicles,).
 
-        As for `scan`, what is `Held` or `Coded` in them is so at compilation too.
+        Inputs that are `Held` or `Coded` must also be so at compilation, here and in `scan`.
         """
 
     @abstractmethod
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
-        """The carry after some ticks, and the rows of those that are logged (see `logged_ticks`).
+        """Return the carry after some ticks, and the rows of the logged ticks (see `logged_ticks`).
 
         Args:
             carry: from `init`, or from an earlier scan or step; stays as it is.
@@ -73,16 +73,16 @@ class CompiledLoop(ABC):
         """
 
     def step(self, carry: Tree, inputs: Tree) -> tuple[Tree, Tree]:
-        """The carry after one tick, and its row with leaves (vehicles,); inputs as for `init`."""
+        """Return the carry after one tick, and its row with leaves (vehicles,); inputs as for `init`."""
         carry, rows = self.scan(carry, tree_map(lambda leaf: np.asarray(leaf)[None], expanded(inputs)))
         return carry, tree_map(lambda leaf: leaf[..., 0], rows)
 
 
 class Compile(Protocol):
-    """The way from functions to a loop."""
+    """A function that compiles `init` and `step` to a loop."""
 
     def __call__(self, init: Init, step: Step, parameters: Tree, inputs: Tree) -> CompiledLoop:
-        """The loop that starts with `init(ops, parameters, inputs)` and goes on with `step`.
+        """Return the loop that starts with `init(ops, parameters, inputs)` and continues with `step`.
 
         Args:
             init: makes the carry before the first tick.
@@ -96,14 +96,14 @@ class Compile(Protocol):
 
 @dataclass(frozen=True)
 class Engine:
-    """One way to run kernels. All give the same numbers to rounding."""
+    """A way to run kernels. All engines give the same numbers up to rounding."""
 
     name: str
     compile: Compile
 
 
 def logged_ticks(ticks: int, log_stride: int) -> NDArray[np.intp]:
-    """Ticks whose rows a scan returns: the first, each `log_stride` ticks after it, and the last."""
+    """Return the ticks whose rows a scan returns: the first, every `log_stride`-th after it, and the last."""
     logged = np.arange(0, ticks, log_stride)
     return logged if logged[-1] == ticks - 1 else np.append(logged, ticks - 1)
 
@@ -111,13 +111,13 @@ def logged_ticks(ticks: int, log_stride: int) -> NDArray[np.intp]:
 def run_whole(
     engine: Engine, init: Init, step: Step, parameters: Tree, inputs: Tree, log_stride: int = 1
 ) -> Tree:
-    """The rows of the logged ticks of a loop that is run once, from its start to its end."""
+    """Return the rows of the logged ticks of a loop that is run once from start to end."""
     loop = engine.compile(init, step, parameters, first_row(inputs))
     return loop.scan(loop.init(first_row(inputs)), inputs, log_stride)[1]
 
 
 def first_row(inputs: Tree) -> Tree:
-    """Inputs of the first tick."""
+    """Return the inputs of the first tick."""
     return _row(inputs, 0)
 
 
@@ -133,23 +133,23 @@ def _row(inputs: Tree, index: int) -> Tree:
 
 
 def expanded(inputs: Tree) -> Tree:
-    """Inputs as kernels see them: what is `Held` stands at every tick, and what is `Coded` as its entries."""
+    """Return inputs as kernels see them: `Held` values repeated at every tick, `Coded` values as entries."""
     return tree_replace(inputs, (Held, Coded), lambda node: node.expanded())
 
 
 def tick_count(inputs: Tree) -> int:
-    """Ticks of a scan's inputs."""
+    """Return the number of ticks of a scan's inputs."""
     return len(tree_leaves(inputs)[0])
 
 
 def read_only(array: Any) -> Any:
-    """The same array, write-protected."""
+    """Return the same array, write-protected."""
     array.flags.writeable = False
     return array
 
 
 def available_cores() -> int:
-    """The processors that this process may use; where the system does not say, all there are."""
+    """Return the number of processors that this process may use, or of all where the system does not say."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

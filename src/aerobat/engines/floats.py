@@ -1,4 +1,4 @@
-"""Arithmetic of floats and of arrays, and kernels on Python floats as they stand: the reference."""
+"""Arithmetic of floats and arrays, and the reference engine, which runs kernels on Python floats."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from aerobat.engines.pytree import Tree, tree_map, tree_rows, tree_stack
 
 
 class ArrayOps:
-    """Arithmetic of NumPy arrays."""
+    """The operations of kernels on NumPy arrays."""
 
     sqrt = staticmethod(np.sqrt)
     exp = staticmethod(np.exp)
@@ -32,38 +32,38 @@ class ArrayOps:
 
 
 class FloatOps:
-    """Arithmetic of Python floats."""
+    """The operations of kernels on Python floats."""
 
     sqrt = staticmethod(math.sqrt)
     exp = staticmethod(math.exp)
 
     @staticmethod
     def minimum(x: float, y: float) -> float:
-        """The smaller of two."""
+        """Return the smaller of two."""
         return x if x < y else y
 
     @staticmethod
     def maximum(x: float, y: float) -> float:
-        """The larger of two."""
+        """Return the larger of two."""
         return x if x > y else y
 
     @staticmethod
     def select(condition: bool, x: Any, y: Any) -> Any:
-        """`x` if the condition holds, else `y`."""
+        """Return `x` if the condition holds, else `y`."""
         return x if condition else y
 
 
 class FloatLoop(CompiledLoop):
-    """A loop run as it is written."""
+    """A loop in plain Python."""
 
     def __init__(self, init: Init, step: Step, parameters: Tree, inputs: Tree) -> None:
-        del inputs  # nothing is compiled for them
+        del inputs  # nothing is compiled
         self._init = init
         self._step = step
         self._parameters = list(tree_rows(parameters, _floats))
 
     def init(self, inputs: Tree) -> Tree:
-        """See `CompiledLoop.init`."""
+        """Return the first carry; see `CompiledLoop.init`."""
         chunk = tree_map(lambda leaf: np.asarray(leaf)[None], expanded(inputs))
         carries = [
             self._init(FloatOps, parameters, next(_ticks(chunk, vehicle)))
@@ -72,7 +72,7 @@ class FloatLoop(CompiledLoop):
         return _stacked(carries)
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
-        """See `CompiledLoop.scan`."""
+        """Run some ticks; see `CompiledLoop.scan`."""
         inputs = expanded(inputs)
         logged = set(logged_ticks(tick_count(inputs), log_stride).tolist())
         carries, series = [], []
@@ -96,7 +96,7 @@ def _ticks(inputs: Tree, vehicle: int) -> Iterator[Tree]:
 
 
 def first_numbers(tree: Tree) -> Any:
-    """The first number of each leaf, as `FloatOps` takes it: of one vehicle, or of the first tick."""
+    """Return the first number of each leaf as a float: that of the first vehicle, or of the first tick."""
     return tree_map(lambda leaf: float(np.ravel(leaf)[0]), tree)
 
 

@@ -1,4 +1,4 @@
-"""Gradients of traces, written into them: differentiation backwards through the operations."""
+"""Gradients of traces by reverse-mode differentiation; the gradient is recorded in the same trace."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from aerobat.engines.tracing import Symbol, TraceOps
 
 
 def gradient(output: Symbol, inputs: Sequence[Symbol]) -> list[Symbol]:
-    """Return the partial derivatives of a value of a trace by others, written into the trace.
+    """Return the partial derivatives of a value of a trace, recorded in the trace.
 
     Args:
         output: What is differentiated, backwards through the operations that make it.
@@ -36,7 +36,7 @@ def gradient(output: Symbol, inputs: Sequence[Symbol]) -> list[Symbol]:
 def _parts(
     ops: TraceOps, name: str, arguments: list[Symbol], value: Symbol, slope: Symbol
 ) -> list[tuple[Symbol, Symbol]]:
-    """The arguments of an operation, each with what a slope by its value adds to the slope by it."""
+    """Return the arguments of an operation, each with its contribution to the derivative by that argument."""
     match name, arguments:
         case "add", [x, y]:
             return [(x, slope), (y, slope)]

@@ -1,4 +1,4 @@
-"""Kernels under JAX: traced once, compiled by XLA for the device that JAX finds, all vehicles at once."""
+"""Kernels under JAX: traced once, compiled by XLA for JAX's device, all vehicles at once."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from aerobat.engines.tracing import FUNCTIONS
 Values = tuple[Any, ...]  # arrays of JAX, each (vehicles,)
 State = tuple[Values, Values]  # the carry, and the outputs of the last tick
 
-MIN_TICKS = 8  # a scan's ticks and rows are padded to this times a power of two, lest each length be compiled
+MIN_TICKS = 8  # lengths of scans are padded to this times a power of two, so that few lengths are compiled
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     **FUNCTIONS,
     "sqrt": jnp.sqrt,
@@ -41,7 +41,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 
 class JaxLoop(CompiledLoop):
-    """A loop compiled by XLA. The precision holds in here, whatever JAX is set to; rows are of float64."""
+    """A loop compiled by XLA. Its precision does not depend on JAX's settings; rows are float64."""
 
     def __init__(
         self,
@@ -58,13 +58,13 @@ class JaxLoop(CompiledLoop):
             self._parameters = tuple(jnp.asarray(leaf, precision) for leaf in tree_leaves(parameters))
 
     def init(self, inputs: Tree) -> Tree:
-        """See `CompiledLoop.init`."""
+        """Return the first carry; see `CompiledLoop.init`."""
         with jax.enable_x64(self._precision == "float64"):
             row = tuple(jnp.asarray(leaf, self._precision) for leaf in tree_leaves(expanded(inputs)))
             return self._carry(_initialized(self._program, self._parameters, row))
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
-        """See `CompiledLoop.scan`."""
+        """Run some ticks; see `CompiledLoop.scan`."""
         inputs = expanded(inputs)
         logged = logged_ticks(tick_count(inputs), log_stride)
         with jax.enable_x64(self._precision == "float64"):
@@ -86,7 +86,7 @@ class _Program:
     loop: TracedLoop = field(compare=False)
 
     def computed(self, numbers: Iterable[int], known: dict[int, Any]) -> dict[int, Any]:
-        """Values, by their numbers, and those known before."""
+        """Return values by their numbers, together with those known before."""
         values = dict(known)
         for number in numbers:
             operation = self.loop.trace.operations[number]
@@ -98,14 +98,14 @@ class _Program:
         return values
 
     def filled(self, numbers: Iterable[int], values: dict[int, Any], like: Any) -> Values:
-        """Some of the values, each an array with an entry for every vehicle, as `like` is."""
+        """Return some values, each as an array with an entry for every vehicle, like `like`."""
         kinds = {number: bool if self.loop.is_logical(number) else like.dtype for number in numbers}
         return tuple(jnp.broadcast_to(jnp.asarray(values[n], kinds[n]), like.shape) for n in numbers)
 
 
 @partial(jax.jit, static_argnums=0)
 def _initialized(program: _Program, parameters: Values, row: Values) -> Values:
-    """The first carry."""
+    """Return the first carry."""
     loop = program.loop
     known = dict(zip((*loop.parameters, *loop.inputs), (*parameters, *row), strict=True))
     return program.filled(loop.first_carry, program.computed(loop.initialization, known), parameters[0])
@@ -115,7 +115,7 @@ def _initialized(program: _Program, parameters: Values, row: Values) -> Values:
 def _scanned(
     program: _Program, parameters: Values, carry: Values, inputs: Values, logged: Any
 ) -> tuple[Values, Values]:
-    """The next carry, and the outputs (rows, vehicles) of the ticks logged, the last among them."""
+    """Return the next carry, and the outputs (rows, vehicles) of the logged ticks, including the last."""
     loop, like = program.loop, parameters[0]
     prologue = program.computed(loop.prologue, dict(zip(loop.parameters, parameters, strict=True)))
 
@@ -139,7 +139,7 @@ def _scanned(
 
 
 def _padded(series: Any) -> Array:
-    """A series that repeats its last entry, as long as the next of a few lengths."""
+    """Return a series padded with its last entry to the next of a few lengths."""
     series = np.asarray(series)
     length = MIN_TICKS
     while length < len(series):
@@ -148,7 +148,7 @@ def _padded(series: Any) -> Array:
 
 
 def _row(output: Any, rows: int) -> Array:
-    """(rows, vehicles) on a device -> (vehicles, rows), logical or of float64."""
+    """Return an output (rows, vehicles) on a device as (vehicles, rows), logical or float64."""
     series = np.asarray(output)[:rows].T
     return series if series.dtype == bool else series.astype(np.float64)
 

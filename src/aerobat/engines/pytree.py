@@ -1,4 +1,4 @@
-"""Pytrees: (named) tuples of (named) tuples whose leaves are arrays or numbers; vectors among them."""
+"""Pytrees: nested tuples and named tuples with arrays or numbers as leaves."""
 
 from __future__ import annotations
 
@@ -14,40 +14,40 @@ Tree: TypeAlias = Any
 
 
 def components(array: Array) -> Tree:
-    """(..., n) -> a tuple of n leaves of shape (...)."""
+    """Return an array (..., n) as a tuple of n leaves (...)."""
     last = array.ndim - 1
     return tuple(np.ascontiguousarray(array.transpose(last, *range(last))))
 
 
 def matrix_components(matrices: Array) -> Tree:
-    """(..., rows, columns) -> rows of columns of leaves (...)."""
+    """Return matrices (..., rows, columns) as rows of columns of leaves (...)."""
     return tuple(components(matrices[..., k, :]) for k in range(matrices.shape[-2]))
 
 
 def from_components(leaves: Tree) -> Array:
-    """n leaves of shape (...) -> (..., n)."""
+    """Return n leaves (...) as an array (..., n)."""
     return np.stack(leaves, axis=-1)
 
 
 def tree_leaves(tree: Tree) -> list[Any]:
-    """The leaves of a tree, from left to right."""
+    """Return the leaves of a tree, from left to right."""
     leaves: list[Any] = []
     _collect((tree,), leaves)
     return leaves
 
 
 def tree_unflatten(tree: Tree, leaves: Iterable[Any]) -> Tree:
-    """The tree with other leaves, from left to right."""
+    """Return the tree with other leaves, from left to right."""
     return _unflatten((tree,), iter(leaves))[0]
 
 
 def tree_map(function: Callable[[Any], Any], tree: Tree) -> Tree:
-    """The tree with `function` applied to each leaf."""
+    """Return the tree with `function` applied to each leaf."""
     return tree_unflatten(tree, map(function, tree_leaves(tree)))
 
 
 def tree_replace(tree: Tree, kind: type | tuple[type, ...], function: Callable[[Any], Tree]) -> Tree:
-    """The tree with `function` applied to each tuple of a kind, or of some kinds."""
+    """Return the tree with `function` applied to each tuple of the given types."""
     if isinstance(tree, kind):
         return function(tree)
     if not isinstance(tree, tuple):
@@ -56,12 +56,13 @@ def tree_replace(tree: Tree, kind: type | tuple[type, ...], function: Callable[[
 
 
 def tree_like(tree: tuple[Any, ...], children: Iterable[Tree]) -> Tree:
-    """The tuple of the same type with other children."""
-    return tuple.__new__(type(tree), children)  # named tuples too, without their constructors' detour
+    """Return a tuple of the same type with other children."""
+    # also for named tuples, without the cost of their constructors
+    return tuple.__new__(type(tree), children)
 
 
 def tree_stack(trees: Sequence[Tree], join: Callable[[Sequence[Any]], Any]) -> Tree:
-    """The tree whose leaves are `join` of the leaves of alike trees."""
+    """Return the tree whose leaves are `join` of the corresponding leaves of trees of one structure."""
     first = trees[0]
     if isinstance(first, tuple):
         return tree_like(first, [tree_stack(children, join) for children in zip(*trees, strict=True)])
@@ -69,7 +70,7 @@ def tree_stack(trees: Sequence[Tree], join: Callable[[Sequence[Any]], Any]) -> T
 
 
 def tree_rows(tree: Tree, iterate: Callable[[Any], Iterator[Any]]) -> Iterator[Tree]:
-    """One tree for each row: `iterate` iterates over the leading axis of a leaf."""
+    """Yield one tree for each row; `iterate` iterates over the leading axis of a leaf."""
     if not isinstance(tree, tuple):
         return iterate(tree)
     if not tree:
@@ -79,7 +80,7 @@ def tree_rows(tree: Tree, iterate: Callable[[Any], Iterator[Any]]) -> Iterator[T
 
 
 def piecewise_constant_leaves(tree: Tree) -> list[bool]:
-    """For each leaf, true below a tuple that is `piecewise_constant`."""
+    """Return, for each leaf, whether it is below a `piecewise_constant` tuple."""
     return tree_leaves(_marked(tree, False))
 
 

@@ -1,4 +1,4 @@
-"""A loop as operations: the prologue, which parameters alone decide, and the body, computed at every tick."""
+"""A traced loop: the prologue, which depends only on parameters, and the body, computed at every tick."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from aerobat.engines.engine import Init, Step
 from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
 from aerobat.engines.tracing import Symbol, Trace, TraceOps
 
-MIN_GUARDED = 32  # operations that are worth a branch
+MIN_GUARDED = 32  # smallest number of operations for which a branch pays off
 
 
 @dataclass(frozen=True)
 class GuardedBlock:
-    """Values that are computed together: always, or only where a logical value holds."""
+    """Values that are computed together: always, or only where a condition (`guard`) holds."""
 
     guard: int | None
-    numbers: tuple[int, ...]  # in order
+    numbers: tuple[int, ...]  # in the order of computation
 
 
 @dataclass(frozen=True, eq=False)
 class TracedLoop:
-    """Values of a trace, by their numbers: the carry is `first_carry`, and after each tick `next_carry`.
+    """A loop as values of a trace, by their numbers; `next_carry` replaces the carry after each tick.
 
-    Parts of the carry on which no output depends are left out. Loops with the same listing are equal, so
-    that an engine compiles them once.
+    Parts of the carry that no output depends on are left out. Loops with the same listing are equal, so an
+    engine compiles them once.
     """
 
     trace: Trace
     parameters: tuple[int, ...]
     inputs: tuple[int, ...]
-    carry: tuple[int, ...]  # as a tick finds it
-    first_carry: tuple[int, ...]  # from parameters and the first tick's inputs
+    carry: tuple[int, ...]  # at the start of a tick
+    first_carry: tuple[int, ...]  # from the parameters and the inputs of the first tick
     next_carry: tuple[int, ...]
     outputs: tuple[int, ...]
-    carry_tree: Tree  # a leaf for each part of the carry, () where one is left out
-    row: Tree  # of a tick, its leaves the outputs' symbols
+    carry_tree: Tree  # a leaf for each part of the carry, () for parts that are left out
+    row: Tree  # row of a tick, with the outputs' symbols as leaves
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, TracedLoop) and self._listing == other._listing
@@ -46,7 +46,7 @@ class TracedLoop:
         return hash(self._listing)
 
     def __str__(self) -> str:
-        """A listing: every value, what the carry becomes, what is output."""
+        """Return a listing: every value, the carry's updates, and the outputs."""
         return self._listing
 
     @cached_property
@@ -62,7 +62,7 @@ class TracedLoop:
 
     @cached_property
     def prologue(self) -> list[int]:
-        """The values that ticks use and no tick changes, in order."""
+        """The values that ticks use and that are the same at all ticks, in order."""
         return sorted(self._each_tick - self._changing)
 
     @cached_property
@@ -71,7 +71,7 @@ class TracedLoop:
         return sorted(self._each_tick & self._changing)
 
     def loop_invariant(self, piecewise_constant: Iterable[int]) -> list[int]:
-        """The values of `body` that change only when these inputs do, in order."""
+        """Return the values of `body` that change only when these inputs change, in order."""
         known = {*piecewise_constant, *self.prologue}
         found = []
         for number in self.body:
@@ -82,9 +82,7 @@ class TracedLoop:
         return found
 
     def guarded_blocks(self, numbers: Sequence[int], shared: Iterable[int]) -> list[GuardedBlock]:
-        """The values of `numbers` in blocks; what only selections by a shared condition use is guarded.
-
-        Where the condition does not hold, a guarded value is not computed, and no selection takes it.
+        """Return the values of `numbers` in blocks, guarded if only selections by a shared condition use one.
 
         Args:
             numbers: of values, in order.
@@ -107,7 +105,7 @@ class TracedLoop:
         return blocks
 
     def _guards(self, numbers: Sequence[int], shared: set[int]) -> dict[int, int]:
-        """The condition, by the values' numbers, without which a value is not needed."""
+        """Return, for each value that is needed only under a condition, that condition."""
         operations = self.trace.operations
         conditions = {operations[n].arguments[0] for n in numbers if operations[n].name == "select"}
         roots = (*self.next_carry, *self.outputs)
@@ -123,9 +121,9 @@ class TracedLoop:
         return guards
 
     def stored_early(self, blocks: Sequence[GuardedBlock]) -> list[dict[int, int]]:
-        """For each block, the parts of the carry that may take their next values in it, and these values.
+        """Return, for each block, the parts of the carry that can be updated in it, with their new values.
 
-        They are those that otherwise stay as they are, and that nothing asks for after the block.
+        These are the parts that otherwise keep their values, and that nothing uses after the block.
         """
         place = {number: i for i, block in enumerate(blocks) for number in block.numbers}
         users: dict[int, set[int]] = {}
@@ -150,7 +148,7 @@ class TracedLoop:
         return found
 
     def is_logical(self, number: int) -> bool:
-        """True for a value that is true or false, not a number."""
+        """Return True for a value that is true or false instead of a number."""
         return self.trace.operations[number].logical
 
     @cached_property
@@ -159,7 +157,7 @@ class TracedLoop:
 
     @cached_property
     def _changing(self) -> set[int]:
-        """Values that inputs and carry change."""
+        """The values that depend on inputs or carry."""
         changing = {*self.inputs, *self.carry}
         for number, operation in enumerate(self.trace.operations):
             if not changing.isdisjoint(operation.arguments):
@@ -168,7 +166,7 @@ class TracedLoop:
 
 
 def trace_loop(init: Init, step: Step, parameters: Tree, inputs: Tree) -> TracedLoop:
-    """The loop that `init` and `step` make for trees of such a structure; see `engine.Compile`."""
+    """Return the loop of `init` and `step` for trees of these structures; see `engine.Compile`."""
     trace = Trace()
     ops = TraceOps(trace)
     parameters, inputs = _symbols(trace, parameters, "parameter"), _symbols(trace, inputs, "input")
@@ -202,7 +200,7 @@ def _numbers(symbols: Iterable[Symbol]) -> tuple[int, ...]:
 
 
 def _kept(trace: Trace, carry: Sequence[int], following: Sequence[int], outputs: Sequence[int]) -> list[int]:
-    """The parts of the carry on which the outputs depend, sooner or later."""
+    """Return the parts of the carry on which the outputs eventually depend."""
     kept: set[int] = set()
     while True:
         needed = trace.needed((*outputs, *(following[i] for i in kept)))

@@ -1,8 +1,7 @@
-"""A kernel run once on symbols: a flat list of operations, for engines that compile and for people to read.
+"""Tracing: a kernel is run once on symbols and recorded as a flat list of operations.
 
-Values are numbered in the order of their computation. Constants are folded and common sub-expressions
-computed once, neither in a way that would change a result's bits. A kernel that branches on a value cannot
-be traced; the error names its line.
+Values are numbered in the order of their computation. Constant folding and common sub-expression elimination
+never change a bit of a result. A kernel that branches on a value cannot be traced; the error names its line.
 """
 
 from __future__ import annotations
@@ -31,11 +30,11 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 _COMMUTATIVE = {"add", "multiply", "and"}
 _LOGICAL = {"less", "less_equal", "and"}
-_OF_LOGICAL = {"and", "select"}  # all others take numbers
+_OF_LOGICAL = {"and", "select"}  # operations that accept logical values; all others take numbers
 
 
 class BranchError(TypeError):
-    """A kernel asked a symbol for its value, which it does not have."""
+    """A kernel needed the value of a symbol, which does not exist during tracing."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +44,10 @@ class Operation:
     name: str  # input, constant, or one of FUNCTIONS
     arguments: tuple[int, ...] = ()  # the numbers of earlier values
     content: float | bool | str = ""  # a constant's value, an input's name
-    logical: bool = False  # true or false, not a number
+    logical: bool = False  # whether the value is true or false instead of a number
 
     def __str__(self) -> str:
-        """As it stands in a listing."""
+        """Return the operation as it stands in a listing."""
         if self.name in ("input", "constant"):
             return f"{self.name} {self.content}"
         return f"{self.name} {' '.join(f'%{i}' for i in self.arguments)}"
@@ -56,21 +55,21 @@ class Operation:
 
 @dataclass
 class Trace:
-    """Record of the operations that symbols take part in."""
+    """A record of the operations on symbols."""
 
     operations: list[Operation] = field(default_factory=list)
     _numbers: dict[Any, int] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        """One line for each value."""
+        """Return a listing with one line for each value."""
         return "\n".join(f"%{i} = {operation}" for i, operation in enumerate(self.operations))
 
     def input(self, name: str, logical: bool = False) -> Symbol:
-        """A new symbol."""
+        """Return a new symbol."""
         return Symbol(self, self._number("input", (), name, logical))
 
     def symbol(self, value: Any) -> Symbol:
-        """A symbol as it is; a number as a constant."""
+        """Return a symbol unchanged, or a number as a constant."""
         if isinstance(value, Symbol):
             return value
         logical = isinstance(value, bool)
@@ -78,7 +77,7 @@ class Trace:
         return Symbol(self, self._number("constant", (), content, logical))
 
     def apply(self, name: str, *arguments: Any) -> Symbol:
-        """A function of symbols and numbers; true and false are 1 and 0 where numbers are taken."""
+        """Return a function of symbols and numbers; as numbers, logical values count as 1 and 0."""
         numbers = tuple([self.symbol(argument).number for argument in arguments])
         known = [self.operations[number] for number in numbers]
         if name not in _OF_LOGICAL and any(operation.logical for operation in known):
@@ -96,7 +95,7 @@ class Trace:
         return Symbol(self, self._number(name, numbers, "", logical))
 
     def needed(self, roots: Iterable[int], unless: int | None = None) -> set[int]:
-        """The values that others are computed from, these included.
+        """Return the values from which `roots` are computed, including `roots`.
 
         Args:
             roots: the others.
@@ -129,7 +128,7 @@ class Trace:
 
 
 def _unchanged(name: str, numbers: Sequence[int], known: Sequence[Operation]) -> int | None:
-    """The argument that is the function's value whatever the others are, if there is one."""
+    """Return the argument that always equals the function's value, if there is one."""
     match name, [operation.content if operation.name == "constant" else None for operation in known]:
         case ("multiply" | "divide", [_, 1.0]) | ("and", [_, True]):
             return numbers[0]
@@ -150,10 +149,10 @@ def _binary(name: str, swapped: bool = False) -> Callable[[Symbol, Any], Symbol]
 
 
 class Symbol:
-    """A number to come: arithmetic with it is written down."""
+    """A symbolic number: arithmetic with it is recorded."""
 
     __slots__ = ("number", "trace")
-    __array_ufunc__ = None  # NumPy leaves arithmetic with it to it
+    __array_ufunc__ = None  # makes NumPy use the operators of this class
 
     def __init__(self, trace: Trace, number: int) -> None:
         self.trace, self.number = trace, number
@@ -197,26 +196,26 @@ def _branch() -> BranchError:
 
 @dataclass(frozen=True)
 class TraceOps:
-    """Arithmetic of a trace's symbols."""
+    """The operations of kernels on a trace's symbols."""
 
     trace: Trace
 
     def sqrt(self, x: Any) -> Symbol:
-        """The square root."""
+        """Return the square root."""
         return self.trace.apply("sqrt", x)
 
     def exp(self, x: Any) -> Symbol:
-        """The exponential."""
+        """Return the exponential."""
         return self.trace.apply("exp", x)
 
     def minimum(self, x: Any, y: Any) -> Symbol:
-        """The smaller of two."""
+        """Return the smaller of two."""
         return self.trace.apply("minimum", x, y)
 
     def maximum(self, x: Any, y: Any) -> Symbol:
-        """The larger of two."""
+        """Return the larger of two."""
         return self.trace.apply("maximum", x, y)
 
     def select(self, condition: Any, x: Any, y: Any) -> Symbol:
-        """`x` if the condition holds, else `y`."""
+        """Return `x` if the condition holds, else `y`."""
         return self.trace.apply("select", condition, x, y)

@@ -1,8 +1,9 @@
-"""The surroundings of a vehicle: gravity, wind and ground, owned by the problem and by nobody else.
+"""The surroundings of a vehicle: gravity, wind, ground and obstacles, which belong to the problem.
 
-The package also holds the conditions of a flight there: what varies, disturbs, and is measured how.
+The package also holds the conditions of a flight: dispersions, disturbances and sensors.
 
-The public names stand in `__init__.pyi`; each is imported when first used: calm air waits for no sensor.
+The public names stand in `__init__.pyi`. Each is imported when first used, so that calm air does not import
+sensors.
 """
 
 import lazy_loader

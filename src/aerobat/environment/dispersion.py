@@ -1,4 +1,4 @@
-"""Differences from flight to flight: the vehicle, its start, the air, its battery, what its sensors say."""
+"""Dispersions between flights: of the vehicle, its start, the wind, its battery and its sensors."""
 
 from __future__ import annotations
 
@@ -97,11 +97,11 @@ class Dispersion:
 
     @validated
     def scaled(self, factor: NonNegative) -> Dispersion:
-        """The same conditions, `factor` times as bad.
+        """Return the same conditions, scaled by `factor`.
 
-        Spreads, unmodelled drag, wind, gusts and the noises, biases and misfits of sensors are multiplied;
-        rates, delays, ranges, gaps, outliers and the battery stay as they are. Raises SpecError where a
-        relative spread comes to 1 or more.
+        Spreads, unmodelled drag, wind, gusts, and noises, biases and misfits of sensors are multiplied.
+        Rates, delays, ranges, gaps, outliers and the battery stay unchanged. SpecError is raised where a
+        relative spread reaches 1.
         """
         capture = _scaled(self.motion_capture, factor, ("position_noise", "attitude_noise"))
         if capture is not None and capture.hand_off is not None:
@@ -123,7 +123,7 @@ class Dispersion:
 
 
 def _scaled(value: T, factor: float, names: tuple[str, ...]) -> T:
-    """The value with some of its numbers multiplied; None as it is."""
+    """Return the value with some of its numbers multiplied; None unchanged."""
     if value is None:
         return value
     return replace(value, **{name: factor * getattr(value, name) for name in names})  # type: ignore[type-var]

@@ -1,4 +1,4 @@
-"""Gravity, wind, ground and obstacles: what a problem is flown in, whichever the vehicle."""
+"""Gravity, wind, ground and obstacles: the environment of a problem, independent of the vehicle."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ class Environment:
 
     @property
     def weight(self) -> Array:
-        """The specific thrust [m/s²] that holds a hover, g e3, (3,)."""
+        """The specific thrust [m/s²] in hover, g e3, (3,)."""
         return self.gravity * UP
 
     @cached_property
     def pieces(self) -> Pieces:
-        """The convex pieces of all obstacles; names that several obstacles have are numbered."""
+        """The convex pieces of all obstacles; names shared by several obstacles are numbered."""
         solids = [
             tuple(replace(piece, motion=each.motion) for piece in each.pieces) for each in self.obstacles
         ]

@@ -1,4 +1,4 @@
-"""Conditions of flights from TOML files and back; the presets are such files too."""
+"""Conditions of flights in TOML files; the presets are such files, too."""
 
 from __future__ import annotations
 
@@ -18,20 +18,19 @@ def dispersion_names() -> tuple[str, ...]:
 
 @validated
 def load_dispersion(name_or_path: PathName) -> Dispersion:
-    """Return conditions that come with Aerobat, by their name, or those in a TOML file, by its path.
+    """Return the preset conditions of this name, or those in the TOML file at this path.
 
-    Raises SpecError, in one sentence that names the file and the field, when there are none such or the file
-    is malformed.
+    SpecError, which names the file and the field, is raised where there are none or the file is malformed.
     """
     return CONDITIONS.load(name_or_path)
 
 
 def as_dispersion(dispersion: Dispersion | str) -> Dispersion:
-    """The conditions, of themselves or of what `load_dispersion` takes. Raises SpecError as that does."""
+    """Return the conditions, loaded where a name or path is given. Raise SpecError as `load_dispersion`."""
     return load_dispersion(dispersion) if isinstance(dispersion, str) else dispersion
 
 
 @validated
 def write_dispersion(dispersion: Dispersion | str, path: PathName) -> None:
-    """Write conditions as TOML, whole or not at all. Raises SpecError when the file cannot be written."""
+    """Write conditions as TOML, completely or not at all. Raise SpecError if the file cannot be written."""
     write_document(path, to_table(as_dispersion(dispersion)))

@@ -1,4 +1,4 @@
-"""Sensors as their data sheets give them: an inertial measurement unit, motion capture of two systems."""
+"""Sensors with the numbers of data sheets: an inertial measurement unit, and motion capture."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ _DAMPING = 0.8  # [-] damping ratio of all poles
 # turned vehicles by 30° within a flip; twice as much was no better (lab book)
 _YAW_SHARE = 0.04
 _INTEGRAL = 8.0  # [1/s] largest ratio of the integral gain to the proportional gain
-_INTEGRAL_SHARE = 0.125  # [-] largest ratio of that to the proportional gain, which keeps the loop damped
+_INTEGRAL_SHARE = 0.125  # [-] limit of that ratio over the proportional gain, which keeps the loop damped
 # [s] smallest rotor lag in the design: with faster rotors the loop's own delays dominate
 _SHORTEST_LAG = 0.01
 _MAX_INTEGRAL = 0.25  # [rad] limit of the integral of the rate error, per axis
@@ -142,8 +142,7 @@ def times(a: Vector, b: Vector) -> Vector:
 
 
 def _mixed(ops: Ops, model: RateLoopModel, load: RotorWrench) -> Commands:
-    """Return commands within limits: moments scaled to fit, then the collective thrust shifted to fit. : [-]
-    limit of that ratio as a fraction of the proportional gain, which keeps the loop damped"""
+    """Return commands within limits: moments scaled to fit, then collective thrust shifted to fit."""
     rotors = model.airframe.rotors
     turning = mix(model.mixer, load._replace(thrust=0.0))
     high, low = reduce(ops.minimum, rotors.max_thrust), reduce(ops.maximum, rotors.min_thrust)

@@ -111,9 +111,9 @@ def collective(mass: Scalar, gamma: Sequence[Vector], omega: Vector) -> tuple[Sc
 def frame_spin(
     thrust: tuple[Scalar, Vector], alpha: tuple[Vector, Vector], body: Axes, yaw_rate: Scalar = 0.0
 ) -> Scalar:
-    """Return the rate [rad/s] at which axes on the mean-drag thrust turn about it beside a body.
+    """Return the rate [rad/s] at which the given axes turn about the mean-drag thrust, relative to a body.
 
-    Those axes are x, y and z here, z along the mean-drag specific thrust, and b1 stays across y.
+    The axes are x, y and z, with z along the mean-drag specific thrust, and b1 stays normal to y.
 
     Args:
         thrust: Norm of the mean-drag specific thrust, and its derivative.

@@ -1,4 +1,4 @@
-"""Kernels as machine code, compiled by LLVM in a moment; see DERIVATION.md."""
+"""Kernels as machine code, compiled by LLVM; see DERIVATION.md."""
 
 from aerobat.engines.llvm.engine import ENGINE
 

@@ -1,4 +1,4 @@
-"""Numbers, vectors with a lane for each vehicle, and the exponential spelt out in plain operations."""
+"""LLVM types, vectors with a lane for each vehicle, and the exponential in plain operations."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ INTEGER = ir.IntType(64)
 CODE = ir.IntType(16)
 
 LOG2_E = 1.4426950408889634
-LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)  # the first ends in zeros: k · LN2[0] is exact
-ROUND_TO_INTEGER = 6755399441055744.0  # 1.5 · 2^52 leaves no room for a fraction beside it
-EXP_RANGE = (-708.0, 709.0)  # where the exponential is a normal number
-EXP_COEFFICIENTS = [1.0 / factorial(k) for k in range(14)]  # of the exponential: enough for |x| ≤ ln 2 / 2
-BIAS, MANTISSA = 1023, 52  # of a float64's exponent; its bits below that
+# ln 2 in two parts; the first ends in zero bits, so that k · LN2[0] is exact
+LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
+ROUND_TO_INTEGER = 6755399441055744.0  # 1.5 · 2^52: adding it leaves no bits for a fraction
+EXP_RANGE = (-708.0, 709.0)  # range in which the exponential is a normal number
+# series of the exponential, exact to rounding for |x| ≤ ln 2 / 2
+EXP_COEFFICIENTS = [1.0 / factorial(k) for k in range(14)]
+BIAS, MANTISSA = 1023, 52  # bias of a float64's exponent, and the number of mantissa bits
 
 
 def exponential(builder: ir.IRBuilder, x: Any) -> Any:
-    """e^x = 2^k e^r with k the integer nearest to x / ln 2: a series for e^r, the bits of 2^k."""
+    """Return e^x = 2^k e^r with k the integer nearest to x / ln 2: a series for e^r, the bits of 2^k."""
     b, like = builder, x.type
 
     def c(value: float) -> Any:
@@ -41,10 +43,10 @@ def exponential(builder: ir.IRBuilder, x: Any) -> Any:
 
 
 def shaped(like: Any, type_: Any) -> Any:
-    """A type in as many lanes as another."""
+    """Return a type with as many lanes as another."""
     return ir.VectorType(type_, like.count) if isinstance(like, ir.VectorType) else type_
 
 
 def filled(type_: Any, constant: Any) -> Any:
-    """A constant in every lane of a type."""
+    """Return a constant in every lane of a type."""
     return ir.Constant(type_, [constant] * type_.count) if isinstance(type_, ir.VectorType) else constant

@@ -1,10 +1,11 @@
-"""A loop in LLVM's intermediate language: all ticks of all vehicles, a few of them side by side.
+"""Code generation: a loop in LLVM's intermediate language, over all ticks of all vehicles.
 
-DERIVATION.md, beside this file, says what is computed where and why the bits are always the same.
+DERIVATION.md, beside this file, explains what is computed where, and why the results are bitwise
+reproducible.
 
-A value is one number for all vehicles or, where they differ, a vector with a lane for each of `width`
-vehicles. No operation is fused with another or reordered, and the exponential is spelt out, so that neither
-the machine, nor the width, nor the size of a batch changes a bit of what comes out.
+A value is one number for all vehicles or, where vehicles differ, a vector with a lane for each of `width`
+vehicles. No operation is fused or reordered, and the exponential is written out in plain operations.
+Therefore neither the machine, nor the width, nor the size of a batch changes a bit of the results.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ from aerobat.engines.tracing import Operation
 
 
 def module(loop: TracedLoop, layout: Layout) -> str:
-    """The text of a module whose functions `init` and `scan` take the addresses of ARRAYS, and COUNTS."""
+    """Return the text of a module with the functions `init` and `scan`.
+
+    Their arguments are the addresses of ARRAYS, and COUNTS.
+    """
     whole = ir.Module("aerobat")
     arguments = [ir.PointerType()] * len(ARRAYS) + [INTEGER] * len(COUNTS)
     signature = ir.FunctionType(ir.VoidType(), arguments)
@@ -35,19 +39,20 @@ def module(loop: TracedLoop, layout: Layout) -> str:
 
 
 class _Codegen:
-    """Writes one function."""
+    """Generator of one function."""
 
     def __init__(self, loop: TracedLoop, layout: Layout, function: ir.Function) -> None:
         self._loop = loop
         self._layout = layout
         self._arguments = dict(zip((*ARRAYS, *COUNTS), function.args, strict=True))
         self._builder = ir.IRBuilder(function.append_basic_block())
-        self._values: dict[int, Any] = {}  # by their numbers in the trace
-        self._unloaded: dict[int, tuple[Any, Any, int | None]] = {}  # address, type and alignment of others
+        self._values: dict[int, Any] = {}  # values by their numbers in the trace
+        # address, type and alignment of values that are not loaded yet
+        self._unloaded: dict[int, tuple[Any, Any, int | None]] = {}
         self._widened: dict[Any, Any] = {}
 
     def emit_init(self) -> None:
-        """The first carry of each block of lanes, one after another."""
+        """Emit the first carry of each block of lanes, one block after another."""
         loop = self._loop
         with self._blocks() as lane:
             self._load_parameters(lane)
@@ -57,7 +62,7 @@ class _Codegen:
         self._builder.ret_void()
 
     def emit_scan(self) -> None:
-        """Blocks of lanes, one after another, each through all ticks."""
+        """Emit blocks of lanes, one after another, each through all ticks."""
         b, loop = self._builder, self._loop
         with self._blocks() as lane:
             self._load_parameters(lane)
@@ -92,7 +97,7 @@ class _Codegen:
             self._builder.store(value, carry[now])
 
     def _refresh(self, piecewise_constant: Sequence[int], invariant: Sequence[int], tick: Any) -> None:
-        """The loop-invariant values, computed anew at the first tick and when a constant input changes."""
+        """Recompute the loop-invariant values at the first tick and after changes of their inputs."""
         b = self._builder
         columns = self._layout.shared_columns
         shared = compress(self._loop.inputs, self._layout.shared_inputs)
@@ -102,15 +107,15 @@ class _Codegen:
         before = b.select(begins, tick, b.sub(tick, INTEGER(1)))
         for number in piecewise_constant:
             address = self._address("shared inputs", before, columns, column[number], None)
-            was = b.load(address, typ=INTEGER, align=8)  # bits: 0.0 and -0.0 are equal
+            was = b.load(address, typ=INTEGER, align=8)  # as bits, because 0.0 and -0.0 compare equal
             changed = b.or_(changed, b.icmp_signed("!=", b.bitcast(self._value(number), INTEGER), was))
         with self._where(changed, invariant):
             self._compute(invariant)
 
     def _compute_guarded(self, numbers: Sequence[int], carry: Mapping[int, Any]) -> set[int]:
-        """Values of a tick, those that only shared conditions ask for where these hold.
+        """Compute the values of a tick; those guarded by a shared condition only where it holds.
 
-        Returns the parts of the carry that are stored there already.
+        Returns the parts of the carry that are already stored there.
         """
         loop = self._loop
         blocks = loop.guarded_blocks(numbers, compress(loop.inputs, self._layout.shared_inputs))
@@ -134,17 +139,17 @@ class _Codegen:
 
     @contextmanager
     def _where(self, condition: Any, kept: Sequence[int]) -> Iterator[None]:
-        """Context of code that runs where a condition holds; some values are kept from tick to tick."""
+        """Context of code that runs where a condition holds; `kept` values are kept from tick to tick."""
         b, widened, values, slots = self._builder, dict(self._widened), dict(self._values), {}
         with b.if_then(condition):
             yield
             for number in kept:
                 slots[number] = self._slot(self._values[number])
-        self._widened, self._values = widened, values  # what was made in there is not known out here
+        self._widened, self._values = widened, values  # values made inside are not defined outside
         self._unloaded |= {number: (slot, slot.allocated_type, None) for number, slot in slots.items()}
 
     def _log(self, tick: Any, lane: Any) -> None:
-        """Store the outputs, if it is time to, true and false as 1 and 0."""
+        """Store the outputs at logged ticks, with true and false as 1 and 0."""
         b, stride = self._builder, self._arguments["log_stride"]
         outputs = self._wide(self._loop.outputs)
         last = b.icmp_signed("==", b.add(tick, INTEGER(1)), self._arguments["ticks"])
@@ -156,7 +161,7 @@ class _Codegen:
                 b.store(self._as_number(value), address, align=8)
 
     def _store_carry(self, values: Sequence[Any], lane: Any) -> None:
-        """Wide values into the next carry, true and false as 1 and 0."""
+        """Store wide values into the next carry, with true and false as 1 and 0."""
         for column, value in enumerate(values):
             address = self._block_address("next carry", len(values), column, lane)
             self._builder.store(self._as_number(value), address, align=8)
@@ -174,7 +179,7 @@ class _Codegen:
                 self._values[number] = self._apply(operation, arguments)
 
     def _apply(self, operation: Operation, arguments: Sequence[Any]) -> Any:
-        """The result of an operation on arguments that are all wide, or none."""
+        """Return the result of an operation on arguments that are all wide or all scalar."""
         b = self._builder
         match operation.name, arguments:
             case "add", (x, y):
@@ -211,7 +216,7 @@ class _Codegen:
         return self._builder.module.declare_intrinsic(f"llvm.sqrt.{suffix}", (), signature)
 
     def _load_parameters(self, lane: Any) -> None:
-        """The parameters, to be loaded where they are needed first."""
+        """Register the parameters, to be loaded where they are first needed."""
         flags = self._layout.shared_parameters
         counts = {True: sum(flags), False: len(flags) - sum(flags)}
         columns = {True: count(), False: count()}
@@ -225,7 +230,7 @@ class _Codegen:
                 self._unloaded[number] = (address, self._wide_type(NUMBER), 8)
 
     def _load_inputs(self, tick: Any, lane: Any) -> None:
-        """One tick's inputs, to be loaded where they are needed first."""
+        """Register the inputs of one tick, to be loaded where they are first needed."""
         layout = self._layout
         rows = {kind: self._row(kind, tick, lane) for kind in {*layout.inputs} if not kind.shared}
         columns: dict[InputKind | str, Iterator[int]] = defaultdict(count)
@@ -242,7 +247,7 @@ class _Codegen:
             self._unloaded[number] = (address, self._wide_type(element), 2 if kind.coded else 8)
 
     def _row(self, kind: InputKind, tick: Any, lane: Any) -> tuple[str, Any]:
-        """The array of a kind of inputs, and the place of its first one at a tick, in a block of lanes."""
+        """Return the array of a kind of inputs, and the index of its first entry in a block at a tick."""
         b, layout = self._builder, self._layout
         array = "codes" if kind.coded else "inputs"
         if kind.held is None:
@@ -257,7 +262,7 @@ class _Codegen:
         return array, b.add(b.mul(lane, block), b.mul(row, INTEGER(layout.width)))
 
     def _address(self, array: str, row: Any, columns: int, column: int, lane: Any | None) -> Any:
-        """Of array[row, column], or of array[row, column, lane]."""
+        """Return the address of array[row, column], or of array[row, column, lane]."""
         b = self._builder
         place = b.add(b.mul(row, INTEGER(columns)), INTEGER(column))
         if lane is not None:
@@ -265,7 +270,7 @@ class _Codegen:
         return b.gep(self._arguments[array], [place], source_etype=NUMBER)
 
     def _block_address(self, array: str, columns: int, column: int, lane: Any) -> Any:
-        """Of array[block, column], its shape (blocks, columns, width)."""
+        """Return the address of array[block, column] in an array (blocks, columns, width)."""
         b = self._builder
         place = b.add(b.mul(lane, INTEGER(columns)), INTEGER(column * self._layout.width))
         return b.gep(self._arguments[array], [place], source_etype=NUMBER)
@@ -287,7 +292,7 @@ class _Codegen:
         b.position_at_end(after)
 
     def _slot(self, value: Any) -> Any:
-        """A place in memory that holds a value to begin with."""
+        """Return a stack slot that is initialized with a value."""
         with self._builder.goto_entry_block():
             slot = self._builder.alloca(value.type)
         self._builder.store(value, slot)
@@ -297,7 +302,7 @@ class _Codegen:
         return [self._widen(self._value(number)) for number in numbers]
 
     def _value(self, number: int) -> Any:
-        """A value that is known, or loaded now."""
+        """Return a value, loaded now if it is not known yet."""
         if number not in self._values:
             address, type_, alignment = self._unloaded[number]
             value = self._builder.load(address, typ=type_, align=alignment)
@@ -305,7 +310,7 @@ class _Codegen:
         return self._values[number]
 
     def _entry(self, code: Any) -> Any:
-        """The table's entry at a place, in each lane."""
+        """Return the table's entry at an index, in each lane."""
         b, place = self._builder, self._builder.zext(code, shaped(code.type, INTEGER))
         if not _is_wide(code):
             return b.load(b.gep(self._arguments["table"], [place], source_etype=NUMBER), typ=NUMBER, align=8)
@@ -318,7 +323,7 @@ class _Codegen:
         return b.call(b.module.declare_intrinsic(name, (), signature), arguments)
 
     def _widen(self, value: Any) -> Any:
-        """A value with a lane for each vehicle."""
+        """Return a value with a lane for each vehicle."""
         width, b = self._layout.width, self._builder
         if _is_wide(value) or width == 1:
             return value
@@ -335,13 +340,13 @@ class _Codegen:
         return ir.VectorType(type_, self._layout.width) if self._layout.width > 1 else type_
 
     def _as_number(self, value: Any) -> Any:
-        """True and false as 1 and 0."""
+        """Return true and false as 1 and 0."""
         if shaped(value.type, LOGICAL) != value.type:
             return value
         return self._builder.uitofp(value, shaped(value.type, NUMBER))
 
     def _as_logical(self, value: Any) -> Any:
-        """1 and 0 as true and false."""
+        """Return 1 and 0 as true and false."""
         return self._builder.fcmp_ordered("!=", value, filled(value.type, NUMBER(0.0)))
 
 

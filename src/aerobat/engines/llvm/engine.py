@@ -1,4 +1,4 @@
-"""Kernels as machine code: traced once, compiled by LLVM in a moment, vehicles side by side on all cores."""
+"""Kernels as machine code: traced once, compiled by LLVM, with vehicles side by side on all cores."""
 
 from __future__ import annotations
 
@@ -32,16 +32,17 @@ from aerobat.engines.llvm.packing import ARRAYS, COUNTS, Layout, PackedInputs, P
 from aerobat.engines.pytree import Tree, piecewise_constant_leaves, tree_leaves, tree_map, tree_unflatten
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
 
-REGISTERS = 2  # of vehicles side by side, so that one need not wait for another's result
-MAX_KEPT = 24_000  # [bytes] that a block of two registers may keep from tick to tick: half of a first cache
-MAX_SCALAR_VEHICLES = 4  # up to which they fly one by one
+REGISTERS = 2  # registers of vehicles side by side, so that one need not wait for another's result
+# [bytes] that a block of two registers may keep from tick to tick: half of a first-level cache
+MAX_KEPT = 24_000
+MAX_SCALAR_VEHICLES = 4  # up to this number, vehicles are simulated one by one
 
 Function = Callable[..., None]
 _UNUSED = np.zeros(0)
 
 
 class MachineLoop(CompiledLoop):
-    """A loop as machine code, for its vehicles' parameters; by default run on all cores."""
+    """A loop as machine code, with its vehicles' parameters; by default run on all cores."""
 
     def __init__(
         self, init: Init, step: Step, parameters: Tree, inputs: Tree, threads: int | None = None
@@ -73,28 +74,28 @@ class MachineLoop(CompiledLoop):
         self._logical_outputs = [i for i, n in enumerate(self._loop.outputs) if self._loop.is_logical(n)]
 
     def init(self, inputs: Tree) -> Tree:
-        """See `CompiledLoop.init`."""
+        """Return the first carry; see `CompiledLoop.init`."""
         after = np.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
         self._run(self._init, self._packing.inputs(inputs, 1), (_UNUSED, after, _UNUSED), 1, 1)
         return self._unpacked(after)
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
-        """See `CompiledLoop.scan`."""
+        """Run some ticks; see `CompiledLoop.scan`."""
         ticks = tick_count(inputs)
         rows = len(logged_ticks(ticks, log_stride))
         after, outputs = self._advanced(carry, self._packing.inputs(inputs, ticks), rows, ticks, log_stride)
         return after, self._row(outputs.transpose(1, 2, 0))
 
     def step(self, carry: Tree, inputs: Tree) -> tuple[Tree, Tree]:
-        """See `CompiledLoop.step`."""
+        """Run one tick; see `CompiledLoop.step`."""
         after, outputs = self._advanced(carry, self._packing.inputs(inputs, 1), 1, 1, 1)
         return after, self._row(outputs[0])
 
     def _advanced(
         self, carry: Tree, inputs: PackedInputs, rows: int, ticks: int, log_stride: int
     ) -> tuple[Tree, Array]:
-        """The next carry, and the outputs (rows, o, vehicles)."""
-        latest, packed = self._latest  # most scans go on from where the last one ended
+        """Return the next carry, and the outputs (rows, o, vehicles)."""
+        latest, packed = self._latest  # most scans continue where the last one ended
         before = packed if carry is latest else self._packing.pad_lanes(tree_leaves(carry))
         after = np.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
         outputs = np.empty((rows, len(self._loop.outputs), self._packing.lanes))
@@ -102,14 +103,14 @@ class MachineLoop(CompiledLoop):
         return self._unpacked(after), outputs[..., : self._packing.vehicles]
 
     def _row(self, series: Array) -> Tree:
-        """Outputs (o, vehicles, ...) as a row's tree."""
+        """Return outputs (o, vehicles, ...) as a row's tree."""
         leaves = list(series)
         for index in self._logical_outputs:
             leaves[index] = leaves[index] != 0.0
         return tree_unflatten(self._loop.row, leaves)
 
     def _unpacked(self, carry: Array) -> Tree:
-        """(blocks, c, width) -> a tree of read-only leaves (vehicles,)."""
+        """Return a carry (blocks, c, width) as a tree of read-only leaves (vehicles,)."""
         carry.flags.writeable = False
         leaves = [read_only(leaf) for leaf in self._packing.unpad_lanes(carry)]
         for index in self._logical:
@@ -121,7 +122,7 @@ class MachineLoop(CompiledLoop):
     def _run(
         self, function: Function, inputs: PackedInputs, arrays: Sequence[Array], ticks: int, log_stride: int
     ) -> None:
-        """All lanes, divided among threads in whole blocks; a thread holds no lock of Python's meanwhile."""
+        """Run all lanes, in whole blocks for each thread; threads do not hold Python's lock meanwhile."""
         arguments = [*self._addresses, *map(address, (*inputs.arrays, *arrays))]
         arguments += [self._packing.lanes, ticks, *inputs.rows, log_stride]
         if len(self._cuts) == 2:
@@ -133,23 +134,23 @@ class MachineLoop(CompiledLoop):
 
 @lru_cache(maxsize=32)
 def _traced(init: Init, step: Step, parameters: Tree, inputs: Tree) -> TracedLoop:
-    """A loop, for bare trees; once for functions that are the same."""
+    """Return the loop for trees without numbers; cached by the functions."""
     return trace_loop(init, step, parameters, inputs)
 
 
 def _bare(tree: Tree) -> Tree:
-    """The tree without its numbers."""
+    """Return the tree without its numbers."""
     return tree_map(lambda leaf: 0, tree)
 
 
 def address(array: Array) -> int:
-    """The place in memory at which an array's values begin, in a third of the time of `array.ctypes`."""
+    """Return the address of an array's values, three times as fast as `array.ctypes`."""
     return int(array.__array_interface__["data"][0])
 
 
 @lru_cache(maxsize=32)
 def machine_code(loop: TracedLoop, layout: Layout) -> tuple[Function, Function]:
-    """`init` and `scan` of a loop as functions of the addresses of ARRAYS, and COUNTS."""
+    """Return `init` and `scan` of a loop as functions of the addresses of ARRAYS, and COUNTS."""
     machine = target_machine()
     code = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     code.add_object_file(llvm.ObjectFileRef.from_data(object_code(loop, layout)))
@@ -157,12 +158,12 @@ def machine_code(loop: TracedLoop, layout: Layout) -> tuple[Function, Function]:
     signature = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(ARRAYS), *[ctypes.c_int64] * len(COUNTS))
     functions: list[Any] = [signature(code.get_function_address(name)) for name in ("init", "scan")]
     for function in functions:
-        function.code = code  # lives as long as what calls it
+        function.code = code  # keeps the code alive as long as its functions
     return functions[0], functions[1]
 
 
 def object_code(loop: TracedLoop, layout: Layout) -> bytes:
-    """Return a loop's object code for the machine that this runs on, compiled or kept from earlier."""
+    """Return a loop's object code for this machine, compiled or from the cache."""
     features = llvm.get_host_cpu_features().flatten()
     versions = f"llvmlite {llvmlite.__version__}, LLVM {llvm.llvm_version_info}"
     machine = f"{llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features}"
@@ -182,7 +183,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def target_machine() -> llvm.TargetMachine:
-    """The machine that this runs on, with all that its processor can do."""
+    """Return this machine as LLVM's target, with all features of its processor."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     return llvm.Target.from_default_triple().create_target_machine(
@@ -191,18 +192,18 @@ def target_machine() -> llvm.TargetMachine:
 
 
 def _width(kept: int) -> int:
-    """The vehicles of a block, each of which keeps so many numbers from tick to tick."""
+    """Return the number of vehicles in a block, each of which keeps `kept` numbers from tick to tick."""
     together = REGISTERS * lanes()
     return together if kept * together * np.float64().nbytes <= MAX_KEPT else lanes()
 
 
 def lanes() -> int:
-    """The numbers of float64 that a register of this processor holds."""
+    """Return the number of float64 values in a register of this processor."""
     return 8 if llvm.get_host_cpu_features().get("avx512f") else 4
 
 
 def _thread_cuts(blocks: int, threads: int, width: int) -> list[int]:
-    """The lanes at which one thread's part ends and the next one's begins."""
+    """Return the lanes at which the parts of the threads begin and end."""
     parts = min(threads, blocks)
     return [width * (blocks * k // parts) for k in range(parts + 1)]
 

@@ -1,7 +1,7 @@
-"""Traces as machine code of many places at once, along several directions from each.
+"""Traced functions as machine code, evaluated at many places at once along several directions each.
 
-It is `scan` of a loop without a carry: places are its vehicles, directions its ticks, and what directions do
-not change is computed once a place.
+A function is the `scan` of a loop without a carry: places are vehicles and directions are ticks. Values that
+do not depend on the direction are computed once for each place.
 """
 
 from __future__ import annotations
@@ -25,24 +25,25 @@ from aerobat.kernels.ops import Ops, Scalar, Vector
 PlaceFunction = Callable[[Array, Array, Array], Array]
 Kernel = Callable[[Ops, Sequence[Scalar], Sequence[Scalar], Sequence[Scalar]], Sequence[Scalar]]
 NO_DIRECTION = np.zeros((1, 0))
-_UNUSED = (None,) * (len(ARRAYS) - 4)  # all but the first three arrays and the last
+_UNUSED = (None,) * (len(ARRAYS) - 4)  # the unused arrays: all but the first three and the last
 
 
 class SmoothFunctions(NamedTuple):
-    """A kernel at places: of shared values (s,), own ones (m, w) and directions (t, d), (t, o, m) each.
+    """A kernel at places: of shared values (s,), own values (m, w) and directions (t, d), (t, o, m) each.
 
-    Own are values that move, then others, and of the curvature weights on what the kernel returns.
+    Own values are the moving values, then the fixed ones and, for the curvature, the weights of the kernel's
+    results.
     """
 
     values: PlaceFunction  # along NO_DIRECTION
-    slopes: PlaceFunction  # along directions of what moves
-    curvature: PlaceFunction  # the change of the weighted sum's slopes by what moves
+    slopes: PlaceFunction  # along directions of the moving values
+    curvature: PlaceFunction  # derivative of the weighted sum's slopes by the moving values
 
 
 def smooth_functions(
     kernel: Kernel, shared: int, moved: int, fixed: int = 0, squares: bool = False
 ) -> SmoothFunctions:
-    """Return a kernel with two derivatives as machine code.
+    """Return a kernel and two derivatives as machine code.
 
     Args:
         kernel: From its arithmetic, shared values, values that move and others of a place to what it returns.
@@ -78,14 +79,14 @@ def smooth_functions(
 
 
 def triples(values: Sequence[Scalar]) -> list[Vector]:
-    """Return values as vectors of three each."""
+    """Return values as vectors of three."""
     return [(values[k], values[k + 1], values[k + 2]) for k in range(0, len(values), 3)]
 
 
 def place_function(
     shared: Sequence[Symbol], own: Sequence[Symbol], directions: Sequence[Symbol], outputs: Sequence[Symbol]
 ) -> PlaceFunction:
-    """Return the function of a trace from shared values (s,), own (m, w) and directions (t, d) to (t, o, m).
+    """Return the traced function of shared (s,), own (m, w) and direction values (t, d), (t, o, m).
 
     Args:
         shared: Inputs that are one number for all places.

@@ -1,4 +1,4 @@
-"""Machine code kept in files: a loop is compiled once on a machine, whichever process asks for it again."""
+"""A cache of machine code in files, so that each loop is compiled only once on a machine."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from pathlib import Path
 from aerobat.errors import SpecError
 from aerobat.storage import read_whole, write_whole
 
-MOST_KEPT = 256  # files; a loop takes 0.1 to 0.3 MB
-MAX_SIZE = 2**24  # [bytes] of a file
+MOST_KEPT = 256  # largest number of files; a loop takes 0.1 to 0.3 MB
+MAX_SIZE = 2**24  # [bytes] largest size of a file
 DIGEST_SIZE = hashlib.sha256().digest_size
 
 
 def kept_code(listing: str, compiled: Callable[[], bytes]) -> bytes:
-    """Return object code that was compiled from the same listing before, or compile it and keep it.
+    """Return cached object code for a listing, or compile it and cache it.
 
-    A folder that cannot be read or written, and a file that was cut short, only cost the time to compile.
+    A folder that cannot be read or written, or a truncated file, only costs the time to compile.
 
     Args:
         listing: All that the code follows from but the compiler's sources, which are taken into account.
@@ -32,7 +32,7 @@ def kept_code(listing: str, compiled: Callable[[], bytes]) -> bytes:
         content = read_whole(path, MAX_SIZE)
         digest, code = content[:DIGEST_SIZE], content[DIGEST_SIZE:]
         if hashlib.sha256(code).digest() == digest:
-            os.utime(path)  # files that are used are kept longest
+            os.utime(path)  # recently used files are kept longest
             return code
     code = compiled()
     with suppress(OSError, SpecError):
@@ -42,7 +42,7 @@ def kept_code(listing: str, compiled: Callable[[], bytes]) -> bytes:
 
 
 def _folder() -> Path:
-    """Return the folder of the user's caches."""
+    """Return the folder of the user's cache."""
     from platformdirs import user_cache_path
 
     return user_cache_path("aerobat", appauthor=False) / "machine-code"
@@ -61,7 +61,7 @@ def _compiler() -> str:
 
 
 def _remove_oldest(folder: Path) -> None:
-    """Leave the files that were used last."""
+    """Remove all but the most recently used files."""
     kept = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime)
     for path in kept[:-MOST_KEPT]:
         path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""The arrays that machine code reads and writes: vehicles in blocks of lanes, side by side."""
+"""Arrays for machine code: vehicles in blocks of lanes, side by side."""
 
 from __future__ import annotations
 
@@ -30,28 +30,29 @@ ARRAYS = (
 )
 COUNTS = ("lanes", "ticks", "held inputs rows", "held codes rows", "log_stride", "begin", "end")
 _NO_TABLE = np.zeros(0)
-_DTYPES = {False: np.float64, True: np.uint16}  # of inputs, by whether they are coded
+_DTYPES = {False: np.float64, True: np.uint16}  # dtypes of inputs, by whether they are coded
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Vehicles side by side, and which parameters and inputs are one number for all.
+    """Arrangement of the vehicles in lanes, and the parameters and inputs that all vehicles share.
 
     Both functions take arrays of float64: shared parameters (s,) and parameters (blocks, p, width); shared
     inputs (ticks, r + h), inputs (blocks, ticks, i, width) and held inputs (blocks, held rows, width); a
     table; carry and next carry (blocks, c, width), and outputs (logged ticks, o, lanes). Arrays of uint16
-    hold the codes of what is `Coded`, shaped as inputs and held inputs are. The last h columns of the shared
-    inputs say where in a block of the held inputs or codes the values of each kind of `Held` begin at a tick.
+    hold the codes of `Coded` inputs, with the shapes of inputs and held inputs. The last h columns of the
+    shared inputs are offsets: where, in a block of held inputs or codes, the values of each kind of `Held`
+    begin at a tick.
 
-    `scan` logs the first tick, each `log_stride` ticks after it, and the last; `init` reads the inputs of one
-    tick and writes the next carry. The lanes `begin` to `end` are run, multiples of the width.
+    `scan` logs the first tick, every `log_stride`-th tick after it, and the last. `init` reads the inputs of
+    one tick and writes the next carry. The lanes `begin` to `end`, multiples of the width, are run.
     """
 
     width: int
     shared_parameters: tuple[bool, ...]
     inputs: tuple[InputKind, ...]
     held_kinds: tuple[InputKind, ...]
-    piecewise_constant: tuple[bool, ...]  # inputs that are shared, and at most ticks the same as before
+    piecewise_constant: tuple[bool, ...]  # shared inputs that at most ticks equal those of the tick before
 
     @cached_property
     def shared_inputs(self) -> tuple[bool, ...]:
@@ -60,29 +61,29 @@ class Layout:
 
     @property
     def shared_columns(self) -> int:
-        """Of the shared inputs."""
+        """The number of columns of the shared inputs."""
         return sum(self.shared_inputs) + len(self.held_kinds)
 
 
 class PackedInputs(NamedTuple):
-    """Inputs of some ticks, in the order of the first arrays and counts of `layout`."""
+    """Inputs of some ticks, in the order of the first arrays and counts of `Layout`."""
 
     arrays: tuple[NDArray[Any], ...]
-    rows: tuple[int, int]  # of a block of lanes: of the held inputs, and of the held codes
+    rows: tuple[int, int]  # rows of a block of lanes: of the held inputs, and of the held codes
 
 
 @dataclass(frozen=True)
 class InputKind:
-    """The place of one of the inputs."""
+    """The storage of an input."""
 
     shared: bool  # one number for all vehicles
-    held: int | None = None  # the `Held` that it stands in
-    coded: bool = False  # it is an entry of the table
+    held: int | None = None  # the index of its `Held`, if any
+    coded: bool = False  # whether it is an entry of the table
 
 
 @dataclass(frozen=True)
 class Packing:
-    """The places of the leaves of a loop's inputs."""
+    """The storage of the leaves of a loop's inputs."""
 
     vehicles: int
     width: int
@@ -90,7 +91,7 @@ class Packing:
 
     @classmethod
     def of(cls, inputs: Tree, vehicles: int, width: int) -> Packing:
-        """The packing of inputs like those of one tick."""
+        """Return the packing for inputs with the structure of these inputs of one tick."""
         helds = count()
 
         def coded(node: Coded) -> Tree:
@@ -107,21 +108,21 @@ class Packing:
 
     @cached_property
     def held_kinds(self) -> tuple[InputKind, ...]:
-        """The kinds of the inputs that are held, of each vehicle's own."""
+        """The kinds of held inputs that differ between vehicles."""
         return tuple(dict.fromkeys(k for k in self.kinds if k.held is not None and not k.shared))
 
     @property
     def blocks(self) -> int:
-        """Blocks of lanes, the last one of them filled up with copies of the last vehicle."""
+        """The number of blocks of lanes; the last block is filled up with copies of the last vehicle."""
         return -(-self.vehicles // self.width)
 
     @property
     def lanes(self) -> int:
-        """Of all blocks."""
+        """The number of lanes of all blocks."""
         return self.blocks * self.width
 
     def inputs(self, inputs: Tree, ticks: int) -> PackedInputs:
-        """Inputs of so many ticks, or without an axis of ticks those of one."""
+        """Return the packed inputs of `ticks` ticks, or of one tick without an axis of ticks."""
         nodes: list[Held] = []
         tables = [_NO_TABLE]
 
@@ -150,14 +151,14 @@ class Packing:
         return PackedInputs((*arrays, tables[-1]), (held[False].shape[1], held[True].shape[1]))
 
     def _told(self, leaves: Sequence[Array], ticks: int, coded: bool = False) -> NDArray[Any]:
-        """What is told at every tick, (blocks, ticks, leaf, width)."""
+        """Return the inputs given at every tick, (blocks, ticks, leaf, width)."""
         chosen = self._of(leaves, InputKind(False, coded=coded))
         packed = np.empty((self.blocks, ticks, len(chosen), self.width), _DTYPES[coded])
         self._fill(packed, chosen)
         return packed
 
     def _held(self, leaves: Sequence[Array]) -> tuple[dict[bool, NDArray[Any]], dict[InputKind, int]]:
-        """What is held as numbers and as codes, (blocks, rows, width), and the row at which a kind begins."""
+        """Return held numbers and codes, (blocks, rows, width), and the first row of each kind."""
         sizes = {False: 0, True: 0}
         begins, chosen = {}, {}
         for kind in self.held_kinds:
@@ -173,27 +174,28 @@ class Packing:
         return packed, begins
 
     def _of(self, leaves: Sequence[Array], kind: InputKind) -> list[Array]:
-        """The leaves (rows, vehicles) of one kind."""
+        """Return the leaves (rows, vehicles) of one kind."""
         chosen = (leaf for leaf, own in zip(leaves, self.kinds, strict=True) if own == kind)
         return [np.reshape(leaf, (-1, self.vehicles)) for leaf in chosen]
 
     def pad_lanes(self, leaves: Sequence[Array]) -> Array:
-        """Leaves (vehicles,) as (blocks, leaf, width)."""
+        """Return leaves (vehicles,) as (blocks, leaf, width)."""
         packed = np.empty((self.blocks, 1, len(leaves), self.width))
         self._fill(packed, [leaf[None] for leaf in leaves])
         return packed[:, 0]
 
     def unpad_lanes(self, packed: Array) -> list[Array]:
-        """The leaves (vehicles,) of (blocks, leaf, width)."""
+        """Return the leaves (vehicles,) of an array (blocks, leaf, width)."""
         leaves = np.empty((packed.shape[1], self.lanes))
         leaves.reshape(-1, self.blocks, self.width)[:] = packed.swapaxes(0, 1)
         return list(leaves[:, : self.vehicles])
 
     def _fill(self, packed: Array, leaves: Sequence[Array]) -> None:
-        """Leaves (rows, vehicles) into an array (blocks, rows, leaf, lane)."""
+        """Copy leaves (rows, vehicles) into an array (blocks, rows, leaf, lane)."""
         whole = self.vehicles // self.width
         full = whole * self.width
-        lanes = np.dtype((np.void, self.width * packed.itemsize))  # are copied as one
+        # all lanes of a block are copied as one item
+        lanes = np.dtype((np.void, self.width * packed.itemsize))
         for index, leaf in enumerate(leaves):
             blocks = np.ascontiguousarray(leaf[:, :full], packed.dtype).view(lanes)
             packed.view(lanes)[:whole, :, index, 0] = blocks.T
@@ -203,5 +205,5 @@ class Packing:
 
 
 def _kind(leaf: Any) -> InputKind:
-    """The kind of one tick's leaf, or that which stands in its place."""
+    """Return the kind of a leaf of one tick, or the kind that replaces it."""
     return leaf if isinstance(leaf, InputKind) else InputKind(shared=np.ndim(leaf) == 0)

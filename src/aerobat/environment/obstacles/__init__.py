@@ -1,4 +1,4 @@
-"""Obstacles in the world: declared shapes, each made of convex pieces, and how far a body is from them."""
+"""Obstacles in the world: declared shapes made of convex pieces, and the distance of a body from them."""
 
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.obstacle import OBSTACLES, Obstacle, obstacle

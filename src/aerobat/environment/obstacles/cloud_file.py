@@ -17,9 +17,9 @@ MAX_FILE = 2**28  # bytes: ten million points
 
 
 def read_values(path: str) -> NDArray[Any]:
-    """Return what a file holds: the cells of a grid, or points (n, 3).
+    """Return the content of a file: the cells of a grid, or points (n, 3).
 
-    Raises FieldError, about the whole of a field, for a file that holds neither.
+    FieldError, about a whole field, is raised for a file that holds neither.
     """
     content = read_named_file(path, MAX_FILE)
     suffix = Path(path).suffix.lower()
@@ -31,14 +31,14 @@ def read_values(path: str) -> NDArray[Any]:
         return _points(path)
     except FieldError:
         raise
-    except Exception as error:  # a parser of foreign formats raises whatever it meets
+    except Exception as error:  # a parser of foreign formats may raise anything
         raise FieldError(
             "", f": {path} is no whole {suffix} file of numbers ({error}); save it again"
         ) from None
 
 
 def _points(path: str) -> NDArray[Any]:
-    """The points of a .ply file, (n, 3)."""
+    """Return the points of a .ply file, (n, 3)."""
     scene = required_trimesh().load_scene(str(beside_document(path)), file_type="ply")
     clouds = [np.asarray(each.vertices) for each in scene.dump()]
     return np.concatenate([*clouds, np.zeros((0, 3))])

@@ -28,9 +28,10 @@ from aerobat.environment.obstacles.cloud_file import read_values
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.obstacle import Obstacle, obstacle
 
-MAX_BOXES = 10_000  # more take minutes to plan around
-FARTHEST = 2**31  # cells from the origin
-UPPER = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])  # of a box's corners
+MAX_BOXES = 10_000  # limit of boxes; more take minutes to plan around
+FARTHEST = 2**31  # largest distance from the origin, in cells
+# which coordinates of a box's corners are the upper ones
+UPPER = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 
 
 def _boxes(value: Any) -> Array:
@@ -49,7 +50,7 @@ Boxes = Annotated[Array, PlainValidator(_boxes), Field(description="six whole nu
 
 
 def _numbers(values: Any) -> NDArray[Any]:
-    """The values as an array. Raises FieldError where they are none."""
+    """Return the values as an array. Raise FieldError for anything but numbers."""
     try:
         given = np.asarray(values)
     except ValueError:  # ragged
@@ -63,7 +64,7 @@ def _numbers(values: Any) -> NDArray[Any]:
 def occupied_boxes(
     values: Any, cell: Positive = 1.0, origin: VectorLike = (0.0, 0.0, 0.0)
 ) -> NDArray[np.int64]:
-    """Return the boxes that are exactly the occupied cells of a grid, (n, 6).
+    """Return boxes that cover exactly the occupied cells of a grid, (n, 6).
 
     A box is x, y, z of its first cell, and of the cell after its last. Cells are merged along x, then along
     y, then along z.
@@ -92,7 +93,7 @@ def occupied_boxes(
 
 
 def _merged(boxes: NDArray[np.int64], axis: int) -> NDArray[np.int64]:
-    """The boxes with those made one that touch along an axis and are alike otherwise."""
+    """Return the boxes, merged where they touch along an axis and are equal otherwise."""
     others = [column for column in range(6) if column % 3 != axis]
     order = np.lexsort([boxes[:, axis], *boxes[:, others].T])
     boxes = boxes[order]
@@ -144,7 +145,7 @@ class Grid(Obstacle):
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write whole numbers as such."""
+        """Convert the boxes to whole numbers."""
         return table | {"boxes": self.boxes.astype(int).tolist()}
 
     @property

@@ -61,12 +61,12 @@ class Mesh(Obstacle):
         return table
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Raise FieldError for a mesh without parts."""
         if not self.parts:
             raise FieldError("parts", "must be one part or more")
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """The parts."""
+        """The parts, in the world."""
         axes = axes_of(self.heading, self.elevation, self.tilt)
         return tuple(ConvexPiece(self.position + part @ axes.T, name=self.name) for part in self.parts)

@@ -1,7 +1,7 @@
 """Mesh files as convex parts: STL, OBJ, PLY, glTF, read by trimesh.
 
-A connected part of the file that is convex is a part as it stands. One that is not is cut by CoACD, whose
-parts together cover it but for its threshold, relative to the part's size.
+Each convex connected part of the file is used unchanged. A part that is not convex is decomposed by CoACD.
+The decomposition covers the part up to CoACD's threshold, relative to the part's size.
 """
 
 from __future__ import annotations
@@ -17,17 +17,18 @@ from aerobat.documents import beside_document, read_named_file
 
 MAX_FILE = 2**26  # bytes: a million triangles
 MAX_PARTS = 1000
-Y_UP = {".glb", ".gltf"}  # the format says so; other formats' files are taken to have z up
+# formats with y up by their standard; files of other formats are assumed to have z up
+Y_UP = {".glb", ".gltf"}
 CONCAVITY = 0.05  # CoACD's threshold, its own default
 FORMATS = (".stl", ".obj", ".ply", ".glb", ".gltf")
 
 
 @validated
 def mesh_parts(path: PathName, scale: Positive = 1.0) -> tuple[Array, ...]:
-    """Return the corners of the convex parts of a mesh file [m], in the file's own axes, z up, (n, 3) each.
+    """Return the corners of the convex parts of a mesh file [m], in the file's axes, z up, (n, 3) each.
 
-    Raises SpecError, one sentence, for a file that cannot be read or is not closed, and where trimesh is not
-    installed, or CoACD for what is not convex.
+    SpecError is raised for a file that cannot be read or is not closed, and where trimesh is not installed,
+    or CoACD for parts that are not convex.
 
     Args:
         path: An STL, OBJ, PLY, GLB or glTF file. A problem's file counts it from its own folder.
@@ -36,7 +37,7 @@ def mesh_parts(path: PathName, scale: Positive = 1.0) -> tuple[Array, ...]:
     suffix = beside_document(path).suffix.lower()
     if suffix not in FORMATS:
         raise FieldError("", f": a mesh ends in {', '.join(FORMATS)}, got {path}; convert it")
-    read_named_file(path, MAX_FILE)  # which refuses what cannot be read
+    read_named_file(path, MAX_FILE)  # raises SpecError for unreadable files
     parts = [part for body in _bodies(path, suffix) for part in _convex_parts(path, body)]
     if not parts or len(parts) > MAX_PARTS:
         raise FieldError(
@@ -47,7 +48,7 @@ def mesh_parts(path: PathName, scale: Positive = 1.0) -> tuple[Array, ...]:
 
 
 def _bodies(path: PathName, suffix: str) -> list[Any]:
-    """The connected parts of a file, each a closed mesh of trimesh."""
+    """Return the connected parts of a file, each a closed mesh of trimesh."""
     trimesh = required_trimesh()
     bodies: list[Any] = []
     try:
@@ -56,7 +57,7 @@ def _bodies(path: PathName, suffix: str) -> list[Any]:
             if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
                 mesh.merge_vertices(merge_tex=True, merge_norm=True)
                 bodies += mesh.split(only_watertight=False) if mesh.is_watertight else [None]
-    except Exception as error:  # a parser of foreign formats raises whatever it meets
+    except Exception as error:  # a parser of foreign formats may raise anything
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FieldError("", f": {path} is no mesh that trimesh reads ({reason}); export it anew") from None
     if None in bodies:
@@ -65,7 +66,7 @@ def _bodies(path: PathName, suffix: str) -> list[Any]:
 
 
 def _convex_parts(path: PathName, body: Any) -> list[Array]:
-    """The corners of a connected mesh, of its parts where it is not convex."""
+    """Return the corners of a connected mesh, or of its parts where it is not convex."""
     if body.is_convex:
         return [np.array(body.convex_hull.vertices)]
     try:
@@ -79,7 +80,7 @@ def _convex_parts(path: PathName, body: Any) -> list[Array]:
 
 
 def required_trimesh() -> Any:
-    """Return the module trimesh. Raises FieldError where it is not installed."""
+    """Return the module trimesh. Raise FieldError where it is not installed."""
     try:
         import trimesh
     except ImportError:

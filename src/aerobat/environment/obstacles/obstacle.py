@@ -36,7 +36,7 @@ class Obstacle(ABC):
 
     @property
     def motion(self) -> ObstacleMotion | None:
-        """The motion; None for what stands still."""
+        """The motion; None for an obstacle at rest."""
         return ObstacleMotion.of(self.velocity, self.path)
 
 

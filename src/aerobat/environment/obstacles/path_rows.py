@@ -1,4 +1,4 @@
-"""Paths of obstacles that move, as rows or as the CSV files that hold them."""
+"""Paths of moving obstacles, given as rows or as CSV files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COLUMNS = ["t", "x", "y", "z"]
 
 
 def rows_of_path(value: Any) -> Array:
-    """Return the rows of an obstacle's path, (k, 4), of a value or of the CSV file that it names."""
+    """Return the rows of an obstacle's path, (k, 4), from a value or from the CSV file that it names."""
     path = _rows_of_file(value) if isinstance(value, str) else value
     if not hasattr(path, "__len__"):
         raise FieldError("", f"must be a CSV file's name or rows of t, x, y, z, got {shown(value)}")

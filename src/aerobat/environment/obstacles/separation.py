@@ -1,14 +1,14 @@
-"""The distance of an ellipsoid from convex pieces, by the plane that separates them best.
+"""The distance between an ellipsoid and convex pieces, by the plane that separates them best.
 
-A body with centre c that is all c + L y with |y| ≤ 1 reaches |Lᵀ n| against a unit vector n. The gap between
-it and a piece across planes with the normal n is φ(n) = n·c − |Lᵀ n| − h(n), with the piece's support h. Its
-maximum over all n is the distance, where that is positive; where body and piece overlap it is how far they
-have to be moved apart, negative. The gap of any n is a lower bound of the distance, however n was found.
+A body with centre c and points c + L y, |y| ≤ 1, extends by |Lᵀ n| against a unit vector n. The gap between
+the body and a piece across planes with the normal n is φ(n) = n·c − |Lᵀ n| − h(n), with the piece's support
+h. Where the maximum over all n is positive, it is the distance. Where body and piece overlap, it is negative:
+minus the penetration depth. The gap for any n is a lower bound of the distance.
 
-It is found by Newton's method on the sphere. The hull's kinks stay: across n, the gap is modelled as the
-least of some planes, one a point of the hull that nearly touches, less a paraboloid of both roundings. The
-best of such a model is where one, two or three of its planes meet. Where the normals of the hull's own faces
-have a larger gap, the search begins there.
+The maximum is found by Newton's method on the sphere. The kinks of the hull are kept in the model: near n,
+the gap is the minimum of some planes, one for each point of the hull that nearly touches, minus a paraboloid
+for the curvature of the two roundings. The maximum of the model is where one, two or three of its planes
+meet. Where the normals of the hull's own faces have a larger gap, the search starts there.
 """
 
 from __future__ import annotations
@@ -24,31 +24,32 @@ import numpy as np
 from aerobat.arrays import Array, Indices, Mask
 from aerobat.environment.obstacles.convex_piece import TINY, ConvexPiece, ObstacleMotion, units
 
-STEPS = 40  # of Newton's method at most; most pairs take five
-ENOUGH = 1e-11  # [m] a step that gains less is the last
-LOWEST = 4  # points of a hull that a step looks at first: as many as touch a plane in a box's side
-ADDED = 3  # that the best of those leaves in the way, of hulls that have more
-SOFT = 1e-4  # [m] of a length whose slope jumps where it vanishes
+STEPS = 40  # limit of Newton steps; most pairs take five
+ENOUGH = 1e-11  # [m] gain below which a step is the last
+LOWEST = 4  # points of a hull in the first model: as many as touch a plane along a box's side
+ADDED = 3  # points added to the model, one by one, for hulls with more points
+SOFT = 1e-4  # [m] smoothing of lengths, whose slopes jump at zero
 LONGEST_STEP = 0.5  # [rad]
-PARTS = np.array([0.0, 1.0, 0.5, 0.25, 0.1, 0.02])  # of a step that are tried
-LEAST_BEND = 0.01  # [m] of a gap's bend on the sphere, also where bodies overlap
+PARTS = np.array([0.0, 1.0, 0.5, 0.25, 0.1, 0.02])  # fractions of a step that are tried
+LEAST_BEND = 0.01  # [m] smallest curvature of a gap on the sphere in the model, also where bodies overlap
 VANISHING = 1e-30  # [m²]
 
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """Planes between bodies and pieces, a pair a row."""
+    """Planes between bodies and pieces, one row for each pair."""
 
     normals: Array  # unit vectors from the piece to the body, (m, 3)
-    offsets: Array  # [m] of the plane along them that touches the piece where that is at first, h(n), (m,)
+    # [m] h(n): offset along the normal of the plane that touches the piece at its initial place, (m,)
+    offsets: Array
     gaps: Array  # [m] between body and piece across the plane, (m,)
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """All convex pieces of a world, as arrays.
+    """All convex pieces of an environment, as arrays.
 
-    Where times [s] are given pieces are where they are then, else where they are at first.
+    With times [s], pieces are at their places at these times, else at their initial places.
     """
 
     pieces: tuple[ConvexPiece, ...]
@@ -63,11 +64,11 @@ class Pieces:
 
     @cached_property
     def moving(self) -> tuple[tuple[int, ObstacleMotion], ...]:
-        """The numbers and motions of those that move."""
+        """The indices and motions of the moving pieces."""
         return tuple((k, piece.motion) for k, piece in enumerate(self.pieces) if piece.motion is not None)
 
     def moved(self, pieces: Indices, times: Array) -> Array:
-        """Return how far pieces (m,) have moved [m] at times (m, ...), (m, ..., 3)."""
+        """Return the displacements [m] of pieces (m,) at times (m, ...), (m, ..., 3)."""
         found = np.zeros((*times.shape, 3))
         for number, motion in self.moving:
             own = np.broadcast_to(pieces.reshape(-1, *[1] * (times.ndim - 1)) == number, times.shape)
@@ -77,7 +78,7 @@ class Pieces:
     def near(
         self, centres: Array, reach: float, within: float, times: Array | None = None
     ) -> tuple[Indices, Indices]:
-        """Return the pairs of bodies and pieces that may be near, as numbers of bodies and of pieces.
+        """Return the pairs of bodies and pieces that may be near, as indices of bodies and of pieces.
 
         Args:
             centres: Of the bodies [m], (m, 3).
@@ -90,7 +91,7 @@ class Pieces:
         return bodies, pieces
 
     def apart(self, lower: Array, upper: Array, over: tuple[Array, Array] | None = None) -> Array:
-        """Return how far boxes are at least from all pieces [m]: from the boxes around these.
+        """Return lower bounds of the distances between boxes and all pieces [m], from the pieces' boxes.
 
         Args:
             lower: Lower corners [m], (..., 3).
@@ -104,7 +105,7 @@ class Pieces:
         if over is not None and self.moving:
             own_lower, own_upper = self._boxes_over(*over, lower.shape[:-1])
         squares: Array = np.zeros((*lower.shape[:-1], len(self)))
-        for k in range(3):  # which is faster than a last axis of three
+        for k in range(3):  # faster than a last axis of three
             between = np.maximum(
                 own_lower[..., k] - upper[..., None, k], lower[..., None, k] - own_upper[..., k]
             )
@@ -112,7 +113,7 @@ class Pieces:
         return np.sqrt(squares)
 
     def holding(self, point: Array) -> ConvexPiece | None:
-        """Return a piece that a point [m] (3,) lies in; None where it lies in none."""
+        """Return a piece that contains a point [m] (3,), or None."""
         _, pieces = self.near(point[None], 0.0, TINY)
         count = len(pieces)
         found = self.separated(pieces, np.tile(point, (count, 1)), np.zeros((count, 3, 3)))
@@ -120,7 +121,7 @@ class Pieces:
         return self.pieces[inside[0]] if len(inside) else None
 
     def _boxes_over(self, begin: Array, end: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
-        """The corners of the boxes around all pieces over times (...), (..., P, 3) each."""
+        """Return the corners of the boxes around all pieces over times (...), (..., P, 3) each."""
         lower, upper = (np.broadcast_to(each, (*shape, *each.shape)).copy() for each in self._boxes)
         for number, motion in self.moving:
             least, most = motion.reach(begin, end)
@@ -136,7 +137,7 @@ class Pieces:
         exact_within: float = inf,
         times: Array | None = None,
     ) -> Separation:
-        """Separate bodies from pieces, pair by pair; planes are where pieces are at first.
+        """Separate bodies from pieces, pair by pair; planes refer to the pieces' initial places.
 
         Args:
             pieces: The number of each pair's piece, (m,).
@@ -177,12 +178,12 @@ class Pieces:
 
     @cached_property
     def largest(self) -> float:
-        """The largest magnitude of any piece's coordinates [m], at most: what rounding is a part of."""
+        """The largest magnitude of any piece's coordinates [m], for bounds of rounding errors."""
         return float(np.abs(self._boxes).max(initial=0.0))
 
     @cached_property
     def _points(self) -> Array:
-        """The points of every piece, the first of them repeated where it has fewer than others, (P, V, 3)."""
+        """The points of every piece, padded with the first point, (P, V, 3)."""
         return _padded([piece.points for piece in self.pieces])
 
     @cached_property
@@ -198,7 +199,7 @@ class Pieces:
 
 @dataclass(frozen=True, eq=False)
 class _Pairs:
-    """Bodies and pieces: from the piece's points to the body's centre, and both roundings."""
+    """Bodies and pieces: vectors from the piece's points to the body's centre, and both roundings."""
 
     offsets: Array  # c − v [m], (m, V, 3)
     roundings: Array  # L of the pieces [m], (m, 3, 3)
@@ -208,17 +209,17 @@ class _Pairs:
         return _Pairs(self.offsets[rows], self.roundings[rows], self.shapes[rows])
 
     def gaps(self, normals: Array) -> Array:
-        """The gaps [m] across planes with these normals, (m, k, 3) -> (m, k)."""
+        """Return the gaps [m] across planes with these normals, (m, k, 3) -> (m, k)."""
         nearest = (normals @ np.swapaxes(self.offsets, 1, 2)).min(axis=-1)
         rounded = np.linalg.norm(normals @ self.roundings, axis=-1)
         return np.asarray(nearest - rounded - np.linalg.norm(normals @ self.shapes, axis=-1))
 
     def extents(self, normals: Array) -> Array:
-        """The lengths [m] to which bodies reach against normals, (m, 3) -> (m,)."""
+        """Return the extents [m] of bodies against normals, (m, 3) -> (m,)."""
         return np.asarray(np.linalg.norm(_times(np.swapaxes(self.shapes, 1, 2), normals), axis=-1))
 
     def refined(self, normals: Array) -> Array:
-        """The normals across which the gaps are largest, from some nearby, (m, 3)."""
+        """Return the normals with the largest gaps, starting from these normals, (m, 3)."""
         found, gaps = normals.copy(), self.gaps(normals[:, None])[:, 0]
         rising = np.arange(len(normals))
         for _ in range(STEPS):
@@ -231,7 +232,10 @@ class _Pairs:
         return found
 
     def _improved(self, normals: Array) -> tuple[Array, Array]:
-        """Normals one step later, (m, 3), and their gaps [m], (m,): the best along the way to the model's."""
+        """Return the normals after one step, (m, 3), and their gaps [m], (m,).
+
+        The best of some fractions of the step to the model's maximum is taken.
+        """
         across = _across(normals)
         turns = self._nearby(normals, across).best_turns
         lengths = np.linalg.norm(turns, axis=-1, keepdims=True)
@@ -243,7 +247,7 @@ class _Pairs:
         return tried[rows, best], gaps[rows, best]
 
     def _nearby(self, normals: Array, across: Array) -> _Model:
-        """The gaps near normals, of turns along two directions across each, (m, 2, 3)."""
+        """Return a model of the gaps near normals, for turns along two directions across each, (m, 2, 3)."""
         values, slopes = _times(self.offsets, normals), self.offsets @ np.swapaxes(across, 1, 2)
         bend = np.zeros((len(normals), 2, 2))
         for root in (self.roundings, self.shapes):
@@ -260,7 +264,7 @@ class _Pairs:
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """Gaps near normals: over turns t in two directions the least of all v + s·t, less t·B t / 2."""
+    """A model of gaps near normals: for turns t, the minimum of all v + s·t, minus t·B t / 2."""
 
     values: Array  # v [m], (m, k)
     slopes: Array  # s [m], (m, k, 2)
@@ -268,7 +272,7 @@ class _Model:
 
     @property
     def best_turns(self) -> Array:
-        """The turns [rad] with the largest of these gaps, (m, 2)."""
+        """The turns [rad] that maximize the model, (m, 2)."""
         chosen = np.argsort(self.values, axis=1, kind="stable")[:, :LOWEST]
         turns = self._of(chosen)._best()
         for _ in range(ADDED if self.values.shape[1] > LOWEST else 0):
@@ -278,12 +282,12 @@ class _Model:
         return turns
 
     def _of(self, terms: Indices) -> _Model:
-        """The same of some terms, (m, k)."""
+        """Return the model of some terms, (m, k)."""
         values = np.take_along_axis(self.values, terms, axis=1)
         return _Model(values, np.take_along_axis(self.slopes, terms[..., None], axis=1), self.bend)
 
     def _best(self) -> Array:
-        """The best turns by trying all candidates, (m, 2)."""
+        """Return the best of all candidates, (m, 2)."""
         turns = self._candidates
         planes = (self.values[:, None] + turns @ np.swapaxes(self.slopes, 1, 2)).min(axis=-1)
         gaps = planes - 0.5 * np.sum(turns @ self.bend * turns, axis=-1)
@@ -291,7 +295,7 @@ class _Model:
 
     @property
     def _candidates(self) -> Array:
-        """The best turns where one of the terms is the least, where two are, and three, (m, c, 2)."""
+        """The maxima where one, two or three of the terms are smallest, (m, c, 2)."""
         soft = np.linalg.inv(self.bend)
         free = self.slopes @ soft
         pairs, triples = _choices(self.values.shape[1])
@@ -306,20 +310,20 @@ class _Model:
         return np.concatenate([free, edges, corners / twice[..., None]], axis=1)
 
     def _beyond(self, first: Indices, second: Indices) -> tuple[Array, Array]:
-        """By how much some terms are above others: their values (m, n) and slopes (m, n, 2)."""
+        """Return the differences between terms: of their values (m, n) and slopes (m, n, 2)."""
         return self.values[:, first] - self.values[:, second], self.slopes[:, first] - self.slopes[:, second]
 
 
 @lru_cache
 def _choices(count: int) -> tuple[Indices, Indices]:
-    """All choices of two and of three of so many, (2, n) and (3, n)."""
+    """Return all choices of two and of three indices, (2, n) and (3, n)."""
     numbers = range(count)
     two, three = (np.array(list(combinations(numbers, k)), np.intp).reshape(-1, k).T for k in (2, 3))
     return two, three
 
 
 def _across(normals: Array) -> Array:
-    """Two unit vectors across each normal, (m, 2, 3)."""
+    """Return two unit vectors across each normal, (m, 2, 3)."""
     least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     first = np.cross(normals, least)
     first /= np.linalg.norm(first, axis=-1, keepdims=True)
@@ -327,12 +331,12 @@ def _across(normals: Array) -> Array:
 
 
 def _away_from_zero(values: Array) -> Array:
-    """Values to divide by, those near zero replaced by what makes a quotient nothing."""
+    """Return divisors, with those near zero replaced by a huge number."""
     return np.where(np.abs(values) > VANISHING, values, 1.0 / VANISHING)
 
 
 def _best_of(piece: ConvexPiece, centres: Array, shapes: Array) -> Array:
-    """Of the directions to bodies that a piece knows, those with the largest gap, (m, 3)."""
+    """Return the direction with the largest gap among those known for each piece, (m, 3)."""
     offsets = centres[:, None] - piece.points
     candidates = np.concatenate([piece.normals_toward(centres), units(offsets)], axis=1)
     roundings = np.broadcast_to(piece.rounding, (len(centres), 3, 3))
@@ -341,11 +345,11 @@ def _best_of(piece: ConvexPiece, centres: Array, shapes: Array) -> Array:
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
-    """Matrices (m, k, 3) times vectors (m, 3), (m, k)."""
+    """Return matrices (m, k, 3) times vectors (m, 3), (m, k)."""
     return np.asarray((matrices @ vectors[..., None])[..., 0])
 
 
 def _padded(rows: Sequence[Array]) -> Array:
-    """Arrays (k, 3) of different lengths as one, the first row of each repeated."""
+    """Return arrays (k, 3) of different lengths as one, padded with their first rows."""
     most = max(map(len, rows))
     return np.array([np.concatenate([each, np.repeat(each[:1], most - len(each), axis=0)]) for each in rows])

@@ -16,8 +16,8 @@ from aerobat.environment.obstacles.attitude import ATTITUDE, axes_of
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.obstacle import Obstacle, obstacle
 
-FAR = 1000.0  # [m] a half-space is the box behind its plane that reaches so far
-CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))  # of a box of two by two by two
+FAR = 1000.0  # [m] extent in each direction of the box that represents a half-space
+CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))  # corners of a box of two by two by two
 
 
 def _size(value: Any) -> Array:
@@ -29,7 +29,7 @@ def _size(value: Any) -> Array:
 
 
 def corners_of_solid(value: Any) -> Array:
-    """Return points (n, 3) that span a solid. Raises FieldError for others."""
+    """Return points (n, 3) that span a solid. Raise FieldError for others."""
     count = len(value) if hasattr(value, "__len__") else 0
     points = finite(value, count, 3) if count else np.zeros((0, 3))
     if len(points) < 4 or np.linalg.matrix_rank(points - points[0], 1e-9) < 3:
@@ -61,7 +61,7 @@ class Box(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """The hull of its corners."""
+        """The convex hull of its corners."""
         corners = self.position + (CORNERS * self.size / 2.0) @ self.axes.T
         return (ConvexPiece(corners, name=self.name),)
 
@@ -76,7 +76,7 @@ class Sphere(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """The middle, rounded."""
+        """Its centre, rounded by a ball."""
         return (ConvexPiece(self.position[None], self.radius * np.eye(3), self.name),)
 
 
@@ -91,7 +91,7 @@ class Capsule(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """The line, rounded."""
+        """Its line, rounded by a ball."""
         return (ConvexPiece(np.array([self.start, self.end]), self.radius * np.eye(3), self.name),)
 
 
@@ -105,13 +105,13 @@ class Cylinder(Obstacle):
     name: Label = "cylinder"  # by which findings name it
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Raise FieldError for coinciding ends."""
         if np.linalg.norm(self.end - self.start) < 1e-9:
             raise FieldError("end", "must be another point than start")
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """The axis, rounded by a disc."""
+        """Its axis, rounded by a disc."""
         along = (self.end - self.start) / np.linalg.norm(self.end - self.start)
         disc = self.radius * (np.eye(3) - np.outer(along, along))
         return (ConvexPiece(np.array([self.start, self.end]), disc, self.name),)
@@ -127,7 +127,7 @@ class HalfSpace(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """A box behind the plane, as large as anything that is flown in."""
+        """A box behind the plane, larger than any space that is flown in."""
         turned = so3.axes(so3.smallest_rotation(so3.UP, self.normal))
         corners = (CORNERS - so3.UP) * [FAR, FAR, FAR / 2.0] @ turned.T
         return (ConvexPiece(self.position + corners, name=self.name),)
@@ -142,5 +142,5 @@ class Polytope(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """The hull as it is."""
+        """The hull of its points."""
         return (ConvexPiece(self.points, name=self.name),)

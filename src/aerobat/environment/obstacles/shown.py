@@ -1,7 +1,7 @@
-"""The parts of obstacles that are seen around a path: surfaces of pieces, without what lies in others.
+"""The visible parts of obstacles around a path: surfaces of pieces, without the parts inside other pieces.
 
-Pieces of one obstacle touch and lie over one another, as those of a wall do. Drawn as glass, what two of them
-share would be seen twice.
+Pieces of one obstacle, for instance of a wall, touch and overlap. In transparent pictures, surfaces inside
+other pieces would be visible.
 """
 
 from __future__ import annotations
@@ -15,14 +15,16 @@ from aerobat.arrays import Array
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.surface import Surface, beyond, surface_of
 
-NEAR, WHOLE = 0.25, 0.5  # of the longest side of what is shown: shown from there, whole if it ends there
-ALIKE = 1e-6  # [m] within which faces lie in one plane
-LEAST_AREA = 1e-6  # [m²] of a face
-MANY = 300  # pieces: of more, as of a map, each is drawn as it is
+# fractions of the longest side of the picture: obstacles are cut at the first, or shown whole if they end
+# within the second
+NEAR, WHOLE = 0.25, 0.5
+ALIKE = 1e-6  # [m] distance within which faces are coplanar
+LEAST_AREA = 1e-6  # [m²] smallest area of a face
+MANY = 300  # limit of pieces; with more, as in a map, each is drawn unchanged
 
 
 def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surface, ...]:
-    """Return what is seen of the pieces near points; what reaches far from them is cut off there.
+    """Return the visible surfaces of the pieces near points; distant parts are cut off.
 
     Args:
         pieces: In the world; those that move are whole.
@@ -47,7 +49,7 @@ def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surfa
 
 
 def _apart(pieces: Sequence[ConvexPiece], surfaces: Sequence[Surface]) -> Iterator[Surface]:
-    """The surfaces without what lies in other pieces; a face that two of them share is the first one's."""
+    """Yield the surfaces without the parts inside other pieces; a shared face belongs to the first of two."""
     solids = [_Solid.of(surface) for surface in surfaces]
     boxes = np.array([piece.box for piece in pieces]).reshape(-1, 2, 3)
     for k, surface in enumerate(surfaces):
@@ -66,20 +68,20 @@ def _apart(pieces: Sequence[ConvexPiece], surfaces: Sequence[Surface]) -> Iterat
 
 @dataclass(frozen=True, eq=False)
 class _Solid:
-    """All points with normals · point ≤ levels."""
+    """The set of points with normals · point ≤ levels."""
 
     normals: Array  # (n, 3)
     levels: Array  # [m], (n,)
 
     @classmethod
     def of(cls, surface: Surface) -> _Solid:
-        """The solid within a surface."""
+        """Return the solid inside a surface."""
         normals = np.array([np.cross(face[1] - face[0], face[2] - face[0]) for face in surface.faces])
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         return cls(normals, np.sum(normals * [face[0] for face in surface.faces], axis=1))
 
     def outside(self, corners: Array, grown: float) -> list[Array]:
-        """The parts of a convex polygon, or of a line, outside the solid that is `grown` [m] to all sides."""
+        """Return the parts of a convex polygon or line outside the solid, enlarged by `grown` [m]."""
         heights = corners @ self.normals.T - self.levels - grown
         if (heights >= 0.0).all(axis=0).any():
             return [corners]
@@ -95,7 +97,7 @@ class _Solid:
 
 
 def _is_seen(part: Array, corners: int) -> bool:
-    """True for what is left of a polygon, or of a line, and not only its rim."""
+    """Return True for a remaining part of a polygon or line that is more than its rim."""
     if len(part) < min(corners, 3):
         return False
     if corners == 2:

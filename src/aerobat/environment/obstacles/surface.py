@@ -1,7 +1,7 @@
-"""The surface of a convex piece as flat faces, as pictures, exports and other engines take it.
+"""The surface of a convex piece as flat faces, for pictures, exports and other engines.
 
-Corners and edges of the hull are exact. A rounding is sampled on its ellipsoid, so that faces lie inside what
-is round, by at most `flattening`.
+Corners and edges of the hull are exact. A rounding is sampled on its ellipsoid, so faces lie inside the round
+parts, by at most `flattening`.
 """
 
 from __future__ import annotations
@@ -17,24 +17,25 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment.obstacles.convex_piece import ConvexPiece, ObstacleMotion
 
-FACETS = 24  # around what is round, a multiple of four: a turn of 15° from each to the next
-SHARP = np.cos(np.deg2rad(20.0))  # of the angle between two faces: those of what is round meet at less
-PLANES_ALIKE = 5  # decimals to which the planes of triangles of one face agree
-THIN = 1e-4  # [m] the half thickness that a flat piece is given
+FACETS = 24  # facets around round parts, a multiple of four: 15° from each to the next
+# cosine of the smallest angle between faces at a sharp edge; facets of round parts meet at less
+SHARP = np.cos(np.deg2rad(20.0))
+PLANES_ALIKE = 5  # decimals to which triangles of one face have the same plane
+THIN = 1e-4  # [m] half thickness given to a flat piece
 TINY = 1e-9  # [m]
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Flat convex faces in the world, and the lines at which they meet sharply."""
+    """Flat convex faces in the world, and their sharp edges."""
 
-    name: str  # of the obstacle
+    name: str  # name of the obstacle
     faces: tuple[Array, ...]  # corners of each [m], anticlockwise from outside, (k, 3)
-    edges: Array  # [m] the ends of the sharp edges, (n, 2, 3)
-    motion: ObstacleMotion | None = None  # away from where it is here
+    edges: Array  # [m] ends of the sharp edges, (n, 2, 3)
+    motion: ObstacleMotion | None = None  # motion away from the initial place
 
     def at(self, time: float) -> Surface:
-        """Return it where it is at a time [s]."""
+        """Return the surface at its place at a time [s]."""
         if self.motion is None:
             return self
         moved = self.motion.moved(np.array(time))
@@ -55,7 +56,7 @@ class Surface:
         return np.concatenate([*fans, np.zeros((0, 3, 3))])
 
     def within(self, lower: Array, upper: Array) -> Surface:
-        """Return what of it lies in a box, open where the box cuts it.
+        """Return the part of the surface inside a box, open where the box cuts it.
 
         Args:
             lower: The box's lower corner [m], (3,).
@@ -79,19 +80,19 @@ def surface_of(piece: ConvexPiece) -> Surface:
 
 
 def flattening(piece: ConvexPiece) -> float:
-    """Return how far [m] the surface lies inside the piece at most, where it is round."""
+    """Return the largest distance [m] of the surface from the piece's round parts, inside them."""
     _, sizes, rank = _axes(piece.rounding)
     return float(sizes[0]) * (1.0 - _depth(rank)) if rank else 0.0
 
 
 def _axes(rounding: Array) -> tuple[Array, Array, int]:
-    """The axes (3, 3) and semi-axes [m] (3,) of a rounding's ellipsoid, and how many are not zero."""
+    """Return the axes (3, 3), semi-axes [m] (3,) and rank of a rounding's ellipsoid."""
     axes, sizes, _ = np.linalg.svd(rounding)
     return axes, sizes, int(np.sum(sizes > TINY))
 
 
 def _rounding(piece: ConvexPiece) -> Array:
-    """Points on the ellipsoid that rounds a piece [m], (n, 3)."""
+    """Return points on the ellipsoid that rounds a piece [m], (n, 3)."""
     axes, sizes, rank = _axes(piece.rounding)
     directions = _directions(rank)
     if rank == 3:  # the equator is where a tube along the piece is widest
@@ -104,14 +105,15 @@ def _rounding(piece: ConvexPiece) -> Array:
 
 @cache
 def _directions(dimensions: int) -> Array:
-    """Unit vectors of a space of so many dimensions, evenly around, (n, dimensions)."""
+    """Return unit vectors, evenly distributed in a space of some dimensions, (n, dimensions)."""
     turn = 2.0 * np.pi * np.arange(FACETS) / FACETS
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     if dimensions < 2:
         return np.array([[1.0], [-1.0]]) if dimensions else np.zeros((1, 0))
     if dimensions == 2:
         return circle
-    latitudes = np.pi * (np.arange(1, FACETS // 2) / (FACETS // 2) - 0.5)  # of rings, the poles left out
+    # latitudes of rings, without the poles
+    latitudes = np.pi * (np.arange(1, FACETS // 2) / (FACETS // 2) - 0.5)
     levels = zip(np.cos(latitudes), np.sin(latitudes), strict=True)
     rings = [np.column_stack([c * circle, np.full(FACETS, s)]) for c, s in levels]
     return np.concatenate([*rings, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
@@ -119,7 +121,7 @@ def _directions(dimensions: int) -> Array:
 
 @cache
 def _depth(dimensions: int) -> float:
-    """How far the hull of such unit vectors reaches everywhere."""
+    """Return the radius of the ball inside the hull of these unit vectors."""
     from scipy.spatial import ConvexHull
 
     if dimensions < 2:
@@ -128,12 +130,12 @@ def _depth(dimensions: int) -> float:
 
 
 def _faces(points: Array) -> tuple[Array, ...]:
-    """The faces of the hull of points, those of one plane as one."""
+    """Return the faces of the hull of points, with coplanar triangles merged."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
         hull = ConvexHull(points)
-    except QhullError:  # a plate: given a thickness
+    except QhullError:  # a plate is given a thickness
         thick = THIN * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
         hull = ConvexHull((points[:, None] + thick).reshape(-1, 3))
     scale = np.append(np.ones(3), 1.0 / max(float(np.ptp(hull.points, axis=0).max()), TINY))
@@ -148,7 +150,7 @@ def _faces(points: Array) -> tuple[Array, ...]:
 
 
 def _around(corners: Array, normal: Array) -> Array:
-    """The corners of a face, anticlockwise about its normal, (k, 3)."""
+    """Return the corners of a face, anticlockwise about its normal, (k, 3)."""
     spokes = corners - corners.mean(axis=0)
     first = spokes[0] / np.linalg.norm(spokes[0])
     second = np.cross(normal, first)
@@ -156,7 +158,7 @@ def _around(corners: Array, normal: Array) -> Array:
 
 
 def _sharp_edges(faces: Sequence[Array]) -> Array:
-    """The ends of the edges whose two faces are at a sharp angle, (n, 2, 3)."""
+    """Return the ends of the edges whose two faces meet at a sharp angle, (n, 2, 3)."""
     normals: dict[frozenset[tuple[float, ...]], list[Array]] = {}
     ends: dict[frozenset[tuple[float, ...]], Array] = {}
     for face in faces:
@@ -171,7 +173,7 @@ def _sharp_edges(faces: Sequence[Array]) -> Array:
 
 
 def clipped(corners: Array, lower: Array, upper: Array) -> Array:
-    """Return what of a convex polygon, or of a line, lies in a box, (k, 3): Sutherland and Hodgman's way."""
+    """Return the part of a convex polygon or line inside a box, (k, 3), by Sutherland and Hodgman."""
     for axis in range(3):
         for sign, level in ((1.0, lower[axis]), (-1.0, -upper[axis])):
             if not len(corners):
@@ -181,13 +183,13 @@ def clipped(corners: Array, lower: Array, upper: Array) -> Array:
 
 
 def beyond(corners: Array, height: Array) -> Array:
-    """Return the part of a convex polygon, or of a line, where heights (k,) at its corners are from 0 on."""
+    """Return the part of a convex polygon or line where the height (k,) is nonnegative."""
     if (height >= 0.0).all():
         return corners
     kept: list[Array] = []
     for k, corner in enumerate(corners):
         last = k - 1
-        is_side = k > 0 or len(corners) > 2  # a line has one
+        is_side = k > 0 or len(corners) > 2  # a line has one side
         if is_side and (height[k] >= 0.0) != (height[last] >= 0.0):
             kept.append(corners[last] + height[last] / (height[last] - height[k]) * (corner - corners[last]))
         if height[k] >= 0.0:
