@@ -44,9 +44,9 @@ class ThrustDirectionRates:
 
         Args:
             thrust: f, f', f'', world.
-            mean: What e3 shall be along on each piece, world, (P, 3).
-            seconds: How long the pieces are [s], (P,).
-            basis: Of interpolation.
+            mean: Direction for e3 on each piece, world, (P, 3).
+            seconds: Durations of the pieces [s], (P,).
+            basis: The basis of interpolation.
         """
         axes = _axes_about(mean)
         n = np.linalg.norm(thrust[..., 0, :], axis=-1)

@@ -63,7 +63,7 @@ class BodyPath:
 
         Args:
             found: Series whose last three columns are the components of the thrust axis.
-            body: The vehicle's.
+            body: The vehicle's body.
         """
         centre, off = _centre(found.trajectory, found.pieces, found.series.shape[1] - 1)
         series = np.concatenate([centre, found.series[..., -3:]], axis=-1)

@@ -17,7 +17,7 @@ BINDING = 0.01  # margin, as a fraction of the limit's size, below which a limit
 
 
 class Verdict(StrEnum):
-    """What is known about a limit over continuous time."""
+    """Knowledge about a limit over continuous time."""
 
     HOLDS = "holds"  # proven, or there is no limit
     VIOLATED = "violated"  # at the time given

@@ -65,7 +65,8 @@ def certify(
 
     The quantities are those of `flatness.reference`: the thrust of every rotor and their sum, tilt, body
     rate, moment, speed, and everything that `envelope.limits` and `envelope.conditions` bound. For a rotor
-    with lag the command is bounded too. What `envelope.passages` require is checked at their instants. Among
+    with lag the command is bounded too. The requirements of `envelope.passages` are checked at
+    their instants. Among
     obstacles the clearance of the whole body is bounded, for all angles about its thrust axis at once.
 
     Bounds are proven over continuous time, rounding included. Margins below about 1e-7 of a rotor's range
@@ -140,9 +141,10 @@ def _bodies(
     """Return the body in its attitude, where one is known, and as a ball on the rest of the path.
 
     Args:
-        curve: What is flown.
-        series: With the components of the thrust axis as its last columns, if an attitude is ever known.
-        body: The vehicle's.
+        curve: The thrust curve of the vehicle.
+        series: Series with the components of the thrust axis as the last columns, or None without any
+            attitude.
+        body: The vehicle's body.
     """
     known = Subintervals.whole(0) if series is None else series.pieces
     attitude = None if series is None else BodyPath.in_attitude(series, body)
@@ -168,10 +170,10 @@ def _queries(
     """Return the queries for the extrema that a certificate states.
 
     Args:
-        vehicle: What flies, with n rotors.
-        envelope: What it shall stay within beside `limits`.
-        limits: On measures, those of the rotors among them.
-        columns: Of the series.
+        vehicle: The vehicle, with n rotors.
+        envelope: Further limits.
+        limits: Limits on measures, including those of the rotors.
+        columns: Columns of the series.
     """
     count = len(vehicle.rotors)
     behind = count + 4 + len(columns.derived)
@@ -204,10 +206,10 @@ def interpolated(
     """Return all quantities along consecutive pieces, in the frame without spin that is carried along them.
 
     Args:
-        curve: What is flown, without unequal drag.
-        pieces: In their order, on which interpolation is accurate.
-        everywhere: Whether they make up the whole trajectory.
-        columns: Of the series, by default those of `quantities.values` alone.
+        curve: The thrust curve of a vehicle without unequal drag.
+        pieces: Consecutive pieces on which interpolation is accurate.
+        everywhere: Whether the pieces cover the whole trajectory.
+        columns: Columns of the series, by default only those of `quantities.values`.
     """
     columns = SeriesColumns() if columns is None else columns
     vehicle, basis = curve.vehicle, curve.basis
@@ -250,9 +252,10 @@ def _derived(weights: Sequence[Array], values: Array, rates: Array) -> Array:
     thrusts.
 
     Args:
-        weights: Of `_weights`; for errors their absolute values.
-        values: The thrusts of n rotors first, the cosine of the tilt behind them and their sum, (..., n + 4).
-        rates: Their derivatives [1/s], those of the thrusts first.
+        weights: Weights from `_weights`; for errors their absolute values.
+        values: The thrusts of n rotors, their sum, the cosine of the tilt, and other quantities, (..., n +
+            4).
+        rates: Derivatives of these values [1/s], beginning with the n thrusts.
     """
     plain, change, tilting = weights
     count = len(plain)

@@ -39,7 +39,7 @@ from aerobat.trajectory.subintervals import Subintervals
 CLEARANCE_TIGHTNESS = 3e-4  # [m] largest distance between the proven bound and the smallest gap found
 NEAR_TIGHTNESS = 0.5  # the same as a fraction of the gap, where that is smaller
 OVERLAP_TIGHTNESS = 0.02  # the same as a fraction of the depth of an overlap, where that is larger
-FINEST_TIGHTNESS = 1e-6  # [m] smallest distance asked for
+FINEST_TIGHTNESS = 1e-6  # [m] smallest value of that distance, for tiny gaps
 FIRST = 64  # obstacles considered first: any small gap found prunes many others
 HALVINGS = 3  # halvings between two searches for planes: a hundred pairs cost little more than one
 ROUNDS = 14  # rounds of searching planes and halving
@@ -67,9 +67,9 @@ def clearance_finding(attitude: BodyPath | None, ball: BodyPath, pieces: Pieces)
     """Return the finding about the smallest gap between a body and obstacles.
 
     Args:
-        attitude: The body where its attitude is determined, if it is anywhere.
+        attitude: The body where its attitude is determined, or None if it never is.
         ball: The ball around the body, on the rest of the path.
-        pieces: Of the obstacles, one at least.
+        pieces: The pieces of the obstacles, at least one.
     """
     known = LeastGap() if attitude is None else least_gap(attitude, pieces)
     around = least_gap(ball, pieces)
@@ -90,9 +90,9 @@ def frame_findings(
     """Return the findings about the body's smallest gap from the frame of each gate during its passage.
 
     Args:
-        attitude: The body where its attitude is determined, if it is anywhere.
+        attitude: The body where its attitude is determined, or None if it never is.
         ball: The ball around the body, on the rest of the path.
-        passages: Where the path passes gates.
+        passages: The passages of gates.
     """
     return [_clear(attitude, ball, passage) for passage in passages]
 

@@ -41,9 +41,9 @@ def discontinuities(
     frame: where b3 is continuous, its jump is that of the body rate.
 
     Args:
-        curve: What is flown.
-        floor: Of |f| [m/s²], below which no attitude is determined.
-        found: Series of the rotors' thrusts, in the first columns; None where no attitude ever is.
+        curve: The thrust curve of the vehicle.
+        floor: |f| [m/s²] below which no attitude is determined.
+        found: Series with the rotors' thrusts as the first columns; None if the attitude is never determined.
     """
     trajectory = curve.trajectory
     ends = curve.at(np.arange(trajectory.segments), np.tile([0.0, 1.0], (trajectory.segments, 1)))
@@ -93,7 +93,7 @@ def _unequal_directions(curve: ThrustCurve, ends: Array) -> tuple[Array, Array]:
     (α_x/α_z, β_y/β_z, 1) to first order and b3' = (α'_x/α_z, β'_y/β_z, 0).
 
     Args:
-        curve: What is flown.
+        curve: The thrust curve of the vehicle.
         ends: v, f, f', f'' at both ends of segments, (S, 2, 4, 3).
     """
     drag = UnequalDrag.of(curve.vehicle, curve.environment)
@@ -117,8 +117,8 @@ def seam(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> 
 
     Args:
         trajectory: The lap.
-        vehicle: What flies it.
-        environment: Where.
+        vehicle: The vehicle that flies the lap.
+        environment: The environment of the lap.
     """
     flat = reference(trajectory, vehicle, [0.0, trajectory.duration], environment=environment)
     state = flat.setpoint
@@ -145,10 +145,10 @@ def _thrust_jumps(curve: ThrustCurve, ends: Array, min_thrust: Array, found: Che
     Jumps below the tolerance count as zero.
 
     Args:
-        curve: What is flown.
+        curve: The thrust curve of the vehicle.
         ends: v, f, f', f'' at both ends of segments, (S, 2, 4, 3).
-        min_thrust: |f| at inner knots, at least [m/s²], (S - 1,).
-        found: Series of the rotors' thrusts, in the first columns.
+        min_thrust: Lower bound of |f| at inner knots [m/s²], (S - 1,).
+        found: Series with the rotors' thrusts as the first columns, or None.
     """
     vehicle, jumps = curve.vehicle, np.zeros(len(min_thrust))
     if found is None or not vehicle.lags.any():

@@ -1,4 +1,4 @@
-"""Limits that a flight shall stay within, beside those of the rotors."""
+"""Limits of a flight in addition to those of the rotors."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ NO_LIMITS = Limits()
 class Envelope:
     """Limits over continuous time; infinite where there is none.
 
-    `limits` bounds position and its derivatives per axis, as a problem does; `conditions` hold throughout,
-    `passages` and `waypoints` at their instants, `start` and `goal` where the path begins and ends. What is
-    `closed` goes on from its end as from its start.
+    `limits` bounds position and its derivatives per axis, as a problem does. `conditions` hold throughout,
+    `passages` and `waypoints` at their instants, `start` and `goal` at the ends of the path. A `closed` path
+    continues from its end at its start.
     """
 
     speed: Limit = np.inf  # [m/s] |v|

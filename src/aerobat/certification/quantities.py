@@ -30,8 +30,8 @@ def values(vehicle: Vehicle, curve: Array, omega: Array, omega_dot: Array) -> Ar
     """Return rotor thrusts, collective thrust, cos tilt, |ω|², |M|², (..., n + 4).
 
     Args:
-        vehicle: What flies, with n rotors.
-        curve: v, f, f', f'' as of a `ThrustCurve`, (..., 4, 3).
+        vehicle: The vehicle, with n rotors.
+        curve: v, f, f', f'' from a `ThrustCurve`, (..., 4, 3).
         omega: ω [rad/s], body axes, (..., 3).
         omega_dot: ω' [rad/s²], body axes, (..., 3).
     """

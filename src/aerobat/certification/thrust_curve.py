@@ -44,10 +44,10 @@ class ThrustCurve:
         Raise SpecError for unreasonably large derivatives.
 
         Args:
-            trajectory: The path; its heading does not matter here, its yaw does.
-            vehicle: Its drag counts.
-            environment: Its gravity and wind count.
-            degree: Of interpolation, at least; the polynomials' own if that is higher.
+            trajectory: The path and its yaw; its heading does not matter here.
+            vehicle: The vehicle with its drag.
+            environment: Gravity and wind.
+            degree: Smallest degree of interpolation; the polynomials' own degree if that is higher.
         """
         _check(trajectory)
         size = max(trajectory.degree, 1)

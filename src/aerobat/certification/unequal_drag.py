@@ -49,10 +49,10 @@ def interpolated_with_unequal_drag(
     """Return the series of `certify.interpolated`, and the intervals without a proven attitude.
 
     Args:
-        curve: What is flown.
-        pieces: In their order, on which quantities of the mean drag are interpolated accurately.
-        everywhere: Whether they make up the whole trajectory.
-        columns: Of the series.
+        curve: The thrust curve of the vehicle.
+        pieces: Consecutive pieces on which the quantities for the mean drag are interpolated accurately.
+        everywhere: Whether the pieces cover the whole trajectory.
+        columns: Columns of the series.
     """
     pieces = pieces.halves()
     for _ in range(HALVINGS):

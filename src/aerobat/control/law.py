@@ -54,9 +54,9 @@ class ControlLaw(ABC):
         """Return the state before the first tick, a tree of tuples; by default empty.
 
         Args:
-            ops: Of the arithmetic.
+            ops: The arithmetic of the engine.
             model: The nominal vehicle: its mass properties and rotors, and the environment.
-            seen: At the first tick.
+            seen: State, rotor thrusts and reference at the first tick.
         """
         return ()
 
@@ -67,11 +67,11 @@ class ControlLaw(ABC):
         """Return the state at a tick, and the required thrust [N] and moment [N·m, body].
 
         Args:
-            ops: Of the arithmetic.
+            ops: The arithmetic of the engine.
             model: The nominal vehicle: its mass properties and rotors, and the environment.
-            state: After the last tick.
-            seen: At this one.
-            elapsed: Since the last tick [s].
+            state: The law's state after the last tick.
+            seen: State, rotor thrusts and reference at this tick.
+            elapsed: Time since the last tick [s].
         """
 
 

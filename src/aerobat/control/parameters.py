@@ -54,9 +54,9 @@ def controller_parameters(controller: Controller, fleet: Fleet, environment: Env
     """Return nominal models with leaves (vehicles,).
 
     Args:
-        controller: the settings.
+        controller: the controller's settings.
         fleet: the nominal vehicles.
-        environment: what they are taken to fly in.
+        environment: the nominal environment.
     """
     rows = matrix_components(np.swapaxes(fleet.mixer, 1, 2))
     return ControllerModel(

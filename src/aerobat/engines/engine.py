@@ -64,9 +64,9 @@ class CompiledLoop(ABC):
         """Return the carry after some ticks, and the rows of the logged ticks (see `logged_ticks`).
 
         Args:
-            carry: from `init`, or from an earlier scan or step; stays as it is.
-            inputs: leaves (ticks,), the same for all vehicles, or (ticks, vehicles), as at compilation; those
-                of a `Held` have as many rows as it has samples.
+            carry: carry from `init`, or from an earlier scan or step; it is not changed.
+            inputs: leaves (ticks,), the same for all vehicles, or (ticks, vehicles), as at compilation;
+                leaves of a `Held` have as many rows as it has samples.
             log_stride: ticks from one logged row to the next.
 
         The rows' leaves are (vehicles, logged ticks).
@@ -85,12 +85,12 @@ class Compile(Protocol):
         """Return the loop that starts with `init(ops, parameters, inputs)` and continues with `step`.
 
         Args:
-            init: makes the carry before the first tick.
-            step: makes the next carry and the row of one tick; both are written in `ops`.
+            init: function that returns the carry before the first tick.
+            step: function that returns the next carry and the row of one tick; both are written in `ops`.
             parameters: leaves (vehicles,).
-            inputs: of one tick; leaves are numbers where all vehicles have the same, else (vehicles,). Those
-                below a tuple with a true attribute `piecewise_constant` change at few ticks: a hint to the
-                compiler, which changes no result.
+            inputs: inputs of one tick; leaves are numbers where all vehicles have the same, else (vehicles,).
+                Leaves below a tuple with a true attribute `piecewise_constant` change at few ticks: a hint to
+                the compiler, which changes no result.
         """
 
 

@@ -11,8 +11,8 @@ def gradient(output: Symbol, inputs: Sequence[Symbol]) -> list[Symbol]:
     """Return the partial derivatives of a value of a trace, recorded in the trace.
 
     Args:
-        output: What is differentiated, backwards through the operations that make it.
-        inputs: By which; nothing looks behind them.
+        output: The value to differentiate.
+        inputs: The values to differentiate by; operations behind them are ignored.
     """
     trace, ops = output.trace, TraceOps(output.trace)
     wanted = {symbol.number for symbol in inputs}

@@ -85,8 +85,8 @@ class TracedLoop:
         """Return the values of `numbers` in blocks, guarded if only selections by a shared condition use one.
 
         Args:
-            numbers: of values, in order.
-            shared: inputs that are one number for all that is computed at once.
+            numbers: values, in order.
+            shared: inputs that all vehicles computed at once share.
         """
         guards = self._guards(numbers, {*shared})
         waiting, blocks = list(numbers), []

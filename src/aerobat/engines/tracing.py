@@ -98,8 +98,8 @@ class Trace:
         """Return the values from which `roots` are computed, including `roots`.
 
         Args:
-            roots: the others.
-            unless: a condition that is taken not to hold, so that selections by it take their second value.
+            roots: the values to compute.
+            unless: a condition that is assumed to be false, so that selections by it take their second value.
         """
         found: set[int] = set()
         waiting = list(roots)
@@ -119,7 +119,7 @@ class Trace:
     def _number(
         self, name: str, arguments: tuple[int, ...], content: float | bool | str, logical: bool
     ) -> int:
-        # 0.0 and -0.0 are equal, True and 1.0 too: the text tells them apart
+        # 0.0 and -0.0 are equal, True and 1.0 too: repr distinguishes them
         key = (name, arguments, repr(content) if name == "constant" else content)
         number = self._numbers.setdefault(key, len(self.operations))
         if number == len(self.operations):

@@ -30,8 +30,8 @@ INERTIAL_ERRORS = (
 class Gusts:
     """Wind beyond the environment's: a horizontal mean of each flight's own, and Dryden turbulence.
 
-    The turbulence is that of MIL-F-8785C with one intensity and one length for its three components, frozen
-    and swept past the vehicle at `airspeed`: first-order along the mean wind, second-order across it.
+    The turbulence is that of MIL-F-8785C, with one intensity and one length for its three components. It is
+    frozen and moves past the vehicle at `airspeed`: first-order along the mean wind, second-order across it.
     """
 
     mean_wind: NonNegative = 0.0  # [m/s] 1σ of the mean wind's two horizontal components
@@ -44,7 +44,7 @@ class Gusts:
 class Battery:
     """A battery whose voltage falls with use, and the rotors' thrust ceilings with it.
 
-    The charge used grows by the rotors' induced power, Σ f^1.5, in units of that of a hover.
+    The discharge rate is the rotors' induced power, Σ f^1.5, relative to that in hover.
     """
 
     endurance: Positive  # [s] of hover, from full to empty
@@ -57,10 +57,10 @@ class Dispersion:
     """Conditions of a flight as it would really be flown: what varies (1σ), disturbs, and is measured how.
 
     Factors of mass, inertia, rotors and lags are log-normal with mean 1 and the standard deviation given
-    here. Controller, observer and plan know the nominal vehicle alone. Left as it is, nothing varies, and
-    the controller sees the true state.
+    here. Controller, observer and plan know only the nominal vehicle. By default nothing varies, and
+    the controller knows the true state.
 
-    Raises SpecError for one sensor without the other: an observer takes both.
+    SpecError is raised for one sensor without the other: an observer needs both.
     """
 
     name: Label = "conditions"  # left out in a file, the file's

@@ -23,8 +23,8 @@ from aerobat.states import STANDARD_GRAVITY
 class Environment:
     """The world around the vehicle, ENU axes.
 
-    Drag acts on the velocity relative to the wind. The ground bounds paths from below, without it nothing
-    does. The whole body keeps clear of obstacles.
+    Drag acts on the velocity relative to the wind. The ground is a lower bound of paths; without a ground
+    there is none. The whole body must stay clear of obstacles.
     """
 
     gravity: Gravity = STANDARD_GRAVITY  # [m/s²] along -z

@@ -28,8 +28,8 @@ AngleSpread = Annotated[float, Field(ge=0, le=pi, description="number of radians
 class Imu:
     """An inertial measurement unit: means of angular rate and specific force over its sample intervals.
 
-    White noise by its density, biases that are drawn before each flight and then walk. Left as it is, one
-    without errors.
+    White noise is given by its density. Biases are drawn before each flight and then follow a random walk.
+    The default is an IMU without errors.
     """
 
     rate: SensorRate = 1000.0  # [1/s] of its samples
@@ -63,9 +63,10 @@ class Imu:
 class HandOff:
     """The plane where one camera system takes over from another, and what remains of their misfit.
 
-    Beyond the plane poses come from the second system, in axes that are moved and turned against those of the
-    first: a pose jumps as the vehicle crosses. Either system's cameras distort near the plane, at the edge of
-    its volume: a warp that grows smoothly towards it. The directions of the three are drawn for each flight.
+    Beyond the plane poses come from the second system, whose axes are offset and turned relative to those of
+    the first: a pose jumps as the vehicle crosses. The cameras of both systems distort near the plane, at the
+    edge of their volumes: this warp grows smoothly towards the plane. The directions of the offset, the turn
+    and the warp are drawn for each flight.
     """
 
     point: Vector3 | None = None  # [m] of the plane; left out, the first gate's centre, else half-way to goal
@@ -90,7 +91,7 @@ class Outage:
 class MotionCapture:
     """Cameras that see markers on the vehicle: poses, late, with gaps and outliers.
 
-    Left as it is, one without errors.
+    The default is motion capture without errors.
     """
 
     rate: SensorRate = 100.0  # [1/s] of its samples

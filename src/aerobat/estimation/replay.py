@@ -177,7 +177,7 @@ def _slots(log: SensorLog, poses: Indices) -> Indices:
 @short
 @by_value
 class Estimates:
-    """Estimates of a log's states: the state at the end of each sample, and what became of each pose."""
+    """Estimates from a log: the state at the end of each sample, and the acceptance of each pose."""
 
     times: Array  # [s], (T,), from the first sample that ends after the first pose
     position: Array  # [m] world, (T, 3)
@@ -219,11 +219,11 @@ def estimate(
     raised where the log has no pose within the IMU samples.
 
     Args:
-        log: What was recorded.
-        ekf: What the filter reckons with.
-        environment: Whose gravity acts, by default that of a calm day on Earth.
+        log: The recorded log.
+        ekf: The settings of the filter.
+        environment: The environment with its gravity, by default that of a calm day on Earth.
         start_velocity: Velocity at the first pose [m/s], world, (3,).
-        max_gap: Time without poses [s] from which on the estimate is said to coast.
+        max_gap: Time without poses [s] from which on the filter is reported as coasting.
     """
     plan = schedule(log)
     gravity = (environment or Environment()).gravity

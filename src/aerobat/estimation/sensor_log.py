@@ -20,9 +20,9 @@ _UNIT = 1e-2  # [-] error of a quaternion's norm: the rounding of a few decimals
 class SensorLog:
     """Record of an IMU and of poses, on one clock; SI units, ENU world, FLU body.
 
-    A sample of the IMU is the mean since the sample before (of the first, over as long as of the second).
-    Poses have the times of their exposure, and those at which they arrived. Raises SpecError, one sentence
-    that names the array, for shapes that differ, NaN, times that do not rise, and gaps.
+    An IMU sample is the mean since the previous sample; the first one covers as long an interval as the
+    second. Poses have exposure times and arrival times. SpecError, which names the array, is raised for
+    shapes that differ, NaN, times that do not rise, and gaps.
     """
 
     imu_times: Array  # [s] of the ends of the samples' intervals, (T,)

@@ -34,12 +34,12 @@ class Ekf:
     @classmethod
     @validated
     def of_sensors(cls, imu: Imu, motion_capture: MotionCapture, start_velocity: NonNegative = 0.05) -> Ekf:
-        """The filter that knows the noise of its sensors, poses without any taken for next to exact.
+        """Return a filter with the noise of its sensors; noise-free poses get a small noise.
 
         Args:
-            imu: its IMU.
-            motion_capture: where its poses come from.
-            start_velocity: 1σ of the velocity at first [m/s], each axis.
+            imu: the vehicle's IMU.
+            motion_capture: the source of its poses.
+            start_velocity: 1σ of the initial velocity [m/s], each axis.
         """
         return cls(
             gyro_noise=imu.gyro_noise,

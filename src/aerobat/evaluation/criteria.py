@@ -53,7 +53,7 @@ def criteria_of(goal: Problem | Plan, path: SampledPath) -> Criteria:
 
     Args:
         goal: the problem, or a plan for it.
-        path: its set-points.
+        path: the set-points of the flights.
     """
     problem = goal.problem if isinstance(goal, Plan) else goal
     placed = timed_stages(goal.stages, problem) if isinstance(goal, Plan) else ()
@@ -162,10 +162,11 @@ def _nearest_instants(centres: Sequence[Array], times: Array, position: Array, i
     With `in_order` they minimize the sum of squared distances over all ordered times, by dynamic programming.
 
     Args:
-        centres: of what is passed [m], (3,), or at the times, (T, 3).
-        times: of the set-points [s], (T,).
-        position: of the set-points [m], (T, 3).
-        in_order: true where one follows the other, and what is passed again is later by PASSAGE_WINDOW.
+        centres: centres of the gates or balls [m], (3,), or at the times, (T, 3).
+        times: times of the set-points [s], (T,).
+        position: positions of the set-points [m], (T, 3).
+        in_order: whether the approaches must be in order; repeated centres are then at least PASSAGE_WINDOW
+            apart.
     """
     squares = [np.sum((position - centre) ** 2, axis=-1) for centre in centres]
     if not in_order or not squares:

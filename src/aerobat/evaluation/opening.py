@@ -61,15 +61,14 @@ def smallest_opening(
     Order Statistics, 2003, section 7.1). The smallest r that reaches the confidence is used.
 
     Args:
-        scores: of flights drawn independently of each other.
-        gate: which one; where it is passed several times, each time counts.
-        probability: with which a flight shall pass.
-        confidence: with which the opening is large enough.
-        side: `both` for an opening of the gate's proportions; `width` or `height` for that alone, the other
-            as it is.
+        scores: scores of independently drawn flights.
+        gate: the gate; of several passages of this gate, each one counts.
+        probability: probability with which a flight shall pass.
+        confidence: confidence that the opening is large enough.
+        side: `both` scales the gate's opening; `width` or `height` scales one side and keeps the other.
 
     Raises:
-        SpecError: no passage is through such a gate, or the flights are too few for such a probability.
+        SpecError: no passage is through this gate, or the flights are too few for this probability.
     """
     return opening_of(_needed(scores, gate, side), gate, probability, confidence, side)
 
@@ -80,11 +79,11 @@ def opening_of(
     """Return the smallest opening for flights whose needed scales are known, as `smallest_opening` does.
 
     Args:
-        needed: the scale of the gate that each flight needs, infinite where none will do, (flights,).
-        gate: which one.
-        probability: with which a flight shall pass.
-        confidence: with which the opening is large enough.
-        side: what is scaled.
+        needed: the scale of the gate that each flight needs, infinite where no scale is enough, (flights,).
+        gate: the gate.
+        probability: probability with which a flight shall pass.
+        confidence: confidence that the opening is large enough.
+        side: the scaled side.
 
     Raises SpecError where the flights are too few for such a probability.
     """

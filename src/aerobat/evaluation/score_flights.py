@@ -41,15 +41,14 @@ def score_flights(
     """Fly as `fly` does with the same arguments, and score each flight during the simulation, without a log.
 
     Args:
-        plan: what is flown; a bare trajectory needs vehicles and a problem.
-        vehicles: what flies it, or their names, by default the plan's.
-        problem: what is judged by, or its name, by default the plan's.
-        environment: where, by default the problem's.
-        config: how.
-        changes: fields of FlightConfig that replace those of `config`, as `seed=3`.
+        plan: the plan to fly; a bare trajectory needs vehicles and a problem.
+        vehicles: vehicles or their names, by default the plan's.
+        problem: the problem that gives the criteria, or its name, by default the plan's.
+        environment: the environment, by default the problem's.
+        config: settings of the flights.
+        changes: fields of FlightConfig that replace those of `config`, for instance `seed=3`.
 
-    Raises SpecError for arguments that do not fit together, BackendMissing for an engine that is not
-    installed.
+    SpecError is raised for inconsistent arguments, BackendMissing for an engine that is not installed.
     """
     return score_over_time(plan, vehicles, problem, environment, config.changed(changes))[0]
 
@@ -86,12 +85,12 @@ def score_over_time(
     """Score flights as `score_flights` does, and also return their errors over time.
 
     Args:
-        plan: what is flown.
-        vehicles: what flies it.
-        problem: what is judged by.
-        environment: where.
-        config: how.
-        stride: ticks from one of the times to the next; None for the last one alone.
+        plan: the plan to fly.
+        vehicles: the vehicles.
+        problem: the problem that gives the criteria.
+        environment: the environment.
+        config: settings of the flights.
+        stride: ticks between the returned times; None for the last time only.
     """
     goal = plan if problem is None else as_problem(problem)
     if isinstance(goal, Trajectory):

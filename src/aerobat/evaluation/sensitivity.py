@@ -100,26 +100,26 @@ def sensitivity(
     """Fly as `fly` does with the same arguments, and differentiate the flight's errors.
 
     Args:
-        plan: what is flown; a bare trajectory needs a vehicle.
-        of: names of quantities: a gain of Controller (no time constant but jerk_filter); of the vehicle that
-            flies "mass", "inertia", "drag_body"; of each of its rotors "rotors.position_body",
-            "rotors.min_thrust", "rotors.max_thrust", "rotors.torque_coefficient", "rotors.lag";
-            "start.position", "start.velocity", "start.attitude" (a rotation [rad] about body axes),
-            "start.omega_body".
-        vehicle: what flies it, or its name, by default the plan's.
-        environment: where, by default the problem's.
-        config: how.
+        plan: the plan to fly; a bare trajectory needs a vehicle.
+        of: names of quantities. A gain of Controller (of its time constants only jerk_filter). Of the true
+            vehicle "mass", "inertia", "drag_body". Of each of its rotors "rotors.position_body",
+            "rotors.min_thrust", "rotors.max_thrust", "rotors.torque_coefficient", "rotors.lag". Of the
+            initial state "start.position", "start.velocity", "start.attitude" (a rotation [rad] about body
+            axes), "start.omega_body".
+        vehicle: the vehicle or its name, by default the plan's.
+        environment: the environment, by default the problem's.
+        config: settings of the flight.
         changes: fields of FlightConfig that replace those of `config`.
 
-    Slopes in the inertia are for its entries one by one, half for each of a mirrored pair: an error changes
-    by Σ slope_ij dJ_ij. The controller's nominal vehicle and the set-points are held: the slope in the mass
-    is what a mass does that the controller does not know of, as in `fly(..., vehicle, nominal=...)` with
-    `vehicle` alone changed.
+    The inertia has one slope for each entry, where a symmetric pair shares its derivative: an error changes
+    by Σ slope_ij dJ_ij. The controller's nominal vehicle and the set-points are held constant. The slope in
+    the mass is therefore that of a mass error unknown to the controller, as in `fly(..., vehicle,
+    nominal=...)` with only `vehicle` changed.
 
-    Slopes are those of the simulation as it is computed, by dual numbers, not differences of two flights.
-    Where it has a kink, as where a rotor's command just meets its limit, they are those of one side. They say
-    nothing of jumps, as of the tick at which a vehicle diverges. Raises SpecError for an unknown quantity
-    and for arguments that do not fit together, BackendMissing for an engine that is not installed.
+    Slopes are exact derivatives of the discrete simulation, by dual numbers, not differences of two flights.
+    At a kink, for instance where a rotor's command just reaches its limit, slopes are one-sided. They do not
+    include jumps, for instance of the tick at which a vehicle diverges. SpecError is raised for an unknown
+    quantity and for inconsistent arguments, BackendMissing for an engine that is not installed.
     """
     names = _known((of,) if isinstance(of, str) else tuple(of))
     config = config.changed(changes)

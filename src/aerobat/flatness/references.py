@@ -76,10 +76,10 @@ def reference(
 
     Args:
         trajectory: The path and its heading, or a plan.
-        vehicle: What flies it, or its name, by default the plan's; its limits do not matter here.
-        times: When [s], (T,), none before the last.
-        rate: Samples a second [1/s], instead of times.
-        environment: Gravity and wind, by default the plan's, of a trajectory those of a calm day on Earth.
+        vehicle: The vehicle, or its name, by default the plan's; its limits do not matter here.
+        times: Times [s], (T,), not falling.
+        rate: Samples per second [1/s], instead of times.
+        environment: Gravity and wind, by default the plan's; for a trajectory those of a calm day on Earth.
     """
     if (times is None) == (rate is None):
         raise SpecError("reference needs either times or a rate, not both")
@@ -110,11 +110,11 @@ def reference_of(
     twice, with the states of both sides. SpecError is raised for falling times and shapes that differ.
 
     Args:
-        times: When [s], (T,).
+        times: Times [s], (T,), not falling.
         flat: Position to snap at these times, (T, 3) each.
-        vehicle: What flies them; its limits do not matter here.
+        vehicle: The vehicle; its limits do not matter here.
         environment: Gravity and wind, by default those of a calm day on Earth.
-        heading: Of the start [rad], about the thrust axis.
+        heading: Initial heading [rad], about the thrust axis.
     """
     environment = environment or Environment()
     times = _rising(times)
@@ -149,11 +149,11 @@ def wrench_for(thrust: Array, airspeed: Array, omega: Array, omega_dot: Array, v
     """Return collective thrust and moment along a path.
 
     Args:
-        thrust: f, f', f'' [m/s²] and so on, world, (..., 3, 3).
+        thrust: f, f', f'' [m/s², m/s³, m/s⁴], world, (..., 3, 3).
         airspeed: Velocity relative to the wind [m/s], world, (..., 3).
         omega: ω [rad/s], body axes, (..., 3).
         omega_dot: ω' [rad/s²], body axes, (..., 3).
-        vehicle: What flies it.
+        vehicle: The vehicle.
     """
     f = thrust[..., 0, :]
     n = np.linalg.norm(f, axis=-1)
@@ -249,14 +249,15 @@ def _assembled(
     """Return the reference at `nodes` of a path of frames.
 
     Args:
-        times: [s], (T,).
-        flat: The motion then.
+        times: Times [s], (T,).
+        flat: Flat states at these times.
         path: TransportedFrames along the mean-drag thrust.
-        nodes: Where the times are among them, (T,).
-        vehicle: What flies.
-        environment: Where.
-        angle: From these frames to those of unequal drag [rad], yaw included, (T,); None of equal drag.
-        yaw: Beside these frames [rad], with two derivatives, (T, 3); None without.
+        nodes: Indices of the times among the path's nodes, (T,).
+        vehicle: The vehicle.
+        environment: The environment.
+        angle: Angle from these frames to the frames of unequal drag [rad], yaw included, (T,); None for equal
+            drag.
+        yaw: Yaw relative to these frames [rad], with two derivatives, (T, 3); None without yaw.
     """
     thrust = specific_thrust(flat, vehicle, environment)
     q, determined = path.q_world_body[nodes], path.determined[nodes]

@@ -112,9 +112,9 @@ class FrameAngle:
 
         Args:
             trajectory: The path.
-            drag: Of the vehicle.
-            pieces: In their order.
-            q_mean: The frame of the mean drag at their nodes, (P, NODES, 4).
+            drag: The drag of the vehicle.
+            pieces: Consecutive pieces of the trajectory.
+            q_mean: The frame of the mean drag at the nodes of the pieces, (P, NODES, 4).
         """
         velocity, acceleration, jerk = np.moveaxis(motion_on(trajectory, pieces, nodes(), 3), 2, 0)
         local = _Local.of(drag, velocity - drag.wind, acceleration, jerk, q_mean)
@@ -145,9 +145,9 @@ def body_attitudes(q_mean: Array, angle: Array, flat: FlatState, drag: UnequalDr
 
     Args:
         q_mean: The frame of the mean drag, (..., 4).
-        angle: ψ [rad], (...).
-        flat: The motion, (...).
-        drag: Of the vehicle.
+        angle: The angle ψ [rad], (...).
+        flat: Flat states, (...).
+        drag: The drag of the vehicle.
         balance: Mean-drag specific thrust, world [m/s²], (..., 3).
     """
     near = so3.multiply(q_mean, so3.about_axis(UP, angle))
@@ -169,10 +169,10 @@ def body_motion(
 
     Args:
         q: Attitudes of the body, (..., 4).
-        flat: The motion, (...).
-        drag: Of the vehicle.
+        flat: Flat states, (...).
+        drag: The drag of the vehicle.
         balance: Mean-drag specific thrust, world [m/s²], (..., 3).
-        yaw: The rate of the turn about the thrust axis [rad/s] and its derivative, (2, ...), if there is any.
+        yaw: Yaw rate about the thrust axis [rad/s] and its derivative, (2, ...), or None.
     """
     airspeed = flat.velocity - drag.wind
     kappa = drag.counted(balance, airspeed)

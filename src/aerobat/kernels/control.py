@@ -118,18 +118,18 @@ def track_attitude(
     """Return the state, including new commands, of the inner loop, which turns the body to an attitude.
 
     Args:
-        ops: of the arithmetic.
+        ops: the arithmetic of the engine.
         flags: features beyond the paper's law.
         model: the nominal vehicle.
-        state: after the last tick, but for its outer loop, which is taken as it is.
-        body_axes: of the body as it is now.
-        pursuit: what is to be turned, and the thrust meanwhile.
-        rates: the reference, of whose rates and their change the moment is fed forward.
-        elapsed: since the last tick [s].
+        state: state after the last tick, with an outer loop that is already updated.
+        body_axes: present axes of the body.
+        pursuit: the attitude error, and the collective thrust.
+        rates: the reference; its rates and their change give the feed-forward moment.
+        elapsed: time since the last tick [s].
     """
     mass_properties, rotors = model.airframe
     error = pursuit.error
-    # while rotors saturate, the attitude error says nothing about a lasting moment
+    # while rotors saturate, the attitude error does not indicate a lasting moment
     counted = ops.select(state.commands.saturated, 0.0, elapsed)
     integral = integrate_attitude_error(ops, model.gains, state.attitude_integral, error, counted)
     moment, change = feedback_moment(model.gains, mass_properties.inertia, error, integral), ZERO
@@ -166,12 +166,12 @@ def predicted(
     ago.
 
     Args:
-        ops: of the arithmetic.
+        ops: the arithmetic of the engine.
         model: the nominal vehicle.
-        state: after the last step.
-        body: as it is now.
-        elapsed: since the last step [s]; a path's last step may be shorter than the delay.
-        delay: [s].
+        state: state after the last step.
+        body: present state of the body.
+        elapsed: time since the last step [s]; the last step of a path may be shorter than the delay.
+        delay: delay of the commands [s].
     """
     rotors = model.airframe.rotors
     left = motors.decay_factors(ops, rotors, ops.maximum(elapsed - delay, 0.0))
@@ -204,13 +204,13 @@ def rotor_commands(
     limits only comes from moments, which every rotor should build up as fast as possible.
 
     Args:
-        ops: of the arithmetic.
+        ops: the arithmetic of the engine.
         flags: features beyond the paper's law.
         model: the nominal vehicle.
         loads: the load, and its change.
-        thrusts: that the rotors give [N].
-        decay_factors: of the rotors in a period.
-        period: until the next tick [s].
+        thrusts: rotor thrusts [N] by the nominal model.
+        decay_factors: decay factors of the rotors over a period.
+        period: time until the next tick [s].
     """
     rotors, (load, ahead) = model.airframe.rotors, loads
     desired = mix(model.mixer, load)

@@ -163,9 +163,9 @@ def attitude_command(
     reference's spin about b3. Where the commanded specific thrust vanishes, the reference attitude is kept.
 
     Args:
-        ops: of the arithmetic.
-        outer: the outer loop's feedback.
-        demand: the thrust that the reference asks for.
+        ops: the arithmetic of the engine.
+        outer: the feedback of the outer loop.
+        demand: the specific thrust of the reference.
         reference: the reference.
     """
     f = add(demand.value, outer.acceleration)

@@ -57,11 +57,11 @@ def step(
     """Return the next sample, over the interval since the last one; the first is instantaneous.
 
     Args:
-        ops: the arithmetic.
-        parameters: the errors.
-        state: since the last sample.
-        felt: the rate and specific force at this instant.
-        bias: that is added.
+        ops: the arithmetic of the engine.
+        parameters: the errors of the IMU.
+        state: state after the last sample.
+        felt: the true rate and specific force at this instant.
+        bias: the present biases.
         noise: independent standard normals.
     """
     before = select_tree(ops, state.has_felt > 0.5, state.felt, felt)

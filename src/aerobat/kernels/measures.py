@@ -31,9 +31,9 @@ def measures(ops: Ops, airframe: InertiaAndDrag, motion: BodyMotion, up: Vector)
     """Return the measures in the order of `limits.quantity`: wrench (4), its rate (4), |f|, |ω|, upright.
 
     Args:
-        ops: The arithmetic.
+        ops: The arithmetic of the engine.
         airframe: Mass, inertia and drag.
-        motion: Weight over mass, airspeed and the derivatives of position from acceleration on.
+        motion: Gravity, airspeed and the derivatives of position from acceleration on.
         up: The vertical, in the axes of the motion.
     """
     if airframe.unequal is not None:

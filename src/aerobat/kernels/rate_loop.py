@@ -114,12 +114,12 @@ def step(
     """Return the state, including new commands, `elapsed` [s] after the last tick.
 
     Args:
-        ops: of the arithmetic.
+        ops: the arithmetic of the engine.
         model: the vehicle and the filters.
-        state: after the last tick.
-        setpoint: of the outer loop.
+        state: state after the last tick.
+        setpoint: set-point of the outer loop.
         gyro: the measured rate [rad/s], body.
-        elapsed: since the last tick [s].
+        elapsed: time since the last tick [s].
     """
     filtered = low_passed(state.gyro, gyro, model.gyro_filter, elapsed)
     slope = scale(1.0 / elapsed, subtract(filtered, state.gyro))

@@ -82,13 +82,13 @@ def step(
     """Return the metrics one tick later.
 
     Args:
-        ops: of the arithmetic.
-        parameters: what the flight is judged by.
-        metrics: before the tick.
+        ops: the arithmetic of the engine.
+        parameters: the criteria for the flight.
+        metrics: the metrics before the tick.
         body: the true state.
-        reference: position [m] and attitude that are tracked.
-        actuation: thrusts and commands of the rotors [N], and true where limits changed the commands.
-        time: of the tick [s].
+        reference: reference position [m] and attitude.
+        actuation: rotor thrusts and commands [N], and whether limits changed the commands.
+        time: time of the tick [s].
     """
     position, q_world_body = reference
     thrusts, commands, saturated = actuation

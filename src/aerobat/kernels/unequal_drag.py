@@ -47,7 +47,7 @@ def body_rates(
         inverse: 1/α_z and 1/β_z.
         alpha: α, α', α''.
         beta: β, β', β''.
-        yaw: ω_z and ω_z'; without, no spin.
+        yaw: ω_z and ω_z'; None for no spin.
     """
     per_alpha, per_beta = inverse
     wx, wy = -1.0 * beta[1][1] * per_beta, alpha[1][0] * per_alpha
@@ -76,11 +76,11 @@ def angular_jerk(
 
     Args:
         inverse: 1/α_z and 1/β_z.
-        alpha: α to α'''.
-        beta: β to β'''.
+        alpha: α, α', α'', α'''.
+        beta: β, β', β'', β'''.
         omega: ω.
         omega_dot: ω'.
-        change: ω_z''; without, no spin.
+        change: ω_z''; None for no spin.
     """
     per_alpha, per_beta = inverse
     (wx, wy, s), (dwx, dwy, ds) = omega, omega_dot
@@ -118,7 +118,7 @@ def frame_spin(
     Args:
         thrust: Norm of the mean-drag specific thrust, and its derivative.
         alpha: α and α'.
-        body: b1, b2 and b3 as of `nearest_axes`.
+        body: b1, b2 and b3 from `nearest_axes`.
         yaw_rate: ω_z [rad/s].
     """
     norm, change = thrust

@@ -30,7 +30,8 @@ def register_limits(family: Family) -> Family:
     """Register a function that yields limits, as a decorator; all planners and certificates use them.
 
     Args:
-        family: Of what is asked, the vehicle and the problem's limits, to the limits that follow from it.
+        family: A function from `Asked` (vehicle, environment, and the problem's bounds) to the limits that
+            follow.
     """
     FAMILIES.append(family)
     return family
@@ -45,10 +46,10 @@ def limits_along(
     """Return all limits that must hold along a whole path.
 
     Args:
-        vehicle: What flies it; without one, rotors and body rates have no limits and there is no drag.
+        vehicle: The vehicle; None means no limits of rotors and body rates, and no drag.
         environment: Gravity, wind and ground.
-        limits: The bounds per axis of a problem, its ground among them.
-        conditions: What a maneuver asks throughout.
+        limits: The bounds per axis of a problem, including its ground.
+        conditions: The conditions of a maneuver that hold throughout.
     """
     asked = Asked(vehicle, environment, limits, conditions)
     return tuple(limit for family in FAMILIES for limit in _limits(family, asked))

@@ -67,9 +67,9 @@ class OpeningAhead(NamedTuple):
 
         Args:
             ops: The arithmetic of the arguments.
-            position: Of the centre of mass as it crosses the plane [m].
-            velocity: Likewise [m/s].
-            extent: Of the body, in its attitude there.
+            position: Position of the centre of mass as it crosses the plane [m].
+            velocity: Velocity of the centre of mass there [m/s].
+            extent: Extent of the body in its attitude there.
         """
         through, offset = dot(self.normal, velocity), subtract(position, self.place)
         bent = self.bending * self.reach * self.reach / 2.0 / ops.maximum(through, SLOWEST)
@@ -110,7 +110,7 @@ def extent_of_attitude(ops: Ops, body: Ellipsoid, axes: Axes) -> Extent:
 
     Args:
         ops: The arithmetic of the axes.
-        body: The ellipsoid about the vehicle.
+        body: The ellipsoid around the vehicle.
         axes: Its body axes in the world.
     """
     centre, semi_axes = body.centre.tolist(), body.semi_axes.tolist()
@@ -128,8 +128,9 @@ def extent_of_thrust(ops: Ops, revolved: Sequence[Scalar], thrust: Vector) -> Ex
 
     Args:
         ops: The arithmetic of the thrust.
-        revolved: The body that encloses the vehicle however that is turned, as `Revolved` has it.
-        thrust: Along its thrust axis, of any length.
+        revolved: The numbers of `Revolved`, the body that contains the vehicle at every angle about its
+            thrust axis.
+        thrust: A vector of any length along the thrust axis.
     """
     wide, high, up, aside = revolved
     size = ops.sqrt(dot(thrust, thrust))

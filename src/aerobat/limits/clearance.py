@@ -55,9 +55,9 @@ class Clearance:
         """Return the planes between the body and the nearest pieces.
 
         Args:
-            positions: Of the centre of mass [m], (m, 3).
-            thrust_axes: Unit vectors, (m, 3).
-            times: [s], (m,).
+            positions: Positions of the centre of mass [m], (m, 3).
+            thrust_axes: Unit vectors along the thrust axis, (m, 3).
+            times: Times of the positions [s], (m,).
         """
         bodies, numbers, found = self._separated(positions, thrust_axes, times, EXACT_WITHIN)
         moved = np.sum(found.normals * self.pieces.moved(numbers, times[bodies]), axis=-1)
@@ -75,10 +75,10 @@ class Clearance:
         """Return the clearance [m] from the nearest piece at each position (infinite if far), and its name.
 
         Args:
-            positions: Of the centre of mass [m], (m, 3).
-            thrusts: Along the thrust axis there, of any length, (m, 3). Where it is zero no attitude is
-                determined, and the body counts in every attitude.
-            times: [s], (m,).
+            positions: Positions of the centre of mass [m], (m, 3).
+            thrusts: Vectors of any length along the thrust axis, (m, 3). Zero vectors mean an undetermined
+                attitude: the body is then considered in every attitude.
+            times: Times of the positions [s], (m,).
         """
         length, revolved = np.linalg.norm(thrusts, axis=-1, keepdims=True), self.body.revolved
         is_falling = length == 0.0
@@ -112,11 +112,12 @@ def left_between(
 
     Args:
         ops: The arithmetic.
-        revolved: The body that encloses the vehicle however that is turned, as `Revolved` has it.
-        position: Of its centre of mass [m].
-        thrust: Along its thrust axis, of any length.
-        normal: Of the plane, toward the body.
-        offset: Of the plane along it [m].
+        revolved: The numbers of `Revolved`, the body that contains the vehicle at every angle about its
+            thrust axis.
+        position: Position of the centre of mass [m].
+        thrust: A vector of any length along the thrust axis.
+        normal: Normal of the plane, towards the body.
+        offset: Offset of the plane along its normal [m].
     """
     against = (-1.0 * normal[0], -1.0 * normal[1], -1.0 * normal[2])
     return dot(normal, position) - extent_of_thrust(ops, revolved, thrust)(against) - offset

@@ -72,9 +72,9 @@ class Limit:
         """Return a sentence without its full stop about a violation.
 
         Args:
-            excess: A fraction of its size.
-            time: [s].
-            fields: Of the end that is exceeded; by default those of both.
+            excess: The violation, as a fraction of the limit's size.
+            time: The time of the violation [s].
+            fields: Fields of the violated end; by default those of both ends.
         """
         name = quantity_name(self.name, self.rotor)
         sentence = f"the {name} is beyond its limit by {100.0 * excess:.3g} % of its range at {time:.2f} s"

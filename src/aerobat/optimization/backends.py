@@ -36,13 +36,13 @@ class Solver(Protocol):
         """Return the assignment of minimum cost, or the best one found within the limits.
 
         Args:
-            program: what to solve.
-            time_limit: [s]; None sets no limit.
-            node_limit: relaxations solved, as the solver counts them; None sets no limit.
-            start: one slot a stage, an assignment that may be good; SCIP only checks it.
+            program: the program to solve.
+            time_limit: limit of the time [s]; None sets no limit.
+            node_limit: limit of the solved relaxations, as the solver counts them; None sets no limit.
+            start: one slot for each stage, an assignment that may be good; SCIP only checks its length.
 
         Raises:
-            SpecError: `start` has not one slot a stage.
+            SpecError: `start` does not have one slot for each stage.
         """
         ...
 

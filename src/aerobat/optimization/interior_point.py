@@ -1,9 +1,9 @@
 """Minimize a linear cost under smooth constraints, by a primal-dual interior point method.
 
-    minimize    gᵀ x   subject to   c(x) ≤ 0,   e(x) = 0,   lower < x < upper
+    minimize    gᵀ x   subject to   c(x) ≤ 0,   e(x) = 0,   lower < x < upper.
 
-Slacks s = −c(x) > 0 and multipliers z satisfy s z = μ, and the barrier parameter μ falls towards zero. Each
-step solves
+Slacks s = −c(x) > 0 and multipliers z satisfy s z = μ, and the barrier
+parameter μ falls towards zero. Each step solves
 
     (H + Cᵀ Σ C + B + δ I) dx + Eᵀ dy = −r,     E dx = −e,     Σ = z/s.
 
@@ -186,10 +186,10 @@ def interior_point(
     The result may be infeasible. Points outside the domain, or on the edge of the box, count as infinite.
 
     Args:
-        program: What is minimized.
-        start: Where to begin, (n,).
-        settings: Accuracy and length.
-        multipliers: Of the inequalities, from a program that is nearly the same.
+        program: The program to minimize.
+        start: The initial point, (n,).
+        settings: Accuracy, number of iterations and barrier parameters.
+        multipliers: Multipliers of the inequalities from a similar program (warm start).
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         return _InteriorPoint(program, settings).run(start, multipliers)
@@ -328,10 +328,10 @@ class _InteriorPoint:
         The weight of the violation is raised first where the predicted decrease needs it.
 
         Args:
-            before: Where it begins.
-            after: Where it ends.
-            promised: Change of the barrier function that a whole step was promised.
-            length: Of the step, 1 for a whole one.
+            before: Violation and barrier function at the start of the step.
+            after: Violation and barrier function at its end.
+            promised: Predicted change of the barrier function for a whole step.
+            length: Length of the step, 1 for a whole one.
         """
         if promised > 0.0 and before.violation > 0.0:
             least = promised / (_SHARE * before.violation)
@@ -359,12 +359,12 @@ class _InteriorPoint:
         """Return a step with second-order correction if it is accepted, else None.
 
         Args:
-            at: Where the step begins.
-            equations: Of the step.
-            trial: The end of the step, which is rejected.
-            before: Violation and barrier function.
-            step: That is corrected.
-            promised: Change of the barrier function that it was promised.
+            at: The start of the step.
+            equations: The linear equations of the step.
+            trial: The rejected trial point of the step.
+            before: Violation and barrier function at the start.
+            step: The step to correct.
+            promised: Predicted change of the barrier function for the step.
         """
         longest = length = self._longest(at, step)
         missed, equal = at.point.inequalities + at.slacks, at.point.equalities

@@ -17,9 +17,9 @@ def quadratic_minimum(
     Args:
         hessian: H, positive definite, (n, n).
         gradient: g, (n,).
-        reach: Of each variable, (n,).
+        reach: Bound of each variable's magnitude, (n,).
         rows: A, (m, n).
-        upper: (m,).
+        upper: Upper bounds of A x, (m,).
     """
     import daqp  # importing takes as long as solving
 

@@ -49,10 +49,11 @@ def minimum_effort(
     durations differ by more orders of magnitude than float64 can resolve.
 
     Args:
-        fixed: Derivatives 0 to s - 1 of position [m/s^d], world, (n + 1, s, 3), NaN where one is free.
-        durations: Of the segments [s], (n,).
-        rule: Continuity that gives way where a derivative is fixed.
-        heading: The trajectory's [rad].
+        fixed: Derivatives 0 to s - 1 of position [m/s^d], world, (n + 1, s, 3), NaN where a derivative is
+            free.
+        durations: Durations of the segments [s], (n,).
+        rule: The derivative whose continuity is given up for each fixed derivative.
+        heading: The trajectory's heading [rad].
     """
     lengths = _positive(durations)
     values, known = _split(fixed, len(lengths))

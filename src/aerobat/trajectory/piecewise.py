@@ -108,8 +108,8 @@ class Trajectory:
         Args:
             initial: Position, velocity, ... at t = 0 [m/s^k], world, (r, 3).
             inputs: The r-th derivative of position on each interval [m/s^r], world, (N, 3).
-            dt: How long an interval is [s]: one number for all, or (N,).
-            heading: The trajectory's [rad].
+            dt: Duration of an interval [s]: one number for all, or (N,).
+            heading: The trajectory's heading [rad].
         """
         state = frozen(initial, "initial", (None, 3))
         inputs = frozen(inputs, "inputs", (None, 3))

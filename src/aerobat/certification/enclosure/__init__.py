@@ -1,1 +1,1 @@
-"""Chebyshev series on pieces of a trajectory: their error, their extrema, and what those say of limits."""
+"""Chebyshev series on pieces of a trajectory: their errors, their extrema, and findings about limits."""

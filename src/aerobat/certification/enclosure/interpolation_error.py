@@ -83,11 +83,11 @@ def accuracy(
     """Bound the interpolation error on regular pieces.
 
     Args:
-        norms: Of the terms of v, f, f', f'' as Chebyshev series, (P, K + 1, 4).
-        seconds: How long the pieces are [s], (P,).
-        sums: Of the absolute values that v, f, f', f'' are evaluated from, (P, 4).
-        vehicle: What flies.
-        turns: Its yaw beside the frame without spin, if there is any.
+        norms: Norms of the terms of v, f, f', f'' as Chebyshev series, (P, K + 1, 4).
+        seconds: Durations of the pieces [s], (P,).
+        sums: Sums of the absolute values of the terms of v, f, f', f'', (P, 4).
+        vehicle: The vehicle.
+        turns: Its yaw relative to the frame without spin, or None.
     """
     around = on_ellipses(norms, seconds / 2, vehicle, turns)
     real = MagnitudeBounds(*(bound[:, 0] for bound in vars(around.magnitudes).values()))
@@ -163,11 +163,11 @@ def first_order(
     """Return first-order errors of flatness quantities for errors `off` of v, f, f', f''.
 
     Args:
-        real: Bounds of what it gives, (P,) each.
-        min_thrust: |f| at least [m/s²], (P,).
-        speed: |v| at most [m/s], (P,).
+        real: Bounds of the flatness quantities, (P,) each.
+        min_thrust: Lower bound of |f| [m/s²], (P,).
+        speed: Upper bound of |v| [m/s], (P,).
         off: Errors of v, f, f', f'', (P, 4).
-        vehicle: What flies.
+        vehicle: The vehicle.
     """
     f, df, ddf = (off[:, 1:] / min_thrust[:, None]).T
     return MagnitudeBounds(

@@ -40,10 +40,10 @@ class ExtremumQuery:
         """Return the finding for a proven enclosure of the maximum.
 
         Args:
-            reached: The function is at least so large at `time`.
-            bound: The function is nowhere larger.
-            time: [s].
-            everywhere: No time was left out.
+            reached: A value that the function reaches at `time`.
+            bound: An upper bound of the function.
+            time: The time of the reached value [s].
+            everywhere: Whether the enclosure covers the whole trajectory.
         """
         value, bound = self.read(reached), self.read(bound)
         limit = None if math.isinf(self.limit) else self.limit

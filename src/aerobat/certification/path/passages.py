@@ -31,9 +31,9 @@ def passage_findings(
 
     Args:
         trajectory: The path.
-        passages: Where it passes gates.
-        vehicle: What flies; its drag counts.
-        environment: Its gravity and wind count.
+        passages: The planned passages of gates.
+        vehicle: The vehicle; its drag is included.
+        environment: Gravity and wind.
     """
     instants = [_Instant.of(trajectory, passage, vehicle, environment) for passage in passages]
     return [finding for instant in instants for finding in instant.findings()]

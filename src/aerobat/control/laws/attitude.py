@@ -40,11 +40,11 @@ def attitude_feedback(
 
     Args:
         ops: The operations of an engine.
-        model: Of the vehicle, whose own gains bound these two.
+        model: The model of the vehicle; its own gains limit the two gains below.
         seen: The body and the reference.
-        desired: The axes that the body shall have.
-        attitude_gain: k_R over the inertia [1/s²].
-        rate_gain: k_Ω over the inertia [1/s].
+        desired: The desired body axes.
+        attitude_gain: k_R divided by the inertia [1/s²].
+        rate_gain: k_Ω divided by the inertia [1/s].
     """
     body_axes = axes(seen.body.q_world_body)
     e_r = rotation_error(body_axes, desired)

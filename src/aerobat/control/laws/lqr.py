@@ -31,8 +31,8 @@ def regulator(sizes: tuple[float, ...], effort: float) -> tuple[float, ...]:
     """Return the gains of a chain of integrators, by Bryson's rule.
 
     Args:
-        sizes: The errors that weigh as much as each other, of the first integral and so on.
-        effort: The input that weighs as much.
+        sizes: Errors with equal weight, from the last integral of the chain to the first.
+        effort: The input with the same weight.
     """
     from scipy.linalg import solve_continuous_are
 

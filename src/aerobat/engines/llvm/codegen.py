@@ -1,6 +1,6 @@
 """Code generation: a loop in LLVM's intermediate language, over all ticks of all vehicles.
 
-DERIVATION.md, beside this file, explains what is computed where, and why the results are bitwise
+DERIVATION.md, beside this file, explains where values are computed, and why the results are bitwise
 reproducible.
 
 A value is one number for all vehicles or, where vehicles differ, a vector with a lane for each of `width`

@@ -46,12 +46,13 @@ def smooth_functions(
     """Return a kernel and two derivatives as machine code.
 
     Args:
-        kernel: From its arithmetic, shared values, values that move and others of a place to what it returns.
-        shared: The number of values that are one for all places.
-        moved: Of those of a place by which slopes are taken.
-        fixed: Of the others of a place.
-        squares: Whether the curvature has that of Σ w_ij slope_i slope_j / 2 beside, with weights on pairs in
-            the order of `combinations_with_replacement` behind the others, those of unlike ones counted once.
+        kernel: A function of the arithmetic, and of the shared, moving and fixed values of a place.
+        shared: The number of shared values, the same for all places.
+        moved: The number of moving values of a place, by which derivatives are taken.
+        fixed: The number of fixed values of a place.
+        squares: Whether the curvature includes that of Σ w_ij slope_i slope_j / 2. The weights of the pairs
+            follow the other weights, in the order of `combinations_with_replacement`; pairs of unlike slopes
+            have one weight.
     """
     trace = Trace()
 
@@ -90,9 +91,9 @@ def place_function(
 
     Args:
         shared: Inputs that are one number for all places.
-        own: Inputs of which every place has its own.
+        own: Inputs that differ between places.
         directions: Inputs that all places take in turn, one row after another.
-        outputs: What comes out.
+        outputs: The results.
     """
     given, turns, found = (tuple(s.number for s in each) for each in ((*shared, *own), directions, outputs))
     loop = TracedLoop(outputs[0].trace, given, turns, (), (), (), found, (), ())

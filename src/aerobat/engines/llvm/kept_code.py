@@ -24,8 +24,8 @@ def kept_code(listing: str, compiled: Callable[[], bytes]) -> bytes:
     A folder that cannot be read or written, or a truncated file, only costs the time to compile.
 
     Args:
-        listing: All that the code follows from but the compiler's sources, which are taken into account.
-        compiled: Compiles the listing.
+        listing: Everything that determines the code, except the compiler's sources, which are added.
+        compiled: A function that compiles the listing.
     """
     path = _folder() / hashlib.sha256(f"{_compiler()}\n{listing}".encode()).hexdigest()
     with suppress(OSError, SpecError):

@@ -14,7 +14,7 @@ def axes_of(heading: float, elevation: float, tilt: float) -> Array:
     """Return an obstacle's own axes in the world, unit vectors as columns, (3, 3).
 
     Args:
-        heading: Of its x axis from the world's x toward y [rad].
+        heading: Angle of its x axis from the world's x towards y [rad].
         elevation: Climb of its x axis [rad].
         tilt: Roll about its x axis, right-handed [rad].
     """

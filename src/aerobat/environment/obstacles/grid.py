@@ -72,8 +72,8 @@ def occupied_boxes(
     Args:
         values: An occupancy grid with three axes, occupied where it is not zero; or points [m], (n, 3), whose
             cells are occupied.
-        cell: The edge of a cell [m], of points.
-        origin: The lower corner of the cell 0, 0, 0 [m], of points, (3,).
+        cell: The edge of a cell [m]; only for points.
+        origin: The lower corner of the cell 0, 0, 0 [m], (3,); only for points.
     """
     given = _numbers(values)
     if given.ndim == 3:

@@ -31,7 +31,8 @@ def mesh_parts(path: PathName, scale: Positive = 1.0) -> tuple[Array, ...]:
     or CoACD for parts that are not convex.
 
     Args:
-        path: An STL, OBJ, PLY, GLB or glTF file. A problem's file counts it from its own folder.
+        path: An STL, OBJ, PLY, GLB or glTF file. In a problem's file, the path is relative to that file's
+            folder.
         scale: The length of the file's unit [m].
     """
     suffix = beside_document(path).suffix.lower()

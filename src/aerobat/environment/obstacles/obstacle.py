@@ -19,8 +19,8 @@ from aerobat.environment.obstacles.path_rows import PathRows
 class Obstacle(ABC):
     """Something solid in the world that stands or moves without turning, made of convex pieces.
 
-    An obstacle of one's own inherits from this class, is registered by `@obstacle("its-name")`, and says its
-    pieces: planners, certificates, flights and pictures know nothing else of it.
+    A custom obstacle inherits from this class, is registered by `@obstacle("its-name")`, and defines its
+    `pieces`. Planners, certificates, flights and pictures use nothing else of it.
     """
 
     velocity: Vector3 = dataclasses.field(default_factory=lambda: np.zeros(3))  # [m/s] with which it moves

@@ -81,10 +81,10 @@ class Pieces:
         """Return the pairs of bodies and pieces that may be near, as indices of bodies and of pieces.
 
         Args:
-            centres: Of the bodies [m], (m, 3).
-            reach: Of a body from its centre in whichever direction, at most [m].
-            within: The distance [m] between body and piece from which on a pair is left out.
-            times: Of the bodies, (m,).
+            centres: Centres of the bodies [m], (m, 3).
+            reach: Upper bound of a body's extent from its centre in any direction [m].
+            within: Distance [m] between body and piece beyond which a pair is left out.
+            times: Times of the bodies [s], (m,).
         """
         over = None if times is None else (times, times)
         bodies, pieces = np.nonzero(self.apart(centres, centres, over) < reach + within)
@@ -96,7 +96,7 @@ class Pieces:
         Args:
             lower: Lower corners [m], (..., 3).
             upper: Upper corners [m], (..., 3).
-            over: When each box's time begins and ends, (...) both.
+            over: Start and end of each box's time interval [s], (...) each.
 
         Returns:
             Distances (..., P).
@@ -140,11 +140,11 @@ class Pieces:
         """Separate bodies from pieces, pair by pair; planes refer to the pieces' initial places.
 
         Args:
-            pieces: The number of each pair's piece, (m,).
-            centres: Of each pair's body [m], (m, 3).
+            pieces: The index of each pair's piece, (m,).
+            centres: The centre of each pair's body [m], (m, 3).
             shapes: L of each pair's body [m], (m, 3, 3).
-            exact_within: The gap [m] beyond which a plane between will do that is not the best.
-            times: Of each pair, (m,).
+            exact_within: The gap [m] beyond which any separating plane is enough, not the best one.
+            times: Times of the pairs [s], (m,).
         """
         if not len(pieces):
             return Separation(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
@@ -165,9 +165,10 @@ class Pieces:
         """Return lower bounds of the distances to all pieces [m], (m,), or to boxes around them.
 
         Args:
-            points: Where from [m], (m, 3).
-            exact_within: The distance [m] from a piece's box from which on the box will do.
-            times: Of the points, (m,).
+            points: The points [m], (m, 3).
+            exact_within: The distance [m] from a piece's box beyond which the distance from the box is
+                enough.
+            times: Times of the points [s], (m,).
         """
         found = self.apart(points, points, None if times is None else (times, times))
         for number, near in enumerate((found < exact_within).T):

@@ -76,7 +76,7 @@ class Sphere(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its centre, rounded by a ball."""
+        """The centre, rounded by a ball."""
         return (ConvexPiece(self.position[None], self.radius * np.eye(3), self.name),)
 
 
@@ -91,7 +91,7 @@ class Capsule(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its line, rounded by a ball."""
+        """The line, rounded by a ball."""
         return (ConvexPiece(np.array([self.start, self.end]), self.radius * np.eye(3), self.name),)
 
 
@@ -111,7 +111,7 @@ class Cylinder(Obstacle):
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """Its axis, rounded by a disc."""
+        """The axis, rounded by a disc."""
         along = (self.end - self.start) / np.linalg.norm(self.end - self.start)
         disc = self.radius * (np.eye(3) - np.outer(along, along))
         return (ConvexPiece(np.array([self.start, self.end]), disc, self.name),)

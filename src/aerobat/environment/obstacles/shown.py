@@ -27,8 +27,8 @@ def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surfa
     """Return the visible surfaces of the pieces near points; distant parts are cut off.
 
     Args:
-        pieces: In the world; those that move are whole.
-        points: What else is shown [m], (n, 3).
+        pieces: The pieces in the world; moving pieces are not cut.
+        points: Points of the other objects in the picture [m], (n, 3).
     """
     low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max())

@@ -102,10 +102,10 @@ def correct(
     """Return the correction after one more scalar measurement: P − c cᵀ/s, c = P h, s = h·c + r.
 
     Args:
-        correction: what is known before it.
-        measured: what it measures of the error, a linear function h·x.
-        innovation: measured less predicted, before any correction.
-        variance: r of its noise.
+        correction: the correction so far.
+        measured: the measured quantity as a linear function h·x of the error.
+        innovation: measured minus predicted value, before any correction.
+        variance: variance r of the measurement noise.
     """
     error, rows, nis = correction
     c = [measured(error_state(row)) for row in rows]

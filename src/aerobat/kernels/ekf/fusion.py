@@ -50,13 +50,14 @@ def fuse(
     restarts at that pose. The covariance must be predicted to the present (`predict_covariance`).
 
     Args:
-        ops: of the arithmetic.
-        parameters: of the filter.
-        state: now, when the pose arrives.
-        measured: the pose at its exposure.
-        past: the filter's own at the exposure: `pose_of` the state then, `carried_back` by fusions since.
+        ops: the arithmetic of the engine.
+        parameters: parameters of the filter.
+        state: the present state, when the pose arrives.
+        measured: the pose measured at its exposure.
+        past: the filter's own pose at the exposure: `pose_of` the state then, `carried_back` by later
+            fusions.
         age: T [s] from the exposure to now.
-        arrived: False where there is none.
+        arrived: False where no pose has arrived.
     """
     innovation = pose_innovation(ops, state.nominal, measured, past)
     correction = _correction(parameters, unpack(state.covariance), innovation, age)
@@ -89,8 +90,8 @@ def carried_back(before: EkfState, after: EkfState, past: Pose, age: Scalar) -> 
     Args:
         before: the state before the fusion.
         after: the state after it.
-        past: the pose at the exposure, as it was estimated then.
-        age: [s] from the exposure to the fusion.
+        past: the pose at the exposure, as estimated at that time.
+        age: time from the exposure to the fusion [s].
     """
     old, new = before.nominal, after.nominal
     moved = add_scaled(subtract(new.position, old.position), -age, subtract(new.velocity, old.velocity))

@@ -35,11 +35,11 @@ def propagate(
     is rotated by the attitude in the middle of the interval.
 
     Args:
-        ops: of the arithmetic.
-        parameters: of the filter.
-        state: at the interval's start.
-        sample: of the interval.
-        elapsed: its length T [s].
+        ops: the arithmetic of the engine.
+        parameters: parameters of the filter.
+        state: state at the interval's start.
+        sample: IMU sample of the interval.
+        elapsed: duration T of the interval [s].
     """
     nominal = state.nominal
     turn = scale(elapsed, subtract(sample.omega, nominal.gyro_bias))

@@ -50,11 +50,11 @@ def step(
     """Return the nearest approach a tick later.
 
     Args:
-        ops: of the arithmetic.
-        approach: before the tick.
+        ops: the arithmetic of the engine.
+        approach: the approach before the tick.
         target: the place.
-        snapshots: the last tick's and this one's.
-        counted: true where there was a last tick, and where this one counts.
+        snapshots: the snapshots at the last tick and at this tick.
+        counted: whether there was a last tick, and whether this tick counts.
     """
     here = _nearest(ops, *(relative(each, target.centre) for each in snapshots))
     in_window = magnitude(ops, here.time - target.planned) <= target.window

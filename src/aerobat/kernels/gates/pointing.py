@@ -63,11 +63,11 @@ def step(
     """Return the smallest angle a tick later.
 
     Args:
-        ops: of the arithmetic.
-        pointing: before the tick.
-        direction: where the thrust axis is to point.
-        snapshots: the last tick's and this one's, attitudes of unit length.
-        counted: true where there was a last tick, and where this one counts.
+        ops: the arithmetic of the engine.
+        pointing: the state before the tick.
+        direction: the required direction of the thrust axis.
+        snapshots: the snapshots at the last tick and at this tick, with attitudes of unit length.
+        counted: whether there was a last tick, and whether this tick counts.
     """
     here = _nearest(ops, direction, *snapshots)
     in_window = magnitude(ops, here.time - direction.planned) <= direction.window

@@ -54,11 +54,11 @@ def step(
     """Return the progress a tick later.
 
     Args:
-        ops: of the arithmetic.
-        progress: before the tick.
-        gate: its plane, and what encloses the vehicle; () where no body is measured.
-        snapshots: the last tick's and this one's.
-        counted: true where there was a last tick, and where this one counts.
+        ops: the arithmetic of the engine.
+        progress: the progress before the tick.
+        gate: the gate's plane, and the ellipsoid around the vehicle; () for an unknown body.
+        snapshots: the snapshots at the last tick and at this tick.
+        counted: whether there was a last tick, and whether this tick counts.
     """
     plane, ellipsoid = gate
     last, now = (beside(ops, each, plane.centre, plane.motion) for each in snapshots)

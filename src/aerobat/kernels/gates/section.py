@@ -64,11 +64,11 @@ def section(
     """Return the section of an ellipsoid by a plane.
 
     Args:
-        ops: of the arithmetic.
-        ellipsoid: what encloses the vehicle.
-        directions: the plane's normal, a direction in it, and the one beside that, unit vectors, world.
-        offset: of the centre of mass from the opening's centre [m], world.
-        q_world_body: the attitude, of any length but zero.
+        ops: the arithmetic of the engine.
+        ellipsoid: the ellipsoid around the vehicle.
+        directions: the plane's normal, a direction in the plane, and its perpendicular, unit vectors, world.
+        offset: position of the centre of mass relative to the opening's centre [m], world.
+        q_world_body: the attitude, of any length except zero.
     """
     body_axes = axes(normalize(ops, q_world_body))
     in_body = [to_body(body_axes, direction) for direction in directions]
@@ -127,11 +127,11 @@ def fraction_of_farthest(
     h²/σ²). This concave function has its maximum in closed form.
 
     Args:
-        ops: of the arithmetic.
-        at: at the end of the way.
-        change: of the centre on the way, along the normal and along the direction [m].
-        within: the least and the greatest fraction to choose from.
-        both_ways: 1 where the farthest against the direction is meant, if the section's centre is there.
+        ops: the arithmetic of the engine.
+        at: the section at the end of the path.
+        change: displacement of the centre along the normal and along the direction [m].
+        within: the smallest and the largest allowed fraction.
+        both_ways: 1 where the opposite direction counts, if the section's centre lies there.
     """
     rise, drift = change
     rise = ops.select(magnitude(ops, rise) < _ROUNDING, _ROUNDING, rise)

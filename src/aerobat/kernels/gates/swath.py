@@ -68,15 +68,16 @@ def step(
     """Return the progress a tick later.
 
     Args:
-        ops: of the arithmetic.
-        progress: before the tick.
-        parameters: the plane's normal, directions in it, the radius [m] of the circle about the opening, the
-            depth [m] about the plane, and what encloses a vehicle.
-        snapshots: the last tick's and this one's, positions from the opening's centre.
-        counted: true where there was a last tick, and where this one counts.
+        ops: the arithmetic of the engine.
+        progress: the progress before the tick.
+        parameters: the plane's normal, directions in it, the radius [m] of the circle around the opening, the
+            depth [m] around the plane, and the ellipsoid around the vehicle.
+        snapshots: the snapshots at the last tick and at this tick, positions relative to the opening's
+            centre.
+        counted: whether there was a last tick, and whether this tick counts.
         crosses: 1 where the centre crosses the plane between them.
-        crossed: true where the centre has crossed and is within the depth, wherever it crossed; and where
-            with this tick the stay, this or the last, has become the one that counts.
+        crossed: two flags: whether the centre has crossed the plane anywhere and is within the depth; and
+            whether, with this tick, this stay or the last one has become the one that counts.
     """
     normal, directions, radius, depth, ellipsoid = parameters
     is_passing, passed = crossed
@@ -114,12 +115,12 @@ def swept_between(
     The attitude at the second tick determines the time of the extremes, the attitude at that time their size.
 
     Args:
-        ops: of the arithmetic.
-        plane: its normal, and directions in it.
-        ellipsoid: what encloses the vehicle.
-        snapshots: at both ticks, positions from the opening's centre.
-        gaps: between body and plane at both [m].
-        crosses: 1 where the centre crosses the plane between them.
+        ops: the arithmetic of the engine.
+        plane: the plane's normal, and directions in it.
+        ellipsoid: the ellipsoid around the vehicle.
+        snapshots: the snapshots at both ticks, positions relative to the opening's centre.
+        gaps: distances between body and plane at both ticks [m].
+        crosses: 1 where the centre crosses the plane between the ticks.
     """
     before, behind = gaps
     meets = ops.minimum(before, behind) <= 0.0
@@ -143,12 +144,12 @@ def _extreme(
     """Return the farthest point along a direction, within fractions of the way between two ticks.
 
     Args:
-        ops: of the arithmetic.
-        normal: of the plane.
-        direction: in the plane.
-        ellipsoid: what encloses the vehicle.
-        snapshots: at both ticks, positions from the opening's centre.
-        within: the fractions.
+        ops: the arithmetic of the engine.
+        normal: normal of the plane.
+        direction: direction in the plane.
+        ellipsoid: the ellipsoid around the vehicle.
+        snapshots: the snapshots at both ticks, positions relative to the opening's centre.
+        within: the smallest and the largest fraction.
     """
     last, now = snapshots
     directions = normal, direction.along, direction.beside

@@ -37,9 +37,9 @@ def dual_ascent(
 
     Args:
         inverse_gram: the inverse of the active rows' Gram matrix, (w, w).
-        multipliers: of the active rows at the start, (w,).
-        is_equality: which of the rows have multipliers of either sign and never drop, (w,).
-        directions: of the candidates.
+        multipliers: multipliers of the active rows at the start, (w,).
+        is_equality: mask of the rows that never drop, because their multipliers may have either sign, (w,).
+        directions: directions of the candidates.
     """
     # multipliers, infinite once a row is dropped
     remaining = np.where(is_equality, inf, multipliers)[:, None]

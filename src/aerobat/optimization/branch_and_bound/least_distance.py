@@ -66,13 +66,13 @@ class LeastDistanceQP:
         """Return the minimizer, or None where there is none with ½|y|² <= cutoff.
 
         Args:
-            lower: bounds of M y, (m,), −UNBOUNDED where there is none.
-            upper: likewise, UNBOUNDED where there is none.
+            lower: lower bounds of M y, (m,), −UNBOUNDED where there is none.
+            upper: upper bounds of M y, (m,), UNBOUNDED where there is none.
             warm_start: the solution for similar bounds, whose active rows are tried first.
-            cutoff: of ½|y|².
+            cutoff: largest ½|y|² of interest.
 
         Raises:
-            NotConverged: DAQP fails with its careful settings too.
+            NotConverged: DAQP fails even with its careful settings.
         """
         if lower.max(initial=0.0) <= 0.0 <= upper.min(initial=0.0):
             y = np.zeros(self._rows.shape[1])
@@ -108,8 +108,8 @@ class LeastDistanceQP:
     def _redundant(self, lower: Array, upper: Array) -> Indices | None:
         """Return the equalities that follow from others; None where no y satisfies all of them.
 
-        DAQP ignores residuals below `_TOLERANCE` and detects dependence where they are larger. Dependent
-        equalities with residuals near the tolerance it reports as infeasible, however large the bounds are.
+        DAQP ignores residuals below `_TOLERANCE` and detects dependence where they are larger. It reports
+        dependent equalities with residuals near the tolerance as infeasible, for bounds of any size.
         """
         larger = np.maximum(np.abs(lower), np.abs(upper))
         equal = np.flatnonzero(upper - lower <= _EQUAL * np.maximum(larger, 1.0))

@@ -153,10 +153,10 @@ class DualBounds:
         multipliers. The bound is infinite where the two are not compatible.
 
         Args:
-            solution: of the node.
-            lower_bounds: of the node, for q candidates.
-            steps: that prove those.
-            some: c of the q candidates, (c,).
+            solution: the solution of the node.
+            lower_bounds: the bounds of the node for q candidates.
+            steps: the dual steps that prove these bounds.
+            some: indices of c of the q candidates, (c,).
         """
         moved = steps.multiplier_change[:, some].T @ steps.active_rows
         moved += np.einsum(

@@ -1,7 +1,7 @@
 """Elimination of the equalities: the QP becomes the shortest vector that satisfies the range rows.
 
 With H = L Lᵀ and w = Lᵀ x + L⁻¹ f the cost is ½|w|² plus a constant. The solutions of the equalities G w = d
-are w = G⁺ d + Z y, where Z is an orthonormal basis of the null space of G, so that
+are w = G⁺ d + Z y. Z is an orthonormal basis of the null space of G. In terms of y:
 
     cost = ½|y|² + ½|G⁺ d|² + constant,      rows:  lower <= M y <= upper,   |M_i| = 1.
 """
