@@ -20,7 +20,7 @@ class Verdict(StrEnum):
     """Knowledge about a limit over continuous time."""
 
     HOLDS = "holds"  # proven, or there is no limit
-    VIOLATED = "violated"  # at the time given
+    VIOLATED = "violated"  # violated at the time given
     # nearer to its limit than the enclosure can resolve, or attitude undetermined on the way
     UNDECIDED = "undecided"
 
@@ -43,19 +43,19 @@ class Finding:
     quantity: str  # "thrust" or "command" of a rotor, "collective thrust", "tilt", "velocity x", ...
     unit: str
     side: Side
-    value: float  # reached at `time`
+    value: float  # the value reached at `time`
     bound: float  # proven: the quantity is nowhere beyond it
     time: float  # [s]
     limit: float | None
     verdict: Verdict
-    gate: str | None = None  # passed at that time
-    waypoint: str | None = None  # met at that time
+    gate: str | None = None  # the gate passed at that time
+    waypoint: str | None = None  # the waypoint met at that time
     rotor: int | None = None  # the rotor whose thrust or command this is
     field: str = ""  # the field of the vehicle or problem that sets the limit: "max_thrust", "limits.jerk"
     size: float | None = None  # size of the range between the limits; reserves are fractions of it
     room: float = inf  # distance of the limit from the range's end; reserves keep a part of it
     end: Literal["start", "goal"] | None = None  # the end of the path at that time
-    obstacle: str | None = None  # nearest to the body at that time
+    obstacle: str | None = None  # the obstacle nearest to the body at that time
 
     @property
     def name(self) -> str:
@@ -103,7 +103,7 @@ class Finding:
         return f"{reached}, {self.shown(margin, 2)} within its limit"
 
     def shown(self, value: float, digits: int = 4) -> str:
-        """Return a value of this quantity with its unit, angles in degrees; no power of ten below a million."""
+        """Return a value of this quantity with its unit, angles in degrees, below a million in full."""
         number = round(degrees(value) if self.unit == "rad" else value, 9) + 0.0  # rounds tiny values to zero
         unit = "°" if self.unit == "rad" else f" {self.unit}"
         whole = len(f"{abs(number):.0f}")
@@ -149,9 +149,10 @@ class Certificate:
     """
 
     findings: tuple[Finding, ...]
-    undetermined: tuple[TimeInterval, ...]  # where thrust vanishes, and with it the attitude
+    undetermined: tuple[TimeInterval, ...]  # where thrust vanishes, so that the attitude is undetermined
     discontinuities: tuple[Discontinuity, ...]
-    too_unequal: float | None = None  # [s] from then on it is drag unequal along x and y that leaves it open
+    # [s] time from which on unequal drag along x and y leaves the attitude undetermined
+    too_unequal: float | None = None
 
     @property
     def certified(self) -> bool:

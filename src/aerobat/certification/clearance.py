@@ -50,7 +50,7 @@ MAX_OPEN = 20_000  # limit of the pairs besides the initial ones; no known path 
 class LeastGap:
     """The smallest gap between a body and obstacles, enclosed between `value` and `bound`."""
 
-    value: float = inf  # [m] reached at `time`
+    value: float = inf  # [m] the gap reached at `time`
     bound: float = inf  # [m] proven: the gap is nowhere smaller
     time: float = 0.0  # [s]
     obstacle: str | None = None  # the nearest obstacle at that time
@@ -153,7 +153,7 @@ class _Beside:
     path: BodyPath
     pieces: Pieces
     parts: Subintervals  # of the path's pieces, (m,)
-    series: Array  # of centre of mass [m] and thrust axis, (m, K + 1, 6)
+    series: Array  # series of centre of mass [m] and thrust axis, (m, K + 1, 6)
     obstacles: Indices  # (m,)
     normals: Array  # unit vectors from the piece to the body, (m, 3)
     offsets: Array  # h [m], (m,)

@@ -35,12 +35,10 @@ from aerobat.trajectory import polynomial
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import mixer
 
-# rounds of halving pieces on which interpolation for the mean drag is already accurate
 QUATERNION_DEGREE = 14
-# [rad] largest attitude error: first-order errors, doubled, are valid far beyond it
 RHO = np.array([1.0, 1.4, 1.6, 1.8, 2.0, 2.3])
-HALVINGS = 8  # of pieces that the mean drag is content with
-LARGEST_ERROR = 1e-3  # [rad] of attitude: first-order errors, taken twice, hold far beyond
+HALVINGS = 8  # rounds of halving pieces on which interpolation for the mean drag is already accurate
+LARGEST_ERROR = 1e-3  # [rad] largest attitude error: first-order errors, doubled, are valid far beyond it
 
 
 def interpolated_with_unequal_drag(

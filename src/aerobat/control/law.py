@@ -30,8 +30,8 @@ L = TypeVar("L", bound="ControlLaw")
 class Seen(NamedTuple):
     """State, rotor thrusts and reference that a law knows at a tick."""
 
-    body: Body  # as the observer has it, when the commands take effect; world, rates in body axes
-    thrusts: PerRotor  # [N] that the rotors give, by the nominal model
+    body: Body  # estimated, at the time when the commands take effect; world, rates in body axes
+    thrusts: PerRotor  # [N] rotor thrusts predicted by the nominal model
     reference: ReferencePoint  # world; its specific thrust is a + g e3, without drag
 
 

@@ -109,7 +109,7 @@ class Schedule:
     inputs: FilterInput  # leaves (rows,)
     slots: int  # largest number of poses in transit at once, at least 1
     sample_rows: Indices  # the last row of each sample that ends after the first pose
-    sample_times: Array  # [s] of those ends
+    sample_times: Array  # [s] ends of these samples
     arrival_rows: Indices  # of each pose, -1 for poses that are not fused
 
 
@@ -183,14 +183,15 @@ class Estimates:
     position: Array  # [m] world, (T, 3)
     velocity: Array  # [m/s] world, (T, 3)
     q_world_body: Array  # (T, 4)
-    omega_body: Array  # [rad/s] mean over the sample, its bias taken off, (T, 3)
+    omega_body: Array  # [rad/s] mean over the sample, without its bias, (T, 3)
     gyro_bias: Array  # [rad/s], (T, 3)
     accelerometer_bias: Array  # [m/s²], (T, 3)
     sigma: Array  # 1σ of errors of position, velocity, attitude (body axes) and both biases, (T, 15)
-    nis: Array  # normalized innovation squared of each pose, NaN for those that were not fused, (P,)
-    accepted: Mask  # poses that were taken; the first is where the filter begins, (P,)
-    jumps: Array  # [s] arrivals of poses that were taken as a jump, (J,)
-    coasting: tuple[TimeInterval, ...]  # from a pose's exposure to the next one's arrival, or to the end
+    nis: Array  # normalized innovation squared of each pose, NaN for poses that were not fused, (P,)
+    accepted: Mask  # accepted poses; the filter begins at the first one, (P,)
+    jumps: Array  # [s] arrival times of poses accepted as jumps, (J,)
+    # from the exposure of an accepted pose to the arrival of the next one, or to the end
+    coasting: tuple[TimeInterval, ...]
 
     def __str__(self) -> str:
         """Return a one-line summary."""

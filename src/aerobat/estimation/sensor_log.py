@@ -25,13 +25,13 @@ class SensorLog:
     shapes that differ, NaN, times that do not rise, and gaps.
     """
 
-    imu_times: Array  # [s] of the ends of the samples' intervals, (T,)
+    imu_times: Array  # [s] ends of the samples' intervals, (T,)
     omega: Array  # [rad/s] body, (T, 3)
     specific_force: Array  # [m/s²] body, (T, 3)
-    pose_times: Array  # [s] of their exposure, (P,)
+    pose_times: Array  # [s] exposure times, (P,)
     position: Array  # [m] world, (P, 3)
     q_world_body: Array  # (P, 4)
-    arrival_times: Array | None = None  # [s], (P,), by default those of exposure
+    arrival_times: Array | None = None  # [s], (P,), by default the exposure times
 
     def __post_init__(self) -> None:
         imu = self._series("imu_times", ("omega", 3), ("specific_force", 3))

@@ -17,7 +17,7 @@ _MIN_ATTITUDE_NOISE = 1e-3  # [rad] likewise
 
 @declared
 class Ekf:
-    """Errors that the error-state Kalman filter reckons with, as data sheets have them, and its trust."""
+    """Settings of the error-state Kalman filter: sensor noise as in data sheets, and outlier rejection."""
 
     gyro_noise: NonNegative = 1e-3  # [rad/s/√Hz] density of the white noise
     accelerometer_noise: NonNegative = 0.02  # [m/s²/√Hz] density of the white noise
@@ -27,9 +27,9 @@ class Ekf:
     accelerometer_bias_walk: NonNegative = 3e-3  # [m/s³/√Hz] the bias spreads by this times √t
     position_noise: Positive = 0.001  # [m] 1σ of a pose, each axis
     attitude_noise: Positive = radians(0.3)  # [rad] 1σ of a pose, about each body axis
-    start_velocity: NonNegative = 0.05  # [m/s] 1σ of what is taken for the velocity at first, each axis
-    gate_probability: Fraction = 0.9999  # of a true pose to be believed
-    rejections_until_jump: Count = 5  # poses rejected in a row, the last of which is believed to be a jump
+    start_velocity: NonNegative = 0.05  # [m/s] 1σ of the assumed initial velocity, each axis
+    gate_probability: Fraction = 0.9999  # probability that a correct pose is accepted
+    rejections_until_jump: Count = 5  # poses rejected in a row, the last of which is accepted as a jump
 
     @classmethod
     @validated
@@ -55,7 +55,7 @@ class Ekf:
 
     @property
     def max_nis(self) -> float:
-        """The largest accepted normalized innovation squared: chi² of 6 freedoms at `gate_probability`."""
+        """importing takes longer than the filter's settings"""
         from scipy.special import chdtri  # imported when needed: it takes longer than the filter's settings
 
         return float(chdtri(POSE_FREEDOMS, 1.0 - self.gate_probability))

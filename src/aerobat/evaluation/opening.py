@@ -23,13 +23,13 @@ Side = Literal["both", "width", "height"]
 class Opening:
     """An opening around a gate's centre, and the statistical confidence in it."""
 
-    # of the upright box around it, infinite where more flights fail to cross the gate's plane than may
+    # of the upright box around it, infinite where too many flights miss the gate's plane
     width: float  # [m]
     height: float  # [m] likewise
-    scale: float  # [-] of the gate's own opening, or of the side that was sought
-    sample_scale: float  # [-] that the wanted fraction of the flights at hand has passed: an estimate
-    probability: float  # with which a flight passes it
-    confidence: float  # with which that is so, whatever the flights' distribution
+    scale: float  # [-] scale of the gate's opening, or of the chosen side
+    sample_scale: float  # [-] scale that the given fraction of these flights has passed: an estimate
+    probability: float  # probability that a flight passes the opening
+    confidence: float  # confidence in that probability, for any distribution of flights
     flights: int
 
     def __str__(self) -> str:

@@ -83,21 +83,21 @@ class Score(PerFlight):
     rms_position_error_m: float
     max_attitude_error_deg: float
     rms_attitude_error_deg: float
-    saturated_fraction: float  # of the control periods, any rotor's command clipped
+    saturated_fraction: float  # fraction of control periods with a clipped rotor command
     passages: tuple[Passage, ...]  # one for each gate, in the order of the stages
     waypoints: tuple[WaypointPassage, ...]  # one for each ball, in the order of the stages
-    places: tuple[WaypointPassage, ...]  # other stages that say where they are, then the goal
-    attitudes: tuple[StageAttitude, ...]  # of other stages, in their order
-    stop: float  # [s] when it diverged, NaN if it did not
-    is_finite: bool  # false where it diverged by what is not a number
-    ground_time: float  # [s] when the vehicle was below ground first, NaN if never
-    off_path_time: float  # [s] when the vehicle had left its path first, NaN if never
-    contact: Contact  # what the vehicle came to touch first, where its plant felt that
-    contact_time: float  # [s] when, NaN if never
-    nearest: NearestObstacle | None = None  # None where there are no obstacles, or the body is not known
-    path_radius_m: float = inf  # by which the path may be left
-    lap_begin_s: float = 0.0  # when the first lap begins; a closed course's before the flight
-    observer: ObserverScore | None = None  # of a filter, where a logged flight had one
+    places: tuple[WaypointPassage, ...]  # other stages that constrain the position, then the goal
+    attitudes: tuple[StageAttitude, ...]  # other stages that constrain the attitude, in their order
+    stop: float  # [s] time of divergence, NaN if none
+    is_finite: bool  # false where it diverged with values that are not finite
+    ground_time: float  # [s] first time below the ground, NaN if never
+    off_path_time: float  # [s] first time off the path, NaN if never
+    contact: Contact  # first contact, if the plant detects contacts
+    contact_time: float  # [s] time of the first contact, NaN if none
+    nearest: NearestObstacle | None = None  # None without obstacles, or for an unknown body
+    path_radius_m: float = inf  # allowed distance from the path
+    lap_begin_s: float = 0.0  # start of the first lap; before the flight for a closed course
+    observer: ObserverScore | None = None  # errors of the state estimator, for a logged flight that had one
 
     @property
     def is_batch(self) -> bool:

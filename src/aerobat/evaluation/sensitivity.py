@@ -65,7 +65,7 @@ class Gradient:
     """
 
     value: Array  # (...)
-    slopes: Mapping[str, Array]  # by the quantity's name, (..., *its shape), in its unit
+    slopes: Mapping[str, Array]  # by name of the quantity, (..., *its shape), per unit of the quantity
 
 
 @by_value

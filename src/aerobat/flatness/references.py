@@ -49,9 +49,9 @@ class Reference:
     """The state and the rotor thrusts that a trajectory requires, at every time of a series."""
 
     times: Array  # [s], (T,)
-    setpoint: Setpoint  # leading axis T; where the attitude is undetermined it is held and its rates are zero
-    rotor_thrusts: Array  # [N], as flatness has them, limits or not, (T, n)
-    undetermined: tuple[TimeInterval, ...]  # where |f| is next to nothing, between samples too
+    setpoint: Setpoint  # leading axis T; an undetermined attitude is held, with zero rates
+    rotor_thrusts: Array  # [N] required by flatness, not clipped to limits, (T, n)
+    undetermined: tuple[TimeInterval, ...]  # intervals with almost zero |f|, also between samples
 
     def __str__(self) -> str:
         """Return a one-line summary."""

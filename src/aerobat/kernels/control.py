@@ -53,7 +53,7 @@ class Commands(NamedTuple):
     """Commands of one tick."""
 
     thrusts: PerRotor  # [N] within limits
-    saturated: Scalar  # true where the limits changed them
+    saturated: Scalar  # true where the limits changed the thrusts
 
 
 class AttitudePursuit(NamedTuple):
@@ -69,7 +69,7 @@ class ControllerState(NamedTuple):
     outer: PositionLoopState
     attitude_integral: Vector  # [rad·s]
     thrusts: PerRotor  # [N] rotor thrusts predicted by the nominal model
-    commands: Commands  # the last ones
+    commands: Commands  # the last commands
 
 
 def init(ops: Ops, model: ControllerModel, body: Body, reference: ReferencePoint) -> ControllerState:

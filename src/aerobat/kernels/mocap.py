@@ -35,7 +35,7 @@ class MocapParameters(NamedTuple):
     dropout: Scalar  # [-]
     outlier: Scalar  # [-]
     outlier_size: Scalar  # [m]
-    outage: tuple[Scalar, Scalar]  # [s] from, to before
+    outage: tuple[Scalar, Scalar]  # [s] start and end
     seam: Seam
     first_error: tuple[Vector, Vector]  # [m], [rad] errors of the pose before the flight
 

@@ -30,8 +30,8 @@ class Ground(NamedTuple):
 class MetricsParameters(NamedTuple):
     """The criteria for a flight."""
 
-    divergence_radius_sq: Scalar  # [m²] of squared position error, beyond which a vehicle has diverged
-    path_radius_sq: Scalar  # [m²] of squared position error, beyond which it has left its path
+    divergence_radius_sq: Scalar  # [m²] largest squared position error before divergence
+    path_radius_sq: Scalar  # [m²] largest squared position error on the path
     ground: Ground
     ellipsoid: BoundingEllipsoid  # of the vehicle
     gates: tuple[GatePlane, ...]

@@ -85,7 +85,7 @@ class Limit:
 class Asked:
     """All sources of limits: a vehicle, an environment, and a problem's bounds for the whole path."""
 
-    vehicle: Vehicle | None  # None: no vehicle in particular
+    vehicle: Vehicle | None  # None: for any vehicle
     environment: Environment
     limits: Limits
     conditions: tuple[Condition, ...]

@@ -59,7 +59,7 @@ class ScaledProgram:
     """A program with unit rows and variables of order one, for solvers whose tolerances are absolute."""
 
     program: AssignmentProgram
-    unit: float  # of the variables
+    unit: float  # unit of the variables
 
     def unscaled(self, claim: AssignmentResult) -> AssignmentResult:
         """Return a claim on the scaled program as a claim on the program itself."""

@@ -112,7 +112,7 @@ class Settings:
     least_slack: float = 1e-2  # smallest initial slack
     damping: float = 1e-4  # smallest δ
     iterations: int = 60
-    tolerance: float = 1e-4  # of all optimality conditions
+    tolerance: float = 1e-4  # tolerance of all optimality conditions
     violation: float = 1e-3  # largest violation at which a cost that no longer changes counts as converged
     gain: float = 1e-3  # change of the cost, over some iterations, below which the cost counts as unchanged
 
@@ -124,7 +124,7 @@ class InteriorPointResult:
     x: Array
     converged: bool  # all conditions hold, or the cost no longer changes and the violation is small
     iterations: int
-    z: Array  # the multipliers of inequalities
+    z: Array  # multipliers of the inequalities
 
 
 @dataclass(eq=False)
@@ -134,8 +134,8 @@ class _Iterate:
     x: Array
     point: ConstrainedPoint
     slacks: Array
-    z: Array  # of inequalities
-    y: Array  # of equalities
+    z: Array  # multipliers of the inequalities
+    y: Array  # multipliers of the equalities
     z_lower: Array
     z_upper: Array
 

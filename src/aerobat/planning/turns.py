@@ -1,4 +1,4 @@
-"""The number of turns of a path to upside down, beyond those that its stages ask."""
+"""The number of times that a path turns the vehicle over, beside what its stages ask."""
 
 from __future__ import annotations
 

@@ -68,7 +68,8 @@ class Trajectory:
     durations: Array  # [s], (S,)
     coefficients: Array  # [m], (S, degree + 1, 3), powers of normalised time rising
     heading: Angle = 0.0  # [rad] about the thrust axis at the start
-    yaw: Array | None = None  # [rad] beside what is carried, (S, any), powers rising; None: no spin
+    # [rad] relative to the frame without spin, (S, any), powers rising; None: no spin
+    yaw: Array | None = None
 
     def __post_init__(self) -> None:
         """Copy, check and write-protect the arrays."""

@@ -43,7 +43,8 @@ class Indi(ControlLaw):
     Attitude and position are controlled as in Lee et al. (2010), with an integral of the position error.
     """
 
-    TAKES_DISTURBANCES: ClassVar[bool] = False  # of moments by itself, of forces by the integral
+    # moments are rejected by the law itself, forces by the integral
+    TAKES_DISTURBANCES: ClassVar[bool] = False
 
     position_gain: NonNegative = 25.0  # [1/s²]
     velocity_gain: NonNegative = 9.0  # [1/s]
@@ -52,7 +53,7 @@ class Indi(ControlLaw):
     max_feedback: NonNegative = 15.0  # [m/s²]
     attitude_gain: NonNegative = 625.0  # [1/s²]
     rate_gain: NonNegative = 42.5  # [1/s]
-    filter_time: Positive = 0.02  # [s] of what is measured
+    filter_time: Positive = 0.02  # [s] time constant of the low-pass filter of measurements
 
     def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> Increments:
         """Return the measurements before the first tick."""

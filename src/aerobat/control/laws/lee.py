@@ -24,10 +24,10 @@ class Lee(ControlLaw):
     that the vehicle's rotors allow.
     """
 
-    position_gain: NonNegative = 20.0  # [1/s²] k_x over the mass
-    velocity_gain: NonNegative = 8.0  # [1/s] k_v over the mass
-    attitude_gain: NonNegative = 625.0  # [1/s²] k_R over the inertia
-    rate_gain: NonNegative = 42.5  # [1/s] k_Ω over the inertia
+    position_gain: NonNegative = 20.0  # [1/s²] k_x divided by the mass
+    velocity_gain: NonNegative = 8.0  # [1/s] k_v divided by the mass
+    attitude_gain: NonNegative = 625.0  # [1/s²] k_R divided by the inertia
+    rate_gain: NonNegative = 42.5  # [1/s] k_Ω divided by the inertia
     max_feedback: NonNegative = 15.0  # [m/s²]
 
     def step(

@@ -46,13 +46,13 @@ def regulator(sizes: tuple[float, ...], effort: float) -> tuple[float, ...]:
 class Lqr(ControlLaw):
     """The linear-quadratic regulator of the errors about the trajectory, weighted by Bryson's rule."""
 
-    position: Positive = 0.1  # [m] an error that weighs as much as each of the others
+    position: Positive = 0.1  # [m] error with the same weight as each error below
     velocity: Positive = 0.8  # [m/s]
     tilt: Positive = 0.6  # [rad] at a specific thrust of 10 m/s²
     rate: Positive = 12.0  # [rad/s] likewise
     angular_acceleration: Positive = 300.0  # [rad/s²] the effort
     thrust: Positive = 6.0  # [m/s²] the effort along the thrust
-    max_position_error: Positive = 1.0  # [m] larger ones are answered as if they were this
+    max_position_error: Positive = 1.0  # [m] larger errors are clipped to this
 
     def step(
         self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar

@@ -59,8 +59,8 @@ class Rates(ControlLaw):
 
     tilt_gain: NonNegative = 16.0  # [1/s] rate per angle of roll and pitch, less where the inner loop is slow
     yaw_gain: NonNegative = 6.0  # [1/s] rate per angle of yaw, at most a third of the inner loop's gain
-    max_correction: Positive = 3.0  # [rad/s] of each axis, beside what the reference asks
-    max_rate: Positive = 34.0  # [rad/s] of each axis: gyros tell 35, which are 2000°/s
+    max_correction: Positive = 3.0  # [rad/s] limit of each axis of the correction to the reference's rates
+    max_rate: Positive = 34.0  # [rad/s] limit of each axis; gyros measure up to 35, which is 2000°/s
 
     def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> RatesState:
         """Return the state before the first tick, with the reference's rates and thrust as set-point."""

@@ -87,7 +87,7 @@ class Packing:
 
     vehicles: int
     width: int
-    kinds: tuple[InputKind, ...]  # of each input
+    kinds: tuple[InputKind, ...]  # kind of each input
 
     @classmethod
     def of(cls, inputs: Tree, vehicles: int, width: int) -> Packing:

@@ -29,8 +29,8 @@ class ErrorState(NamedTuple):
 class Correction(NamedTuple):
     """The estimated error after the measurements so far."""
 
-    error: ErrorState  # its mean
-    rows: Rows  # its covariance
+    error: ErrorState  # mean of the error
+    rows: Rows  # covariance of the error
     nis: Scalar  # normalized innovation squared, summed
 
 

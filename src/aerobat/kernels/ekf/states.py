@@ -19,7 +19,7 @@ class EkfParameters(NamedTuple):
     accelerometer_noise: Scalar  # [m²/s³] density
     gyro_walk: Scalar  # [rad²/s³] density of its bias's rate
     accelerometer_walk: Scalar  # [m²/s⁵] density of its bias's rate
-    velocity_variance: Scalar  # [m²/s²] at first, each axis
+    velocity_variance: Scalar  # [m²/s²] initial, each axis
     gyro_bias_variance: Scalar  # [m²/s²] initial, each axis
     accelerometer_bias_variance: Scalar  # [rad²/s²] initial
     position_variance: Scalar  # [m²/s⁴] initial

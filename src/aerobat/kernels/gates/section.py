@@ -44,7 +44,7 @@ class Section(NamedTuple):
     shear_along: Scalar  # change of the section's centre with the height
     shear_beside: Scalar  # likewise
     half: Scalar  # [m] half extent of the section along the direction, through the centre
-    covariance: Scalar  # [m²] of along and beside there
+    covariance: Scalar  # [m²] covariance of along and beside in the section
 
 
 class PlanePoint(NamedTuple):

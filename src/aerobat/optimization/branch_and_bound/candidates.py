@@ -49,9 +49,8 @@ class Candidates:
         stages = [program.stages[i] for i in self.free_stages]
         counts = [len(stage.slots) for stage in stages]
         self.stage = np.repeat(np.array(self.free_stages, dtype=np.intp), counts)
-        # the index of the stage in free_stages
         self.slot = np.array([slot for stage in stages for slot in stage.slots], dtype=np.intp)
-        self.group = np.repeat(np.arange(len(stages)), counts)  # the place of the stage among free_stages
+        self.group = np.repeat(np.arange(len(stages)), counts)  # the index of the stage among free_stages
         self._group_starts = np.cumsum([0, *counts])
         self.compatible = _compatible(
             program, self.stage, self.slot, self.stage[:, None], self.slot[:, None]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array, Indices
 from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED
 
-# DAQP's marks on a row, and its exit flags
+# DAQP's flags of a row, and its exit flags
 _AT_UPPER, _AT_LOWER, _IGNORED = 1, 3, 4
 _SOLVED, _INFEASIBLE, _OVERDETERMINED = 1, -1, -6
 _EQUAL = 1e-11  # bounds closer than this, relative to the larger one or to 1, make an equality
