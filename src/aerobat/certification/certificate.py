@@ -53,7 +53,7 @@ class Finding:
     rotor: int | None = None  # the rotor whose thrust or command this is
     field: str = ""  # the field of the vehicle or problem that sets the limit: "max_thrust", "limits.jerk"
     size: float | None = None  # size of the range between the limits; reserves are fractions of it
-    room: float = inf  # distance of the limit from the range's end; reserves keep a part of it
+    room: float = inf  # room next to the limit, as a fraction of that range; reserves keep a part of it
     end: Literal["start", "goal"] | None = None  # the end of the path at that time
     obstacle: str | None = None  # the obstacle nearest to the body at that time
 

@@ -41,7 +41,7 @@ NEAR_TIGHTNESS = 0.5  # the same as a fraction of the gap, where that is smaller
 OVERLAP_TIGHTNESS = 0.02  # the same as a fraction of the depth of an overlap, where that is larger
 FINEST_TIGHTNESS = 1e-6  # [m] smallest value of that distance, for tiny gaps
 FIRST = 64  # obstacles considered first: any small gap found prunes many others
-HALVINGS = 3  # halvings between two searches for planes: a hundred pairs cost little more than one
+HALVINGS = 3  # halvings between searches for planes; these cost little more for 100 pairs than for one
 ROUNDS = 14  # rounds of searching planes and halving
 MAX_OPEN = 20_000  # limit of the pairs besides the initial ones; no known path needs a tenth of it
 

@@ -82,7 +82,10 @@ class TracedLoop:
         return found
 
     def guarded_blocks(self, numbers: Sequence[int], shared: Iterable[int]) -> list[GuardedBlock]:
-        """Return the values of `numbers` in blocks, guarded if only selections by a shared condition use one.
+        """Return the values of `numbers` in blocks; some blocks are guarded by a shared condition.
+
+        Only selections by that condition use the values of a guarded block. Where the condition does not
+        hold, these values are not computed, and no selection uses them.
 
         Args:
             numbers: values, in order.

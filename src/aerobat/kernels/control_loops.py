@@ -196,7 +196,10 @@ def integrate_attitude_error(
 
 
 def feedback_moment(gains: Gains, inertia: Matrix, error: AttitudeError, integral: Vector) -> Vector:
-    """Return the feedback moment [N·m], body axes: eq. (2) as a PID, with gains per unit of inertia."""
+    """Return the feedback moment [N·m], body axes: eq. (2) as a PID, with gains per unit of inertia.
+
+    M = J (2 ω_n² sign(q_w) q_vec + 2 ζ ω_n (ω_des − ω) + K_i ∫).
+    """
     acceleration = add_scaled(scale(gains.stiffness, error.rotation), gains.damping, error.omega)
     return transform(inertia, add_scaled(acceleration, gains.attitude_integral, integral))
 

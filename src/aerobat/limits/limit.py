@@ -35,7 +35,7 @@ class Limit:
     fields: tuple[str, str]  # that set the lower and the upper bound: "max_thrust", "limits.velocity"
     size: float  # size of its range; reserves and violations are fractions of it
     rotor: int | None = None  # index of the rotor that the limit is about
-    # room at either end, as a fraction of the size, of which `kept` keeps a part
+    # room next to either end, as a fraction of the size; `kept` reduces the reserve in a small room
     rooms: tuple[float, float] = (0.0, 0.0)
     # whether other limits imply it along a whole path, so that an optimizer may omit it
     is_implied: bool = False

@@ -37,7 +37,10 @@ def evaluate(coefficients: Array, s: ArrayLike) -> Array:
 
 
 def hermite(left: Array, right: Array) -> Array:
-    """Return the polynomials of degree 2r - 1 with given derivatives 0..r-1 at s = 0 and s = 1."""
+    """Return the polynomials of degree 2r - 1 with given derivatives 0..r-1 at s = 0 and s = 1.
+
+    Derivatives are with respect to s: (..., r, D) twice -> (..., 2r, D).
+    """
     count = left.shape[-2]
     at_end = np.array(
         [[math.perm(power, k) for power in range(2 * count)] for k in range(count)], dtype=float

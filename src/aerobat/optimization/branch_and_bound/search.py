@@ -25,7 +25,7 @@ from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED, ReducedB
 from aerobat.optimization.result import Status
 
 _OPTIMALITY_GAP = 1e-10  # relative optimality gap at which the search ends
-_MAX_INHERITED = 4  # with at most so many candidates of the last stage, the parent's bounds are reused
+_MAX_INHERITED = 4  # up to this number of candidates of the last stage, the parent's bounds are reused
 _DIVE_GROWTH = 2  # the search dives whenever the number of solved QPs has grown by this factor
 _FAILURE_COST = 20  # cost of a QP that does not converge, in converging QPs, because it is tried three times
 
