@@ -11,9 +11,9 @@ Chebyshev series are known. Branch and bound considers pairs of a part of the pa
 at the middle of the part and bounds φ along the part. Pairs that may still be nearer than the nearest gap
 found are halved. DERIVATION.md, section 9, has the details.
 
-A gate's frame is treated as in the scores of flights: the plane around the opening, infinitely wide and thin.
-It counts during the passage: while the body, or its centre within PASSAGE_DEPTH, is at that plane without a
-break, near enough to touch the circle around the opening.
+A gate's frame is modelled as in the scores of flights: the plane around the opening, infinitely wide and
+thin. It counts during the passage: while the body, or its centre within PASSAGE_DEPTH, is at that plane
+without a break, near enough to touch the circle around the opening.
 """
 
 from __future__ import annotations

@@ -177,8 +177,8 @@ class AssignmentProgram:
     def violation(self, x: Array, slots: Sequence[int]) -> float:
         """Return the largest residual of any row a x <= b, relative to |a| |x| + |b|, for stages in `slots`.
 
-        |x| is at least its value at the minimum of the cost without constraints. The result is infinite where
-        `slots` are not a valid assignment.
+        In this scale |x| is at least its value at the minimum of the cost without constraints. The result is
+        infinite where `slots` are not a valid assignment.
         """
         if not self.is_assignment(slots):
             return inf

@@ -21,8 +21,8 @@ class AssignmentResult:
 
     "optimal": x is feasible and no other solution costs less. "locally optimal": no window of consecutive
     stages can be improved while the other stages keep their slots. "time_limit": the search ended early, x is
-    the best solution found. In these cases the cost is within `gap` of the bound. "infeasible": there is no
-    x. "unknown": no x was found, which proves nothing.
+    the best solution found. In the last two cases the cost is within `gap` of the bound. "infeasible": there
+    is no x. "unknown": no x was found, which proves nothing.
     """
 
     status: Status

@@ -19,7 +19,7 @@ from aerobat.kernels.vectors import add, add_scaled, clamp_norm, scale, subtract
 class Lee(ControlLaw):
     """Force along the body's thrust axis, and moment from the attitude error on SO(3) (Lee et al., 2010).
 
-    The force over the mass is f = (−k_x e_x − k_v e_v + g e₃ + a_d) · R e₃. With the inertia taken out, the
+    The force over the mass is f = (−k_x e_x − k_v e_v + g e₃ + a_d) · R e₃. Divided by the inertia, the
     moment is M = −k_R e_R − k_Ω e_Ω + the reference's own moment. The attitude gains are limited to those
     that the vehicle's rotors allow.
     """

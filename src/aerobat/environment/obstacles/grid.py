@@ -109,7 +109,7 @@ def _merged(boxes: NDArray[np.int64], axis: int) -> NDArray[np.int64]:
 class Grid(Obstacle):
     """The occupied cells of a map: boxes of whole cells, from an occupancy grid or a point cloud.
 
-    A problem's file names the map's file. Plans and runs hold the boxes themselves.
+    A problem's file names the map's file. Plans and runs store the boxes themselves.
     """
 
     boxes: Boxes  # x, y, z of each box's first cell, and of the cell after its last

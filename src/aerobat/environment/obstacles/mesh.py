@@ -28,8 +28,8 @@ def _scale(value: Any) -> float:
 class Mesh(Obstacle):
     """A solid of convex parts, as a mesh file has them.
 
-    A problem's file names the mesh file. Plans and runs hold the parts themselves, so that they stay as they
-    were, whatever becomes of the mesh file.
+    A problem's file names the mesh file. Plans and runs store the parts themselves, so later changes of the
+    mesh file do not affect them.
     """
 
     parts: tuple[Points, ...]  # [m] the corners of each convex part, in the mesh's own axes

@@ -103,9 +103,10 @@ def gap(ops: Ops, at: Section) -> Scalar:
 
 
 def farthest(ops: Ops, at: Section, both_ways: Scalar) -> PlanePoint:
-    """Return the section's point farthest along the direction, or on its own side with `both_ways`.
+    """Return the section's point farthest along the direction.
 
-    Where ellipsoid and plane do not meet, the ellipsoid's point nearest to the plane is returned.
+    With `both_ways` it is the farthest point on the side of the section's centre. Where ellipsoid and plane
+    do not meet, the ellipsoid's point nearest to the plane is returned.
     """
     relative = at.height / at.reach
     size = ops.sqrt(ops.maximum(1.0 - relative * relative, 0.0))

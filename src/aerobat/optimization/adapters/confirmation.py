@@ -8,7 +8,7 @@ from aerobat.optimization.result import AssignmentResult
 
 
 def confirmed(program: AssignmentProgram, result: AssignmentResult) -> AssignmentResult:
-    """Return a general solver's result, where "infeasible" is confirmed by the exact search.
+    """Return a general solver's result, with "infeasible" confirmed by the exact search.
 
     A solution can be verified by its residuals, but infeasibility cannot. Presolve and tolerances of general
     solvers are sometimes wrong (SCIP 10 reports feasible flips as infeasible). Where the exact search finds a

@@ -17,7 +17,7 @@ _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the l
 
 
 class Gurobi:
-    """Solve with one binary for each stage and slot; big-M or indicator constraints enable its bounds.
+    """A solver with a binary for each stage and slot; big-M or indicator constraints enable the bounds.
 
     Big-M constraints take less time than indicator constraints. The licence in the package allows
     `free_variables` variables, a full licence any number.

@@ -16,7 +16,7 @@ _MEANING: dict[str, Status] = {"optimal": "optimal", "infeasible": "infeasible"}
 
 
 class Scip:
-    """Solve with one binary for each stage and slot; big-M or indicator constraints enable its bounds."""
+    """A solver with a binary for each stage and slot; big-M or indicator constraints enable the bounds."""
 
     name: ClassVar[str] = "scip"
     package: ClassVar[str] = "pyscipopt"

@@ -27,9 +27,9 @@ _CONTRADICTION_TOLERANCE = 1e-9
 
 
 class BranchAndBound:
-    """Solve assignment programs exactly, and keep factorizations for the next program with the same matrices.
+    """An exact solver of assignment programs; it reuses factorizations while the matrices stay the same.
 
-    The solver is not thread-safe: use one for each thread. DERIVATION.md beside this file derives the method
+    The solver is not thread-safe: use one for each thread. DERIVATION.md in this folder derives the method
     and proves it.
     """
 
