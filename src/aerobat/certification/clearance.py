@@ -37,10 +37,10 @@ from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.trajectory.subintervals import Subintervals
 
 CLEARANCE_TIGHTNESS = 3e-4  # [m] largest distance between the proven bound and the smallest gap found
-NEAR_TIGHTNESS = 0.5  # the same as a fraction of the gap, where that is smaller
-OVERLAP_TIGHTNESS = 0.02  # the same as a fraction of the depth of an overlap, where that is larger
-FINEST_TIGHTNESS = 1e-6  # [m] smallest value of that distance, for tiny gaps
-FIRST = 64  # obstacles considered first: any small gap found prunes many others
+NEAR_TIGHTNESS = 0.5  # this distance as a fraction of the gap, where that is smaller
+OVERLAP_TIGHTNESS = 0.02  # this distance as a fraction of an overlap's depth, where that is larger
+FINEST_TIGHTNESS = 1e-6  # [m] smallest value of this distance, for tiny gaps
+FIRST = 64  # pieces considered first: any small gap found prunes many others
 HALVINGS = 3  # halvings between searches for planes; these cost little more for 100 pairs than for one
 ROUNDS = 14  # rounds of searching planes and halving
 MAX_OPEN = 20_000  # limit of the pairs besides the initial ones; no known path needs a tenth of it

@@ -15,7 +15,7 @@ from aerobat.flatness import TimeInterval
 from aerobat.trajectory.subintervals import Subintervals
 
 MAX_REMAINDER = 1e-8  # largest interpolation error of a quantity, relative to its scale
-MAX_COMMAND_REMAINDER = 1e-7  # the same for a command, which contains a derivative of the interpolant
+MAX_COMMAND_REMAINDER = 1e-7  # relative error of a command, which contains the interpolant's derivative
 MIN_DURATION = 1e-8  # [s] shorter pieces are not cut further
 MAX_PIECES = 20_000  # limit of the pieces at a time, besides four a segment; no known flight needs as many
 

@@ -9,7 +9,7 @@ from aerobat.arrays import Array, frozen
 from aerobat.declaration import by_value, short, validated
 from aerobat.errors import SpecError
 
-MAX_GAP = 0.05  # [s] between IMU samples; longer samples say too little about a turning vehicle
+MAX_GAP = 0.05  # [s] between IMU samples; longer means do not resolve a turning vehicle
 MAX_AGE = 0.2  # [s] of a pose on arrival; the filter relates the errors then and now to first order
 _UNIT = 1e-2  # [-] error of a quaternion's norm: the rounding of a few decimals
 

@@ -32,9 +32,9 @@ from aerobat.optimization.deadline import out_of_time
 _BOUND_PUSH = 1e-2  # distance of the start from the bounds of the box, as a fraction of its width
 _NEARLY = 0.99  # fraction to the boundary: longest step towards a zero multiplier or the edge of the box
 _LEAST_SLACK = 0.1  # smallest fraction of a slack that a step leaves
-_BARRIER_SOLVED = 10.0  # μ falls when the error of the barrier problem is below this multiple of μ,
-_BARRIER_FALL = 0.2  # to this fraction of μ,
-_BARRIER_POWER = 1.5  # or to this power of μ, whichever is smaller
+_BARRIER_SOLVED = 10.0  # μ is decreased when the error of the barrier problem is below this multiple of μ
+_BARRIER_FALL = 0.2  # factor of μ at each decrease
+_BARRIER_POWER = 1.5  # exponent of μ at each decrease; the smaller of the two results is used
 _GROWTH = 4.0  # factor of δ where the matrix is not positive definite or a step is shortened
 _SHRINK = 3.0  # divisor of δ after a whole step
 _JUMP = 10.0  # factor of δ where no length of a step is accepted

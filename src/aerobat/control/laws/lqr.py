@@ -22,7 +22,7 @@ from aerobat.kernels.quaternions import axes, to_body
 from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import clamp_norm, dot, norm, subtract
 
-_MIN_THRUST = 3.0  # [m/s²] thrust in the gains at least: with less, turning hardly moves the vehicle
+_MIN_THRUST = 3.0  # [m/s²] smallest thrust in the gains: with less, turning hardly moves the vehicle
 _TUNED_FOR = 25.0  # [rad/s] bandwidth of the attitude loop; vehicles that allow less get slower gains
 
 

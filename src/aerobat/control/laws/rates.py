@@ -32,8 +32,8 @@ from aerobat.kernels.vectors import (
     transform,
 )
 
-_YAW_OF_GAIN = 1.0 / 3.0  # [-] of the inner loop's yaw gain; a faster outer loop is underdamped
-_TILT_OF_FREQUENCY = 0.215  # [-] of the frequency of the inner loop's poles, likewise
+_YAW_OF_GAIN = 1.0 / 3.0  # [-] largest yaw gain over that of the inner loop; a faster one is underdamped
+_TILT_OF_FREQUENCY = 0.215  # [-] largest tilt gain over the frequency of the inner loop's poles, likewise
 # [m/s²] below this specific thrust corrections are reduced, because small errors swing its direction
 _FULL_THRUST = 9.8
 

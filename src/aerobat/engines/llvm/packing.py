@@ -52,7 +52,7 @@ class Layout:
     shared_parameters: tuple[bool, ...]
     inputs: tuple[InputKind, ...]
     held_kinds: tuple[InputKind, ...]
-    piecewise_constant: tuple[bool, ...]  # shared inputs that at most ticks equal those of the tick before
+    piecewise_constant: tuple[bool, ...]  # shared inputs that rarely change from tick to tick
 
     @cached_property
     def shared_inputs(self) -> tuple[bool, ...]:

@@ -1,7 +1,7 @@
 """Covariance of the 15-dimensional error; only the upper triangle is stored, so it stays symmetric.
 
-Linear maps of the error are given as functions of the error, so zero blocks cost nothing. The same function
-maps an error vector, and both sides of its covariance.
+Linear maps of the error are given as functions of the error, so blocks of zeros need no operations. The same
+function maps an error vector, and both sides of its covariance.
 """
 
 from __future__ import annotations
