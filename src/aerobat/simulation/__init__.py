@@ -1,4 +1,4 @@
-"""Simulation: the loop of plant, sensors and controller, and the flights that come of it."""
+"""Simulation: the loop of plant, sensors and controller, and the flights that it produces."""
 
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.flight import Flight, load_flight

@@ -1,4 +1,4 @@
-"""States of bodies, as arrays (..., 3) and as leaves of components that kernels read."""
+"""Conversions of body states between arrays (..., 3) and the components that kernels read."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from aerobat.states import BodyState
 
 
 def bodies(state: BodyState) -> Body:
-    """A state with leaves of components."""
+    """Return a state as components."""
     return Body(*(components(part) for part in vars(state).values()))
 
 
 def body_states(body: Body) -> BodyState:
-    """The inverse of `bodies`."""
+    """Return components as a state; the inverse of `bodies`."""
     return BodyState(*(from_components(part) for part in body))

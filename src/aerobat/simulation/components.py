@@ -1,4 +1,4 @@
-"""The loop's components that every flight has: what the controller sees, the controller, the plant."""
+"""Components that every simulation loop has: observer, controller, computation delay and plant."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from aerobat.kernels.vectors import subtract
 from aerobat.kernels.wind import WindState
 from aerobat.simulation.loop import Component, Estimate, Signals
 
-MAX_STEP = 0.002  # [s] of RK4: enough for 1e-6 m in the fastest flips
+MAX_STEP = 0.002  # [s] largest step of RK4: integrates the fastest flips to within 1e-6 m
 
 
 def rigid_body_steps(duration: float) -> int:
-    """The number of steps of RK4 in which a rigid body is advanced by a duration [s]."""
+    """Return the number of RK4 steps in which a rigid body is advanced by a duration [s]."""
     return max(1, math.ceil(duration / MAX_STEP - 1e-9))
 
 
 @dataclass(frozen=True)
 class StateObserver(Component):
-    """The true state, as if it were known."""
+    """The observer that returns the true state."""
 
     def init(self, ops: Ops, parameters: tuple[()], inputs: tuple[()], signals: Signals) -> Estimate:
         """See `Component.init`."""
@@ -44,17 +44,17 @@ class StateObserver(Component):
 
 
 class ControllerParameters(NamedTuple):
-    """A controller, and the delay of its commands."""
+    """The model of a controller, and the delay of its commands."""
 
     model: ControllerModel
-    delay: Scalar | tuple[()]  # [s] from the state to the commands made of it; () for at once
+    delay: Scalar | tuple[()]  # [s] from the state to the effect of its commands; () for no delay
 
 
 @dataclass(frozen=True)
 class TrackingController(Component):
     """The tracking controller, which takes the body's state from the observer.
 
-    Its reference is an input of its own where its commands come late, else that of the tick.
+    It tracks a reference from its own inputs if its commands are delayed, else the reference of the tick.
     """
 
     flags: FeatureFlags
@@ -92,16 +92,16 @@ def controller_inputs(
     takes_forces: bool = True,
     takes_moments: bool = True,
 ) -> tuple[Body, ReferencePoint]:
-    """Return the state when the commands take effect, and the reference that counters the disturbance.
+    """Return the state when the commands take effect, and the reference corrected for the disturbance.
 
     Args:
         ops: The operations of an engine.
         parameters: A controller and its delay.
-        state: The controller's, of which the thrusts and the last commands count.
-        inputs: A reference of its own, where its commands come late.
-        signals: Of the loop.
-        takes_forces: Whether the reference answers the disturbing force that the observer knows.
-        takes_moments: The same of the moment.
+        state: The controller's state, of which the thrusts and the last commands are used.
+        inputs: The controller's own reference if its commands are delayed, else ().
+        signals: The signals of the loop.
+        takes_forces: Whether the estimated disturbing force is subtracted from the reference.
+        takes_moments: Whether the estimated disturbing moment is, too; only with `takes_forces`.
     """
     body, reference = signals.observer.body, inputs or signals.reference
     disturbance = signals.find(Disturbance)
@@ -114,12 +114,12 @@ def controller_inputs(
 
 
 class Disturbance(NamedTuple):
-    """The disturbance that an IMU feels beyond the model, in body axes.
+    """The estimated disturbance that the nominal model does not explain, in body axes.
 
-    Most of a disturbance, such as the rotors' mismatch, turns with the body.
+    Body axes are used because most disturbances, such as a mismatch of rotors, turn with the body.
     """
 
-    force: Vector  # [m/s²] over mass
+    force: Vector  # [m/s²] disturbing force over mass
     angular_acceleration: Vector  # [rad/s²]
     omega_body: Vector  # [rad/s] at the last step
     has_omega: Scalar  # 1, or 0 before the first step
@@ -128,7 +128,7 @@ class Disturbance(NamedTuple):
 def _answering(
     reference: ReferencePoint, body: Body, disturbance: Disturbance, takes_moments: bool
 ) -> ReferencePoint:
-    """The reference less the linear and angular accelerations of a disturbance, which is in body axes."""
+    """Return the reference less the linear and angular accelerations of a disturbance in body axes."""
     body_axes = axes(body.q_world_body)
     force, turn = (
         to_world(body_axes, each) for each in (disturbance.force, disturbance.angular_acceleration)
@@ -144,18 +144,18 @@ def _answering(
 
 
 class CommandsOnTheirWay(NamedTuple):
-    """Commands of a controller that takes its time: of rotors [N], or a set-point of rates."""
+    """Commands of a controller with computation delay: rotor thrusts [N], or a set-point of body rates."""
 
     in_effect: Any
-    latest: Any  # of the last tick, which takes effect next
+    latest: Any  # commands of the last tick, which take effect next
 
 
 @dataclass(frozen=True)
 class ComputationDelay(Component):
-    """The controller's commands, which take effect a while after they are asked for.
+    """The computation delay between the controller's step and the effect of its commands.
 
-    Its input is 1 at the ticks at which the latest commands take effect, which may be those of the
-    controller's next step.
+    Its input is 1 at the ticks at which the latest commands take effect. Such a tick may be one at which the
+    controller already computes its next commands.
     """
 
     def init(
@@ -181,7 +181,7 @@ class ComputationDelay(Component):
 
 
 class PlantParameters(NamedTuple):
-    """A vehicle, and where it is."""
+    """A vehicle and its environment."""
 
     airframe: Airframe
     environment: EnvironmentParameters
@@ -189,7 +189,7 @@ class PlantParameters(NamedTuple):
 
 @dataclass(frozen=True)
 class RigidBodyPlant(Component):
-    """Rigid body and rotors under held commands, each tick in so many steps of RK4."""
+    """Rigid body and rotors under held commands, integrated by a fixed number of RK4 steps per tick."""
 
     substeps: int
     feedthrough: bool = False
@@ -197,7 +197,7 @@ class RigidBodyPlant(Component):
     def init(
         self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals
     ) -> VehicleState:
-        """See `Component.init`; the rotors give at first what the controller takes them to give."""
+        """See `Component.init`; the initial rotor thrusts are those that the controller assumes."""
         return VehicleState(signals.start, signals.controller.thrusts)
 
     def step(
@@ -215,7 +215,7 @@ class RigidBodyPlant(Component):
 
 @dataclass(frozen=True)
 class RateLoop(Component):
-    """The inner loop of a flight controller, on its own gyro, behind a law that gives it rates and thrust."""
+    """The inner loop of a flight controller, which tracks commanded body rates and thrust by its own gyro."""
 
     def init(self, ops: Ops, parameters: RateLoopModel, inputs: tuple[()], signals: Signals) -> RateLoopState:
         """See `Component.init`."""
@@ -235,31 +235,31 @@ class RateLoop(Component):
 
 
 def gyro(signals: Signals) -> Vector:
-    """The body rates [rad/s] that are measured at this tick, or the true ones where there is no IMU."""
+    """Return the body rates [rad/s] measured at this tick, or the true ones where there is no IMU."""
     imu = signals.find(ImuState)
     return signals.plant.body.omega_body if imu is None else imu.sample.omega
 
 
 def _sent(controller: Any) -> Any:
-    """The commands that a controller sends at its step: of rotors [N], or a set-point of rates."""
+    """Return the commands that a controller sends at its step: rotor thrusts [N], or a set-point of rates."""
     setpoint = getattr(getattr(controller, "own", None), "setpoint", None)
     return controller.commands.thrusts if setpoint is None else setpoint
 
 
 def setpoint_in_effect(signals: Signals) -> Any:
-    """Return the commands in effect now: of rotors [N], or a set-point of rates."""
+    """Return the commands in effect now: rotor thrusts [N], or a set-point of rates."""
     delayed = signals.find(CommandsOnTheirWay)
     return _sent(signals.controller) if delayed is None else delayed.in_effect
 
 
 def rotor_commands(signals: Signals) -> Commands:
-    """The latest commands to the rotors: of the inner loop where there is one, else of the controller."""
+    """Return the latest rotor commands: of the inner loop if there is one, else of the controller."""
     inner = signals.find(RateLoopState)
     return signals.controller.commands if inner is None else inner.commands
 
 
 def commands_in_effect(signals: Signals) -> PerRotor:
-    """The rotors' commands [N] of this tick, which may be some while old."""
+    """Return the rotor commands [N] in effect at this tick, which may be delayed."""
     in_effect = setpoint_in_effect(signals)
     if isinstance(in_effect, RateSetpoint):
         return rotor_commands(signals).thrusts
@@ -268,13 +268,13 @@ def commands_in_effect(signals: Signals) -> PerRotor:
 
 
 def with_wind(environment: EnvironmentParameters, signals: Signals) -> EnvironmentParameters:
-    """The environment with the wind of this tick, where the loop has a component that makes one."""
+    """Return the environment with the wind of this tick, if the loop has a component for wind."""
     wind = signals.find(WindState)
     return environment if wind is None else environment._replace(wind=wind.velocity)
 
 
 def with_ceiling(ops: Ops, airframe: Airframe, signals: Signals) -> Airframe:
-    """The airframe with what the battery leaves of its rotors' limits, where the loop has one."""
+    """Return the airframe with the maximum thrusts that the battery allows, if the loop has a battery."""
     battery = signals.find(BatteryState)
     if battery is None:
         return airframe
@@ -285,23 +285,23 @@ def with_ceiling(ops: Ops, airframe: Airframe, signals: Signals) -> Airframe:
 
 
 class LoggedEstimate(NamedTuple):
-    """The estimate that a filter made from its sensors."""
+    """The state as estimated by a filter from its sensors."""
 
     body: Body
-    since_pose: Scalar  # [s] since the exposure of the last pose that it took
+    since_pose: Scalar  # [s] since the exposure of the last pose that the filter took
 
 
 class LogRow(NamedTuple):
-    """Row of the log, kept of each tick."""
+    """One row of the log, recorded at each tick."""
 
     motion: VehicleState
     commands: Commands
     observed: LoggedEstimate | tuple[()]  # () where the true state is known
-    rate_setpoint: RateSetpoint | tuple[()]  # in effect; () where no inner loop takes one
+    rate_setpoint: RateSetpoint | tuple[()]  # set-point in effect; () without an inner loop
 
 
 def log_row(signals: Signals) -> LogRow:
-    """The row of a flight's log."""
+    """Return the row of a flight's log."""
     body, own = signals.observer
     observed = LoggedEstimate(body, own.filter.since_pose) if own else ()
     in_effect = setpoint_in_effect(signals)

@@ -23,7 +23,7 @@ LogRate = Annotated[float, Field(ge=1e-3, le=1e6, description="number from 0.001
 
 
 def _or_named(cls: type, named: Callable[[str], Any]) -> PlainValidator:
-    """The validator of an instance of a class, of its name, or of None."""
+    """Return the validator of an instance of a class, of its name, or of None."""
 
     def made(value: Any) -> Any:
         if value is None or isinstance(value, cls):
@@ -107,7 +107,7 @@ class FlightConfig:
 
     @property
     def control_rate(self) -> float:
-        """Of the controller [1/s]."""
+        """The rate of the controller [1/s]."""
         asked = None if self.conditions is None else self.conditions.control_rate
         return asked or self.rate
 
@@ -118,15 +118,15 @@ class FlightConfig:
 
     @property
     def law(self) -> ControlLaw | None:
-        """The control law asked for, in place of the tracking controller."""
+        """The control law requested in place of the tracking controller; None for the tracking controller."""
         asked = self.controller if self.controller is not None or self.autopilot is None else "rates"
         found = named_controller(asked) if isinstance(asked, str) else asked
         return found if isinstance(found, ControlLaw) else None
 
     def controller_of(self, nominal: Sequence[Vehicle]) -> Controller:
-        """The settings asked for, or those of the nominal vehicles.
+        """Return the requested settings, or those of the nominal vehicles.
 
-        Raises SpecError for vehicles with more than one.
+        Raises SpecError for nominal vehicles with different settings.
         """
         if isinstance(self.controller, Controller):
             return self.controller
@@ -140,5 +140,5 @@ class FlightConfig:
 
     @property
     def rows_rate(self) -> float:
-        """Of the flight's rows [1/s]."""
+        """The rate of the flight's rows [1/s]."""
         return self.log_rate or self.control_rate

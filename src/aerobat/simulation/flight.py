@@ -1,4 +1,4 @@
-"""Flights: what vehicles did over time, as values that can be saved, replayed and scored."""
+"""Flights: recorded motions of one or many vehicles over time, which can be saved, replayed and scored."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from aerobat.states import BodyState, FlatState, Setpoint, Wrench
 from aerobat.storage import format_of, read_arrays, whole_file
 
 _FORMAT = "aerobat-flight-2"
-MAX_FLIGHT = 2**31  # bytes of a file: hours at 500 Hz
-_ROTORS = -1  # in a shape: as many as the vehicles have
+MAX_FLIGHT = 2**31  # largest size of a flight file [bytes]: hours of flight at 500 Hz
+_ROTORS = -1  # placeholder in a shape for the number of rotors
 
 
 @dataclass(frozen=True)
 class Series:
-    """One quantity of a flight; its array is ([vehicles,] [times,] *shape)."""
+    """One quantity of a flight; its array has the shape ([vehicles,] [times,] *shape)."""
 
     name: str
     unit: str
@@ -38,7 +38,7 @@ class Series:
     per_vehicle: bool = True
     over_time: bool = True
     logical: bool = False
-    part: str | None = None  # of a flight that only some have, as what an inner loop was asked
+    part: str | None = None  # optional part of a flight to which the series belongs; None: in every flight
 
 
 SERIES = (
@@ -52,10 +52,10 @@ SERIES = (
     Series("observed_position", "m", (3,), part="observer"),
     Series("observed_velocity", "m/s", (3,), part="observer"),
     Series("observed_q_world_body", "", (4,), part="observer"),
-    Series("since_pose", "s", part="observer"),  # [s] since the exposure of the last pose that was taken
-    Series("rate_setpoint", "rad/s", (3,), part="inner loop"),  # body rates asked of it, in effect
-    Series("thrust_setpoint", "N", part="inner loop"),  # collective, likewise
-    Series("contact", "", part="plant"),  # what the vehicle touched, by the codes of Contact
+    Series("since_pose", "s", part="observer"),  # since the exposure of the last pose that the filter took
+    Series("rate_setpoint", "rad/s", (3,), part="inner loop"),  # commanded to the inner loop, in effect
+    Series("thrust_setpoint", "N", part="inner loop"),  # collective; commanded to the inner loop, in effect
+    Series("contact", "", part="plant"),  # object that the vehicle touched, as a code of Contact
     Series("setpoint_position", "m", (3,), per_vehicle=False),
     Series("setpoint_velocity", "m/s", (3,), per_vehicle=False),
     Series("setpoint_acceleration", "m/s²", (3,), per_vehicle=False),
@@ -68,7 +68,7 @@ SERIES = (
     Series("setpoint_moment_body", "N·m", (3,), per_vehicle=False),
     Series("min_thrusts", "N", (_ROTORS,), over_time=False),
     Series("max_thrusts", "N", (_ROTORS,), over_time=False),
-    Series("ends", "s", over_time=False),  # the last row of each vehicle
+    Series("ends", "s", over_time=False),  # time of the last row of each vehicle
 )
 
 
@@ -76,26 +76,26 @@ SERIES = (
 @in_notebooks
 @by_value
 class Flight:
-    """One flight, or a batch of them: then the vehicles' series carry a leading axis of vehicles.
+    """One flight, or a batch of flights, whose per-vehicle series carry a leading axis of vehicles.
 
     Row k of every series is the situation at `times[k]`: the true state, the thrusts that the rotors give,
     and the commands that the controller sends then and holds until the next row. Each series of SERIES is an
-    attribute too, as `flight.thrusts`; what a filter made of its sensors is there where one flew, what an
-    inner loop was asked where it held the rates, what the vehicle touched where its plant felt that. A
-    vehicle that diverges ends at its `ends`; in a batch its later rows repeat that one. Raises SpecError for
-    shapes that do not match and numbers that are not finite.
+    attribute too, as `flight.thrusts`. Estimated states are present if a filter flew, rate set-points if an
+    inner loop tracked body rates, and contacts if the plant detects them. A vehicle that diverges ends at its
+    time in `ends`; in a batch its later rows repeat its last row. Raises SpecError for shapes that do not
+    match and numbers that are not finite.
     """
 
     times: Array  # [s], (T,), rising
     series: Mapping[str, Array]  # by the names of SERIES
     vehicles: tuple[str, ...]  # their names
-    outcomes: tuple[Outcome, ...]  # of each vehicle
-    sentences: tuple[str, ...]  # the outcomes with their numbers
-    engine: str  # which engine flew them, or which plant
+    outcomes: tuple[Outcome, ...]  # outcome of each vehicle
+    sentences: tuple[str, ...]  # the outcomes as sentences with their numbers
+    engine: str  # name of the engine, or of the plant, that flew them
     environment: Environment
 
     def __post_init__(self) -> None:
-        """Copy, check and write-protect."""
+        """Copy, check and write-protect the arrays."""
         times = frozen(self.times, "times", (None,))
         if times.ndim != 1 or (np.diff(times) <= 0).any():
             raise SpecError("times must be one list of rising numbers of seconds")
@@ -129,19 +129,19 @@ class Flight:
 
     @property
     def is_observed(self) -> bool:
-        """True where a filter saw the flight."""
+        """True where a filter estimated the state in flight."""
         return "since_pose" in self.series
 
     @property
     def has_inner_loop(self) -> bool:
-        """True where an inner loop held the rates that the controller gave."""
+        """True where an inner loop tracked body rates given by the controller."""
         return "rate_setpoint" in self.series
 
     @property
     def first_contact(self) -> tuple[Contact, float]:
-        """The first contact of one vehicle and its time [s]; NOTHING and NaN where none was felt.
+        """The first contact of one vehicle and its time [s]; NOTHING and NaN where no contact was detected.
 
-        A vehicle that stands on the ground at first comes into contact only after it has left the ground.
+        Contacts at the start, as of a vehicle that stands on the ground, do not count until they have ended.
         """
         contact = self.series.get("contact", np.zeros(1))
         came = (contact > 0) & ~np.logical_and.accumulate(contact > 0)
@@ -172,7 +172,7 @@ class Flight:
         return so3.angle_between(self.series["q_world_body"], self.series["setpoint_q_world_body"])
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line about the flight or the batch."""
         about = f"{self.times[-1]:.3f} s in {len(self.times)} rows by the engine {self.engine}"
         if not self.is_batch:
             return f"{self.vehicles[0]}: {self.sentences[0]}; {about}"
@@ -185,14 +185,14 @@ class Flight:
 
     @property
     def outcome(self) -> Outcome:
-        """The one flight's end. Raises SpecError for a batch."""
+        """The outcome of one flight. Raises SpecError for a batch."""
         if self.is_batch:
             raise SpecError("outcome is asked of one flight; of a batch, ask flight[k].outcome or outcomes")
         return self.outcomes[0]
 
     @property
     def diverged_at(self) -> Array:
-        """When the one flight diverged [s], NaN where it did not, (1,). Raises SpecError for a batch."""
+        """The time when the flight diverged [s], NaN if it did not, (1,). Raises SpecError for a batch."""
         return np.array([np.nan if self.outcome is Outcome.COMPLETE else self.series["ends"]])
 
     def __len__(self) -> int:
@@ -201,7 +201,7 @@ class Flight:
 
     @validated
     def __getitem__(self, vehicle: int) -> Flight:
-        """The flight of one vehicle of a batch, as if it had flown alone. Raises SpecError for one flight."""
+        """Return one vehicle's flight of a batch, as if flown alone. Raises SpecError for one flight."""
         if not self.is_batch:
             raise SpecError("this is one flight, not a batch: use it without an index")
         if not -len(self) <= vehicle < len(self):
@@ -225,10 +225,10 @@ class Flight:
     def save(self, path: PathName) -> None:
         """Write the flight as a NumPy .npz file, whole or not at all.
 
-        Its arrays: times; each of SERIES; the text vehicles, outcomes, sentences, engine; gravity, wind and
-        ground (NaN where there is none) of the environment, and where there are obstacles these as text, in
-        JSON, the walls of gates by their gates; and format, "aerobat-flight-2". No pickles.
-        Raises SpecError when the file cannot be written.
+        The file's arrays: `times`; each series of SERIES; `vehicles`, `outcomes`, `sentences` and `engine` as
+        text; `gravity`, `wind` and `ground` (NaN: none) of the environment; `obstacles`, if there are
+        any, as JSON text, in which a gate's wall is stored as its gate; and `format`, "aerobat-flight-2".
+        The file holds no pickles. Raises SpecError when the file cannot be written.
         """
         text = {"vehicles": self.vehicles, "sentences": self.sentences, "engine": self.engine}
         outcomes = [outcome.name for outcome in self.outcomes]
@@ -271,12 +271,12 @@ def load_flight(path: PathName) -> Flight:
         raise SpecError(f"flight file {path}: it has no array {error.args[0]!r}; save it again") from None
     except SpecError as error:
         raise SpecError(f"flight file {path}: {error}") from None
-    except (TypeError, ValueError):  # arrays of other kinds and shapes
+    except (TypeError, ValueError):  # arrays of wrong kinds or shapes
         raise SpecError(f"flight file {path}: it is damaged; save it again") from None
 
 
 def _obstacle_table(obstacle: Obstacle) -> dict[str, Any]:
-    """An obstacle as a table: as problem files have it; the wall of a gate by its gate."""
+    """Return an obstacle as a table, as in problem files; the wall of a gate is stored as its gate."""
     return {"gate": to_table(obstacle.gate)} if isinstance(obstacle, GateWall) else to_table(obstacle)
 
 
@@ -291,18 +291,18 @@ def _outcome(name: str) -> Outcome:
 
 
 def setpoint_series(setpoint: Setpoint) -> dict[str, Array]:
-    """Set-points as arrays by the names of SERIES."""
+    """Return set-points as arrays by the names of SERIES."""
     parts = vars(setpoint) | vars(setpoint.flat) | vars(setpoint.wrench)
     return {f"setpoint_{name}": part for name, part in parts.items() if isinstance(part, np.ndarray)}
 
 
 def setpoint_rows(setpoint: Setpoint, rows: slice | NDArray[np.intp]) -> Setpoint:
-    """Some rows of set-points."""
+    """Return some rows of set-points."""
     return _setpoint({name: values[rows] for name, values in setpoint_series(setpoint).items()})
 
 
 def joined_setpoints(parts: Sequence[Setpoint]) -> Setpoint:
-    """Join set-points that follow one another."""
+    """Return the set-points of consecutive parts as one."""
     series = [setpoint_series(part) for part in parts]
     return _setpoint({name: np.concatenate([each[name] for each in series]) for name in series[0]})
 

@@ -1,4 +1,4 @@
-"""The interface to a flight controller's own firmware, in place of the model of its inner loop."""
+"""The interface to a flight controller's own firmware, which replaces the model of the inner loop."""
 
 from __future__ import annotations
 
@@ -20,41 +20,41 @@ class Sensed(NamedTuple):
 
 
 class AutopilotRun(Protocol):
-    """A firmware that flies a vehicle."""
+    """A firmware in operation, which flies a vehicle."""
 
     def step(self, sensed: Sensed, setpoint: RateSetpoint, duration: float) -> PerRotor:
-        """Return the rotor commands [N] for the next while [s]. Raises SpecError where it gives up."""
+        """Return the rotor commands [N] for the next `duration` [s]. Raises SpecError where it gives up."""
 
     def close(self) -> None:
         """End the firmware; called once, whatever became of the flight."""
 
 
 class Autopilot(ABC):
-    """A flight controller's firmware behind our outer loop, which gives it rates and thrust.
+    """A flight controller's firmware behind our outer loop, which commands body rates and thrust.
 
-    One of one's own inherits from this class and is registered by `AUTOPILOTS.add("its-name", cls)`.
+    A custom autopilot inherits from this class and is registered by `AUTOPILOTS.add("its-name", cls)`.
     """
 
     kind: ClassVar[str] = ""  # its name in settings, set when it is registered
 
     @abstractmethod
     def begin(self, vehicle: Vehicle, setpoint: RateSetpoint, max_rate: float) -> AutopilotRun:
-        """Return the firmware, armed, its motors at the first set-point.
+        """Return the firmware, armed, with its motors at the first set-point.
 
         Args:
             vehicle: The nominal vehicle that the firmware is configured for.
-            setpoint: At the start.
-            max_rate: The most [rad/s] that the reference turns about any axis.
+            setpoint: The set-point at the start.
+            max_rate: The largest rate [rad/s] of the reference about any axis.
 
-        Raises BackendMissing where it is not installed, SpecError for what it cannot fly or refuses.
+        Raises BackendMissing where the firmware is not installed, SpecError for a vehicle that it cannot fly.
         """
 
     @abstractmethod
     def require(self) -> None:
-        """Raise BackendMissing where the firmware, or what it takes to run it, is not installed."""
+        """Raise BackendMissing where the firmware, or a program that it needs, is not installed."""
 
     def logging_to(self, file: str) -> Autopilot:
-        """Return the same, which writes its own log of a flight to a file; itself where it keeps none."""
+        """Return a copy that writes its own log of a flight to a file; unchanged if it keeps no log."""
         return self
 
     def settings(self, vehicle: Vehicle, max_rate: float) -> str:
@@ -62,7 +62,7 @@ class Autopilot(ABC):
 
         Args:
             vehicle: The vehicle that the firmware is configured for.
-            max_rate: The most [rad/s] that the reference turns about any axis.
+            max_rate: The largest rate [rad/s] of the reference about any axis.
         """
         return ""
 

@@ -39,14 +39,15 @@ def fly(
     """Fly a plan in the nonlinear simulation (paper, Sections III and IV-A).
 
     One vehicle, or a batch: a sequence of vehicles with as many rotors each, a `start` with a leading axis,
-    or `flights` under `conditions`. Each flies as it would alone: flight k of a seed is the same in any
-    batch. Divergence (5 m off, or no longer a number) ends a flight and is its outcome, not an error.
+    or `flights` under `conditions`. Each vehicle flies as it would alone: flight k of a seed is the same in
+    batch. A flight ends when it diverges (5 m position error, or a state that is not finite); this is its
+    outcome, not an error.
 
     Args:
-        plan: what is flown; a bare trajectory needs a vehicle.
-        vehicle: what flies it, or its name, by default the plan's.
-        environment: where, by default the problem's; for a bare trajectory a calm day on Earth.
-        config: how.
+        plan: the plan or trajectory to fly; a bare trajectory needs a vehicle.
+        vehicle: the vehicle or vehicles that fly, or their names, by default the plan's.
+        environment: the surroundings, by default the problem's; for a bare trajectory a calm day on Earth.
+        config: the settings of the flight.
         changes: fields of FlightConfig that replace those of `config`, as `seed=3`.
 
     Raises SpecError for arguments that do not fit together, BackendMissing for an engine that is not
@@ -131,7 +132,7 @@ def _taken(values: Array, shown: NDArray[np.intp]) -> Array:
 def _endings(
     series: dict[str, Array], times: Array
 ) -> tuple[NDArray[np.intp], tuple[Outcome, ...], tuple[str, ...]]:
-    """The last row of each vehicle, its outcome, and that in a sentence."""
+    """Return the last row of each vehicle, its outcome, and the outcome as a sentence."""
     finite: Any = np.logical_and.reduce(
         [
             np.isfinite(series[name]).all(axis=-1)
@@ -143,7 +144,7 @@ def _endings(
     fine = finite & (distance <= DIVERGENCE_RADIUS)
     ends, outcomes, sentences = [], [], []
     for vehicle in range(len(fine)):
-        k = int(np.argmin(fine[vehicle]))  # the first row that is not, if there is one
+        k = int(np.argmin(fine[vehicle]))  # the first bad row, if there is one
         outcome = Outcome.COMPLETE
         if not fine[vehicle, k]:
             outcome = Outcome.DIVERGED if finite[vehicle, k] else Outcome.STATE_NOT_FINITE

@@ -1,4 +1,4 @@
-"""The loop's component that flies a control law: the law's inputs before it, rotor commands behind it."""
+"""The controller component for control laws: the law's inputs and the rotor commands from its output."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ from aerobat.simulation.loop import Component, Signals
 from aerobat.simulation.setup import LoopPart
 
 GYRO, DERIVATIVE = 0.5 / (pi * 250.0), 0.5 / (pi * 150.0)  # [s] of an inner loop's filters: 250 Hz, 150 Hz
-# rates are ahead of the rotors' lag by themselves, and what the inner loop makes of them is not led again
+# rate commands already lead the rotors' lag, so the inner loop's output is not lag-compensated again
 _BEHIND_RATES = FeatureFlags(moment_feedforward=True, motor_lag_compensation=False, prioritize_tilt=True)
 
 
 class LawState(NamedTuple):
-    """State of a law from tick to tick, its commands among it."""
+    """State of a law from tick to tick, with its commands."""
 
     own: Any
-    thrusts: PerRotor  # [N] that the rotors give, by the nominal model
+    thrusts: PerRotor  # [N] rotor thrusts by the nominal model
     commands: Commands  # the last ones
 
 
 @dataclass(frozen=True)
 class LawController(Component):
-    """A control law on the observer's state; its input is that of the tracking controller."""
+    """A control law on the observer's state; its inputs are those of the tracking controller."""
 
     law: ControlLaw
-    flags: FeatureFlags  # of the way from its force and moment to the rotors
+    flags: FeatureFlags  # for the control allocation, from the law's force and moment to rotor commands
 
     def init(
         self, ops: Ops, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
@@ -91,7 +91,7 @@ class LawController(Component):
         return LawState(own, thrusts, commands)
 
     def _checked(self, answer: Any) -> tuple[Any, RotorWrench]:
-        """The state and the wrench that a law answered. Raises SpecError for anything else."""
+        """Return the state and the wrench from a law's answer. Raises SpecError for any other answer."""
         match answer:
             case (own, (thrust, (x, y, z))) if all(
                 hasattr(each, "__truediv__") for each in (thrust, x, y, z)
@@ -104,7 +104,7 @@ class LawController(Component):
 
 @contextmanager
 def _compiled(ops: Ops, method: Any) -> Iterator[None]:
-    """Refuse a line of a law's method that floats alone can compute, in flights by any other engine."""
+    """Raise SpecError for a line of a law's method that compiles in no engine but floats."""
     try:
         yield
     except TypeError as error:
@@ -130,11 +130,11 @@ def _complaint(method: Any, complaint: str) -> str:
 
 
 def flown_by(law: ControlLaw | None, settings: Controller) -> Component:
-    """Return the controller's component: of a law, or else the tracking controller.
+    """Return the controller's component: of a control law, or the tracking controller.
 
     Args:
-        law: What is flown by, if it is none of settings.
-        settings: Whose switches count.
+        law: The control law; None for the tracking controller.
+        settings: Of which the feature flags are used.
     """
     if law is None:
         return TrackingController(settings.feature_flags)
@@ -142,11 +142,11 @@ def flown_by(law: ControlLaw | None, settings: Controller) -> Component:
 
 
 def inner_loop(law: ControlLaw | None, model: ControllerModel) -> tuple[LoopPart, ...]:
-    """Return the inner loop behind a law that gives rates, one part; nothing for other controllers.
+    """Return the inner loop behind a law that gives body rates, one part; nothing for other controllers.
 
     Args:
-        law: What is flown by, if it is none of settings.
-        model: The nominal vehicles.
+        law: The control law; None for the tracking controller.
+        model: The model of the nominal vehicles.
     """
     if law is None or not law.GIVES_RATES:
         return ()

@@ -1,9 +1,9 @@
-"""The loop over time, a tuple of components: sensors, controller, plant, monitors.
+"""The simulation loop over time, a tuple of components: sensors, controller, plant, monitors.
 
-At each tick the components step in order. One with direct feedthrough (a sensor, a controller) is seen in its
-new state by those after it and by the log; one without (the plant) leads to the next tick, and is seen as it
-is at this one. A component whose period is k ticks steps at the first tick and at every k-th after it, and
-holds its state between.
+At each tick the components step in order. A component with direct feedthrough (a sensor, a controller) shows
+its new state to the components after it and to the log at this tick. A component without (the plant) shows
+its present state at this tick and the new one at the next. A component whose period is k ticks steps at the
+first tick and at every k-th tick after it, and holds its state between.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ State = TypeVar("State")
 
 
 class StepClock(NamedTuple):
-    """Time about a component's step, which at few of them differs from the step before."""
+    """The times since a component's last step and until its next, which change at few steps."""
 
     elapsed: Scalar  # [s] since its last step
     period: Scalar  # [s] until its next
@@ -40,27 +40,27 @@ class StepClock(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """The state of an observer, of which the controller takes the body."""
+    """The state of an observer, of which the controller uses the body."""
 
     body: Body
-    own: Tree = ()  # what the observer goes on from; () where it sees the true state
+    own: Tree = ()  # the observer's internal state; () where it sees the true state
 
 
 @dataclass(frozen=True)
 class Signals:
-    """All that components see of each other at a tick: their states, found by their types."""
+    """All that components see of each other at a tick: their states, which are found by type."""
 
     clock: StepClock
     reference: ReferencePoint
-    start: Body  # the true state at first
+    start: Body  # the true initial state
     states: list[Tree]  # of the components in their order; before the first tick, of those that have one
 
     def find(self, kind: type[State]) -> State | None:
-        """The state of that type; None where no component has one."""
+        """Return the state of that type, or None where no component has one."""
         return next((state for state in self.states if isinstance(state, kind)), None)
 
     def of(self, kind: type[State]) -> State:
-        """The state of that type, which a component has. Raises LookupError where none does."""
+        """Return the state of that type, which must exist. Raises LookupError where no component has one."""
         found = self.find(kind)
         if found is None:
             raise LookupError(f"no component of the loop has a state of the type {kind.__name__}")
@@ -73,32 +73,32 @@ class Signals:
 
     @property
     def observer(self) -> Estimate:
-        """The state as it is known."""
+        """The observer's estimate of the state."""
         return self.of(Estimate)
 
     @property
     def controller(self) -> Controlling:
-        """The controller's state, whichever controller it is."""
+        """The controller's state, of whatever controller the loop has."""
         return next(state for state in self.states if isinstance(state, Controlling))
 
 
 Log: TypeAlias = Callable[[Signals], Tree]
-# inputs of a component at the ticks from one to before another, leaves (ticks,) or (ticks, vehicles)
+# inputs of a component at the ticks from `begin` to before `end`, leaves (ticks,) or (ticks, vehicles)
 Source: TypeAlias = Callable[[int, int], Tree]
 
 
 class LoopParameters(NamedTuple):
-    """Parameters that do not change along a flight."""
+    """Parameters that do not change during a flight."""
 
-    start: Body  # the true state at first
+    start: Body  # the true initial state
     own: tuple[Tree, ...]  # of each component
 
 
 class Due(NamedTuple):
-    """The turn of a component that does not step at every tick."""
+    """Whether a component that does not step at every tick steps at this one."""
 
-    now: Scalar  # 1 at a tick that it steps at, 0 at others
-    clock: StepClock  # about the latest of these ticks, from the one before to the next
+    now: Scalar  # 1 at a tick at which the component steps, else 0
+    clock: StepClock  # about the latest of these ticks: since the one before, until the next
 
 
 def due_ticks(period: int, begin: int, end: int, delay: int = 0) -> Array:
@@ -111,7 +111,7 @@ def due_ticks(period: int, begin: int, end: int, delay: int = 0) -> Array:
 
 
 class LoopInput(NamedTuple):
-    """Inputs from outside at a tick."""
+    """The external inputs of the loop at a tick."""
 
     clock: StepClock
     due: tuple[Due | tuple[()], ...]  # of each component; () where it steps at every tick
@@ -120,25 +120,25 @@ class LoopInput(NamedTuple):
 
 
 class Component(Protocol):
-    """One part of the loop: a frozen, hashable value that holds no numbers of a flight."""
+    """One part of the loop: a frozen, hashable value without numerical parameters."""
 
     @property
     def feedthrough(self) -> bool:
-        """True if its new state is seen at the tick of its step, false if at the next."""
+        """True if the new state is seen at the tick of its step, false if at the next tick."""
         return True
 
     def init(self, ops: Ops, parameters: Tree, inputs: Tree, signals: Signals) -> Tree:
-        """The state before the first tick; of the components, signals hold those before it in order."""
+        """Return the state before the first tick; `signals` holds the states of earlier components."""
 
     def step(self, ops: Ops, parameters: Tree, state: Tree, inputs: Tree, signals: Signals) -> Tree:
-        """The next state, from its own parameters and inputs and what others show."""
+        """Return the next state, from the component's parameters and inputs and the others' states."""
 
 
 @lru_cache(maxsize=64)
 def compose(components: tuple[Component, ...], log: Log) -> tuple[Init, Step]:
-    """The loop of some components as two functions for an engine, the same for the same arguments.
+    """Return the loop of some components as two functions for an engine, the same for the same arguments.
 
-    Their carry is a tuple with the state of each; a row is what `log` takes of the signals.
+    The carry is a tuple of the components' states; `log` makes a row of the signals.
     """
 
     def init(ops: Ops, parameters: LoopParameters, inputs: LoopInput) -> tuple[Tree, ...]:

@@ -1,4 +1,4 @@
-"""Metrics of flights by one kernel: at every tick, as the loop's last component, or over a log's rows."""
+"""Metrics of flights by one kernel: online, as the loop's last component, or afterwards over a log's rows."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ from aerobat.vehicle import Ellipsoid
 
 
 class Criteria(NamedTuple):
-    """Criteria that a flight is judged by; passages and places are in the order of the stages."""
+    """Criteria by which a flight is judged; passages and places are in the order of the stages."""
 
     gates: tuple[PlannedPassage, ...] = ()
     waypoints: tuple[PlannedWaypoint, ...] = ()
     lap_begin: float = 0.0  # [s] when the first lap begins
-    places: tuple[PlannedWaypoint, ...] = ()  # of other stages that say where they are, and the goal
+    places: tuple[PlannedWaypoint, ...] = ()  # of other stages with a place, and the goal
     attitudes: tuple[PlannedAttitude, ...] = ()  # of other stages
-    path_radius: float = inf  # [m] by which the path may be left
+    path_radius: float = inf  # [m] largest allowed distance from the path
 
 
 @dataclass(frozen=True)
 class MetricsMonitor(Component):
-    """The loop's component that adds up a flight's metrics."""
+    """The loop's component that accumulates a flight's metrics."""
 
     def init(self, ops: Ops, parameters: MetricsParameters, time: Scalar, signals: Signals) -> RunningMetrics:
         """See `Component.init`."""
@@ -73,30 +73,30 @@ class MetricsMonitor(Component):
 
 
 def metrics_row(signals: Signals) -> RunningMetrics:
-    """The metrics so far."""
+    """Return the metrics so far."""
     return signals.of(RunningMetrics)
 
 
 class PoseRow(NamedTuple):
-    """A tick where poses are kept: then the last metrics are those of the carry."""
+    """A row with the pose; for the other metrics, the last carry suffices."""
 
     ticks: Scalar  # as in RunningMetrics
     sum_square: Scalar
     sum_square_angle: Scalar
     position: Vector
     q_world_body: Quaternion
-    all_metrics: Scalar  # their sum, which says nothing: engines leave out of a carry what no row depends on
+    all_metrics: Scalar  # their sum, without meaning: engines drop from a carry whatever no row depends on
 
 
 def pose_row(signals: Signals) -> PoseRow:
-    """The pose, and the errors so far."""
+    """Return the pose and the accumulated errors so far."""
     metrics, body = signals.of(RunningMetrics), signals.plant.body
     errors = metrics.ticks, metrics.sum_square, metrics.sum_square_angle
     return PoseRow(*errors, body.position, body.q_world_body, reduce(plus, tree_leaves(metrics)))
 
 
 def with_metrics(setup: FlightSetup, criteria: Criteria = Criteria()) -> FlightSetup:  # noqa: B008 - frozen
-    """The same flight with its metrics added up, and judged by criteria."""
+    """Return the same flight with a monitor of its metrics, judged by criteria."""
     ellipsoid = BoundingEllipsoid(*map(components, (setup.fleet.body_centres, setup.fleet.semi_axes)))
     parameters = MetricsParameters(
         divergence_radius_sq=DIVERGENCE_RADIUS**2,
@@ -112,12 +112,12 @@ def with_metrics(setup: FlightSetup, criteria: Criteria = Criteria()) -> FlightS
 
 
 def metrics_of_log(flight: Flight, criteria: Criteria, body: Ellipsoid | None) -> RunningMetrics:
-    """Metrics of one flight that was logged, straight between its rows, leaves (1,).
+    """Return the metrics of one logged flight, linearly interpolated between rows, leaves (1,).
 
     Args:
         flight: with its rows; it ends where it diverged.
-        criteria: what it is judged by.
-        body: what encloses its vehicle; without it the clearance is unknown.
+        criteria: by which the flight is judged.
+        body: the ellipsoid that encloses the vehicle; without it the clearance is unknown.
     """
     times, states = flight.times, flight.states
     rows = log_rows(times, states.position, states.velocity, states.q_world_body)
@@ -150,11 +150,11 @@ def metrics_of_log(flight: Flight, criteria: Criteria, body: Ellipsoid | None) -
 
 
 def _ground(environment: Environment) -> Ground:
-    """The ground of an environment as flights hit it."""
+    """Return the ground of an environment as kernels test it: heights of contact and landing speed."""
     height = -inf if environment.ground is None else environment.ground
     return Ground(height - TOUCHDOWN, height - LANDING_DEPTH, LANDING_SPEED**2)
 
 
 def _first(times: Array, happens: NDArray[np.bool_]) -> float:
-    """The first of the times at which something happens, infinite if it never does."""
+    """Return the first of the times at which something happens, infinite if it never does."""
     return float(times[int(np.argmax(happens))]) if happens.any() else inf

@@ -1,4 +1,4 @@
-"""Outcomes of a flight: what it came to, as something that can be counted, with a sentence each."""
+"""Outcomes of flights, which can be counted, each with a sentence for people."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 DIVERGENCE_RADIUS = 5.0  # [m] of position error: no controller is expected back from there
-TOUCHDOWN = 1e-3  # [m] below the ground that is no hit: paths that land end on it
-# The simulated ground does not hold a vehicle up that takes off or lands a few centimetres off its path.
-# A slow vehicle that sinks by no more than places are kept to counts as standing on the ground.
-LANDING_SPEED = 2.0  # [m/s] that of a fall from 20 cm, which a landing gear takes
+TOUCHDOWN = 1e-3  # [m] depth below the ground that counts as no hit: paths that land end on the ground
+# The simulated ground does not support a vehicle that takes off or lands a few centimetres off its path.
+# A slow vehicle that sinks by no more than the tolerance of places counts as standing on the ground.
+LANDING_SPEED = 2.0  # [m/s] the speed of a fall from 20 cm, which a landing gear survives
 LANDING_DEPTH = 0.1  # [m] the tolerance of places
-NO_LENGTH = 1e-6  # [m] less is rounding
-FEW_DECIMALS = 0.095  # what rounds to less than 0.10 has no two digits in two decimals
+NO_LENGTH = 1e-6  # [m] smaller lengths are rounding
+FEW_DECIMALS = 0.095  # smaller values would show less than two digits in two decimals
 
 
 class Contact(IntEnum):
-    """The object that a vehicle touches: of several, an obstacle before a gate before the ground."""
+    """The object that a vehicle touches; of several, the highest code: obstacle, then gate, then ground."""
 
     NOTHING = 0
     GROUND = 1
@@ -28,31 +28,31 @@ class Contact(IntEnum):
 
 
 def length(metres: float) -> str:
-    """A length with the unit that suits it."""
+    """Return a length with the unit that suits it."""
     return f"{digits(metres)} m" if metres >= 1.0 else f"{digits(100.0 * metres, NO_LENGTH * 100.0)} cm"
 
 
 def digits(value: float, nothing: float = 0.0) -> str:
-    """A number with two decimals, or two digits where those would show too little of it.
+    """Return a number with two decimals, or with two digits where two decimals would show too few.
 
     Args:
         value: In the unit that is shown.
-        nothing: Up to so much is rounding, 0.00.
+        nothing: Values up to this are rounding and shown as 0.00.
     """
     return f"{value:.2g}" if nothing < abs(value) < FEW_DECIMALS else f"{value:.2f}"
 
 
 def counted(outcomes: Iterable[Outcome]) -> str:
-    """Counts of the ends of flights, the most frequent first."""
+    """Return counts of the outcomes of flights as text, the most frequent first."""
     counts = Counter(outcome.name.lower().replace("_", " ") for outcome in outcomes)
     return ", ".join(f"{count} {name}" for name, count in counts.most_common())
 
 
 class Outcome(Enum):
-    """The end of a flight; the value is a sentence to be filled with its numbers.
+    """The outcome of a flight; the value is a sentence template for its numbers.
 
-    A gate is missed in five ways: beside its opening, backwards, short of its plane, stopped in it, or beyond
-    it too early.
+    A gate is missed in five ways: beside its opening, backwards, short of its plane, stopped in it, or passed
+    too early, so that the vehicle is beyond the plane throughout the time window.
     """
 
     COMPLETE = "flown to the end, {error} off its path at most"
@@ -86,17 +86,17 @@ class Outcome(Enum):
         return self in (Outcome.COMPLETE, Outcome.THROUGH_GATES)
 
     def sentence(self, **numbers: object) -> str:
-        """The sentence with its numbers."""
+        """Return the sentence with its numbers."""
         return self.value.format(**{"radius": DIVERGENCE_RADIUS, **numbers})
 
 
 class FlightFailure(NamedTuple):
-    """A mistake of one flight, and when it happened."""
+    """A failure of one flight, and its time."""
 
     time: float  # [s]
     outcome: Outcome
     numbers: Mapping[str, object] = MappingProxyType({})  # of its sentence
 
     def sentence(self, **others: object) -> str:
-        """The outcome with its numbers."""
+        """Return the outcome's sentence with its numbers."""
         return self.outcome.sentence(**{"time": self.time, **self.numbers, **others})

@@ -1,4 +1,4 @@
-"""prepare(): who flies, from where, with which controller: a flight before it is flown."""
+"""prepare(): the setup of a flight, with its vehicles, start and controller, before it is flown."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ def prepare(
     config: FlightConfig = FlightConfig(),  # noqa: B008 - frozen
     **changes: Unpack[FlightChanges],
 ) -> FlightSetup:
-    """All that a flight takes, to be stepped, cut or branched at will: `loop = prepare(plan).compile()`.
+    """Return the setup of a flight, to be stepped, cut or branched at will: `loop = prepare(plan).compile()`.
 
     Then `carry = loop.init(setup.first_tick)` and, for each tick k,
     `carry, row = loop.step(carry, setup.tick(k))`.
 
     Args:
-        plan: what is flown; a bare trajectory needs a vehicle.
-        vehicle: what flies it, or its name, by default the plan's.
-        environment: where, by default the problem's; for a bare trajectory a calm day on Earth.
-        config: how.
+        plan: the plan or trajectory to fly; a bare trajectory needs a vehicle.
+        vehicle: the vehicle or vehicles that fly, or their names, by default the plan's.
+        environment: the surroundings, by default the problem's; for a bare trajectory a calm day on Earth.
+        config: the settings of the flight.
         changes: fields of FlightConfig that replace those of `config`, as `seed=3`.
 
-    Raises SpecError for arguments that do not fit together, and for a `plant` or an `autopilot`, which are
-    not stepped.
+    Raises SpecError for arguments that do not fit together, and for a `plant` or an `autopilot`, which cannot
+    be stepped.
     """
     config = config.changed(changes)
     for name, outside in (("plant", config.plant), ("autopilot", config.autopilot)):
@@ -63,7 +63,7 @@ def setup_of(
     environment: Environment | None,
     config: FlightConfig,
 ) -> FlightSetup:
-    """All that a flight takes, of `prepare`'s arguments, whatever flies in the place of the built-in loop."""
+    """Return the setup of a flight from `prepare`'s arguments; an external plant or autopilot is allowed."""
     if isinstance(vehicle, str) and vehicle in dispersion_names() and vehicle not in vehicle_names():
         raise SpecError(f"{vehicle!r} are conditions, not a vehicle; give conditions={vehicle!r}")
     environment = environment_of(plan, environment)
@@ -109,7 +109,7 @@ def _batch_of(start: BodyState | None) -> tuple[int, ...]:
 
 
 def _broadcast_vehicles(flying: list[Vehicle], config: FlightConfig) -> tuple[list[Vehicle], list[Vehicle]]:
-    """The vehicles that fly, one for each start, and the nominal ones."""
+    """Return the vehicles that fly, one for each start, and the nominal ones."""
     starts = _batch_of(config.start)
     if starts and len(flying) == 1:
         flying = flying * starts[0]

@@ -1,4 +1,4 @@
-"""The reference that the controller tracks, made in blocks of ticks as they are asked for."""
+"""References that the controller tracks, computed on demand in blocks of ticks."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-BLOCK = 4096  # ticks; blocks begin at its multiples, so that no chunk's size changes a bit of a reference
+BLOCK = 4096  # ticks; blocks begin at multiples, so that chunk sizes do not change a bit of a reference
 
 
 @dataclass(frozen=True)
 class ReferenceSource:
-    """Set-points of a trajectory for a nominal vehicle, at the ticks of a loop."""
+    """The set-points of a trajectory for a nominal vehicle, at the ticks of a loop."""
 
     trajectory: Trajectory
     vehicle: Vehicle  # the nominal one
     environment: Environment
     rate: float  # [1/s] of the ticks
     every: int = 1  # ticks from one step of the controller to the next
-    delay: float = 0.0  # [s] until its commands take effect, whose set-points are those of so much later
+    delay: float = 0.0  # [s] until commands take effect; set-points are those of `delay` later
 
     @cached_property
     def times(self) -> Array:
@@ -42,7 +42,7 @@ class ReferenceSource:
 
     @property
     def start(self) -> BodyState:
-        """The state of a vehicle that begins without any error, no leading axis."""
+        """The state of a vehicle that starts without error, no leading axis."""
         first = self.setpoint(np.array([0]))
         return BodyState(
             first.flat.position[0], first.flat.velocity[0], first.q_world_body[0], first.omega_body[0]
@@ -50,7 +50,7 @@ class ReferenceSource:
 
     @property
     def max_rate(self) -> float:
-        """The most [rad/s] that the reference turns about any axis of the body."""
+        """The largest rate [rad/s] of the reference about any axis of the body."""
         return float(np.abs(self.setpoint(np.arange(len(self.times))).omega_body).max())
 
     def setpoint(self, ticks: NDArray[np.intp]) -> Setpoint:
@@ -61,16 +61,16 @@ class ReferenceSource:
         )
 
     def chunk(self, begin: int, end: int) -> ReferencePoint:
-        """References of the controller at the ticks from `begin` to before `end`, all of one block."""
+        """Return the controller's references at the ticks from `begin` to before `end`, within one block."""
         number, first = divmod(begin, BLOCK)
         rows = slice(first, first + end - begin)
         points: ReferencePoint = tree_map(lambda leaf: leaf[rows], _block(self, number).points)
         return points
 
     def clock(self, begin: int, end: int, every: int = 1) -> StepClock:
-        """Time about the ticks from `begin` to before `end`, of what steps at every so many.
+        """Return the step clock at ticks from `begin` to before `end` of components with period `every`.
 
-        All periods but the last are alike to the last bit, so that an engine may see that they are.
+        All periods but the last are equal to the last bit, so that an engine can detect that they are.
         """
         steps = np.arange(begin, end) // every
         return StepClock(
@@ -78,11 +78,11 @@ class ReferenceSource:
         )
 
     def due(self, every: int, begin: int, end: int) -> Due:
-        """The turns, at these ticks, of a component that steps at every so many."""
+        """Return at which of these ticks a component steps that steps every `every` ticks."""
         return Due(due_ticks(every, begin, end), self.clock(begin, end, every))
 
     def _period_after(self, steps: NDArray[np.intp], every: int) -> Array:
-        """The period [s] that begins with each step; the last begins none."""
+        """Return the period [s] that begins with each step; the last step begins none."""
         final = len(self.times) - 1
         begins = np.minimum(steps * every, final)
         ends = np.minimum(begins + every, final)
@@ -95,12 +95,12 @@ class _Block:
     """Set-points of the ticks of a block."""
 
     setpoint: Setpoint
-    points: ReferencePoint  # the same as kernels read them, leaves (ticks,), read-only
+    points: ReferencePoint  # the set-points as kernels read them, leaves (ticks,), read-only
 
 
-@lru_cache(maxsize=16)  # of 2 MB: the flights of a study are of one plan or few, whatever else they draw
+@lru_cache(maxsize=16)  # of 2 MB each: the flights of a study share a few plans, whatever else they draw
 def _block(source: ReferenceSource, number: int) -> _Block:
-    """The block of that number of a source."""
+    """Return the block with this number of a source."""
     grid, every = source.times, source.every
     vehicle, environment = source.vehicle, source.environment
     first, last = number * BLOCK, len(grid) - 1
@@ -116,13 +116,13 @@ def _block(source: ReferenceSource, number: int) -> _Block:
 def reference_points(
     setpoint: Setpoint, following: Setpoint, environment: Environment, vehicle: Vehicle
 ) -> ReferencePoint:
-    """Set-points as kernels read them.
+    """Return set-points as kernels read them.
 
     Args:
         setpoint: at ticks, leading axis (ticks,).
-        following: one step of the controller later.
-        environment: where; its gravity and wind count.
-        vehicle: that they are for; its drag counts.
+        following: the set-points one step of the controller later.
+        environment: of which gravity and wind are used.
+        vehicle: the nominal vehicle, of which mass and drag are used.
     """
     flat, q = setpoint.flat, setpoint.q_world_body
 
@@ -147,7 +147,7 @@ def reference_points(
 
 
 def _specific_collective(setpoint: Setpoint, environment: Environment, vehicle: Vehicle) -> Array:
-    """Collective thrust over mass [m/s²], (ticks,): without drag the same for vehicles of any mass."""
+    """Return collective thrust over mass [m/s²], (ticks,): without drag the same for vehicles of any mass."""
     if has_unequal_drag(vehicle):
         return setpoint.wrench.thrust / vehicle.mass
     flat = setpoint.flat

@@ -1,4 +1,4 @@
-"""A flight before it is flown: its loop, the loop's parameters, and where its inputs come from."""
+"""Flights before they are flown: the loop, its parameters, and the sources of its inputs."""
 
 from __future__ import annotations
 
@@ -26,52 +26,52 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
-_VEHICLE_TICKS = 512_000  # whose own inputs are made at once, so that they take little memory (30 MB)
-_MIN_CHUNK = 16  # ticks
+_VEHICLE_TICKS = 512_000  # vehicles times ticks whose own inputs are made at once, in 30 MB
+_MIN_CHUNK = 16  # smallest number of ticks made at once
 
 
 @dataclass(frozen=True, eq=False)
 class LoopPart:
-    """One component of the loop: what its parameters are, where its inputs come from, when it steps."""
+    """One component of the loop with its parameters, the source of its inputs, and its period."""
 
     component: Component
-    parameters: Tree = ()  # leaves (vehicles,), or one number for all
+    parameters: Tree = ()  # leaves (vehicles,), or one number for all vehicles
     source: Source | None = None  # None for a component without inputs
     period: int = 1  # ticks from one step to the next
 
 
 @dataclass(frozen=True, eq=False)
 class LoopSetup:
-    """A loop before it runs: its parts, to be compiled, then stepped or scanned at will."""
+    """A loop before it runs: its parts, which can be compiled and then stepped or scanned."""
 
-    start: Body  # the true state at first
+    start: Body  # the true initial state
     parts: tuple[LoopPart, ...]  # in the order of their steps
 
     @property
     def components(self) -> tuple[Component, ...]:
-        """Of the loop, in the order of their steps."""
+        """The components of the loop, in the order of their steps."""
         return tuple(part.component for part in self.parts)
 
     @property
     def parameters(self) -> LoopParameters:
-        """Of the loop, leaves (vehicles,)."""
+        """The parameters of the loop, leaves (vehicles,)."""
         vehicles = len(self.start.position[0])
         own = tuple(part.parameters for part in self.parts)
         return LoopParameters(self.start, tree_map(lambda leaf: np.broadcast_to(leaf, vehicles), own))
 
     def compile_for(self, engine: Engine, first_tick: LoopInput, log: Log) -> CompiledLoop:
-        """The loop, ready for `init`, `step` and `scan`; its rows are what `log` takes of the signals."""
+        """Return the compiled loop with `init`, `step` and `scan`; `log` makes a row of the signals."""
         return engine.compile(*compose(self.components, log), self.parameters, first_tick)
 
 
 def plant_part(
     fleet: Fleet, environment: Environment, rate: float, effectiveness: Array | None = None
 ) -> LoopPart:
-    """The rigid bodies of a fleet.
+    """Return the part of the loop for the rigid bodies of a fleet.
 
     Args:
-        fleet: what flies.
-        environment: where.
+        fleet: the vehicles.
+        environment: gravity and wind.
         rate: of the ticks [1/s].
         effectiveness: of the rotors [-], (vehicles, n); left out, 1.
     """
@@ -85,13 +85,13 @@ def plant_part(
 def controller_model(
     controller: Controller, nominal: Sequence[Vehicle], known: Fleet, environment: Environment
 ) -> ControllerModel:
-    """The model by which a controller flies, leaves (vehicles,) of those that it knows.
+    """Return a controller's model of its nominal vehicles, leaves (vehicles,).
 
     Args:
         controller: its settings.
-        nominal: the vehicles that it knows, one for each flight or one for all.
-        known: the fleet of these.
-        environment: where.
+        nominal: the nominal vehicles, one for each flight or one for all.
+        known: the fleet of the nominal vehicles.
+        environment: gravity and wind.
 
     Raises SpecError for a vehicle that cannot hover.
     """
@@ -103,10 +103,10 @@ def controller_model(
 
 @dataclass(frozen=True, eq=False)
 class FlightSetup(LoopSetup):
-    """Everything that a flight takes."""
+    """Everything that is needed to simulate a flight."""
 
     reference: ReferenceSource
-    fleet: Fleet  # that flies
+    fleet: Fleet  # the vehicles that really fly
     nominal: Fleet
     environment: Environment
     config: FlightConfig
@@ -115,20 +115,20 @@ class FlightSetup(LoopSetup):
 
     @property
     def times(self) -> Array:
-        """Of the ticks [s]."""
+        """The times of the ticks [s]."""
         return self.reference.times
 
     @property
     def log_stride(self) -> int:
-        """The ticks from one row of the log to the next."""
+        """The number of ticks from one row of the log to the next."""
         return round(self.reference.rate / self.config.rows_rate)
 
     def engine(self, copies: int = 1) -> Engine:
-        """The engine asked for, or the fastest for so many copies of the vehicles."""
+        """Return the requested engine, or the fastest for so many copies of the vehicles."""
         return choose(self.config.engine, copies * len(self.fleet), len(self.times))
 
     def compile(self, log: Log = log_row) -> CompiledLoop:
-        """The loop, ready for `init`, `step` and `scan`; its rows are what `log` takes of the signals."""
+        """Return the compiled loop with `init`, `step` and `scan`; `log` makes a row of the signals."""
         return self.compile_for(self.engine(), self.first_tick, log)
 
     @cached_property
@@ -137,14 +137,14 @@ class FlightSetup(LoopSetup):
         return self.tick(0)
 
     def tick(self, tick: int) -> LoopInput:
-        """The inputs of one tick, for `init` and `step`. Raises SpecError for one that the flight has not."""
+        """Return the inputs of one tick, for `init` and `step`. Raises SpecError outside of the flight."""
         if not 0 <= tick < len(self.times):
             raise SpecError(f"tick must be from 0 to {len(self.times) - 1}, the flight's last, got {tick}")
         inputs: LoopInput = first_row(self.inputs(tick, tick + 1))
         return inputs
 
     def inputs(self, begin: int, end: int) -> LoopInput:
-        """The inputs of the ticks from `begin` to before `end`, all of one block, for `scan`."""
+        """Return the inputs of the ticks from `begin` to before `end`, within one block, for `scan`."""
         own = tuple(() if part.source is None else part.source(begin, end) for part in self.parts)
         periods = (part.period for part in self.parts)
         due = tuple(() if period == 1 else self.reference.due(period, begin, end) for period in periods)
@@ -154,11 +154,11 @@ class FlightSetup(LoopSetup):
         """Run the whole flight.
 
         Args:
-            log: What a row takes of the signals.
+            log: The function that makes a row of the signals.
             stride: The ticks from one row to the next.
 
-        Returns the rows of the multiples of the stride and of the last tick, leaves (vehicles, rows), and the
-        last states of the loop's components.
+        Returns the rows at multiples of the stride and at the last tick, leaves (vehicles, rows), and the
+        final states of the loop's components.
         """
         loop = self.compile(log)
         carry = loop.init(self.first_tick)
@@ -173,9 +173,9 @@ class FlightSetup(LoopSetup):
         return whole, carry
 
     def chunks(self, log_stride: int = 1, copies: int = 1) -> Iterator[tuple[int, int]]:
-        """The flight cut into pieces whose inputs fit into little memory, each of one block.
+        """Yield the flight in pieces (begin, end) whose inputs fit into little memory, each within one block.
 
-        A piece that holds rows of the log begins with one. Each of `copies` of a vehicle has its own inputs.
+        A piece that contains rows of the log begins with one. Memory is counted for `copies` of each vehicle.
         """
         ticks, size = len(self.times), BLOCK
         if any(np.ndim(leaf) for leaf in tree_leaves(self.first_tick.own)):  # each vehicle has its own

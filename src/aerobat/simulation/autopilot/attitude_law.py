@@ -1,11 +1,11 @@
-"""The attitude law of an autopilot: it turns no faster than the rotors can stop it in time.
+"""The attitude law of an autopilot: body rates are limited so that the rotors can stop them in time.
 
-From an error θ, an angular deceleration a that sets in a lag τ later stops what turns at ω with
-ω τ + ω²/(2 a) = θ; so ω = √(a² τ² + 2 a θ) − a τ is the most that is commanded. For small errors the usual
-law commands less, and it is that one. ArduPilot's attitude controller limits its rates by a root likewise.
+A body at rate ω that decelerates by a after a lag τ stops within the angle ω τ + ω²/(2 a). To stop within the
+error θ, the commanded rate is at most ω = √(a² τ² + 2 a θ) − a τ. For small errors the usual proportional law
+commands less and applies. ArduPilot's attitude controller limits its rates by a square root likewise.
 
-The thrust axis is brought to where it should be by the shortest way, and the body turned about it once it is
-near [BD].
+The thrust axis is turned by the shortest way to its direction, and the body is yawed about it once the thrust
+axis is near [BD].
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from aerobat.kernels.quaternions import conjugate, multiply, to_body
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import subtract
 
-_STOPPING = 0.7  # [-] of the angular acceleration that a hovering vehicle has, which is counted on
-_MAX_YAW_RATE = 4.0  # [rad/s] for an error of yaw: rotors that lag cannot tilt a body that spins faster
-_OPPOSITE = 1e-6  # [-] cosine of half a tilt, below which yaw means nothing
+_STOPPING = 0.7  # [-] fraction used of a hovering vehicle's angular acceleration
+_MAX_YAW_RATE = 4.0  # [rad/s] largest commanded yaw rate: lagging rotors cannot tilt a body that spins faster
+_OPPOSITE = 1e-6  # [-] cosine of half the tilt, below which yaw is undefined
 
 
 class Authority(NamedTuple):
@@ -28,21 +28,21 @@ class Authority(NamedTuple):
 
     tilt: Scalar  # [rad/s²] in roll and pitch
     yaw: Scalar  # [rad/s²]
-    lag: Scalar  # [s] until they do it
+    lag: Scalar  # [s] lag of the rotors
 
 
 def slope_limited_error(
     ops: Ops, gains: Gains, authority: Authority, body: Body, body_axes: Axes, attitude: AttitudeCommand
 ) -> AttitudeError:
-    """Distance of the body from its desired attitude and rates, as far as it may be answered.
+    """Return the error of attitude and body rates, limited to the part that may be answered.
 
     Args:
         ops: of the arithmetic.
         gains: of the attitude loop.
         authority: of the rotors.
-        body: as it is now.
+        body: the present state.
         body_axes: its axes.
-        attitude: what is commanded.
+        attitude: the commanded attitude.
     """
     q = multiply(conjugate(body.q_world_body), attitude.q_world_body)
     sign = ops.select(q[0] < 0.0, -1.0, 1.0)
@@ -61,16 +61,16 @@ def slope_limited_error(
 
 
 def _answered(ops: Ops, gains: Gains, half: Scalar, acceleration: Scalar, lag: Scalar) -> Scalar:
-    """The part of an error [-] that the attitude loop may answer.
+    """Return the fraction of an error [-] that the attitude loop may answer.
 
     Args:
         ops: of the arithmetic.
-        gains: they command stiffness·half/damping as the rate [rad/s].
-        half: sin(θ/2) [-], whose double is no more than the error θ.
-        acceleration: [rad/s²] that stops it.
-        lag: [s] until it does.
+        gains: of which stiffness·half/damping is the commanded rate [rad/s].
+        half: sin(θ/2) [-]; twice this is at most the error θ.
+        acceleration: the angular deceleration [rad/s²] available.
+        lag: [s] until it sets in.
     """
     a = _STOPPING * acceleration
-    # (√(a² τ² + 4 a s) − a τ) / s, without the difference
+    # (√(a² τ² + 4 a s) − a τ) / s, written without the difference
     slope = 4.0 * a / (a * lag + ops.sqrt(a * a * lag * lag + 4.0 * a * half) + TINY)
     return ops.minimum(1.0, slope * gains.damping / (gains.stiffness + TINY))

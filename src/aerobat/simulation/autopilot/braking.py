@@ -1,4 +1,4 @@
-"""Paths from any motion to a hover, by which an autopilot brakes, for one vehicle or many."""
+"""Braking paths of an autopilot, from any motion to a hover, for one vehicle or many."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-MIN_FLOOR = 0.5  # [m] above the ground, below which no hover is sought
-_SHORTEST = 0.2  # [s] of any braking
-_PEAK = 1.5  # [-] of its deceleration, times duration over speed at first
-_BRAKING = 0.8  # [-] of what thrust can do beyond hovering
-_FALLING = 0.7  # [-] of gravity, which alone ends a climb
+MIN_FLOOR = 0.5  # [m] height above the ground below which no hover is aimed at
+_SHORTEST = 0.2  # [s] shortest duration of braking
+_PEAK = 1.5  # [-] peak deceleration times duration over initial speed, of the polynomial
+_BRAKING = 0.8  # [-] fraction used of the deceleration that thrust can give beyond hovering
+_FALLING = 0.7  # [-] fraction of gravity with which a climb is ended
 
 
 class Braking(NamedTuple):
-    """Paths straight on to rest, or r higher: p = p₀ + v T (s − s³ + s⁴/2) + r (10 s³ − 15 s⁴ + 6 s⁵)."""
+    """Straight braking paths, raised by r: p = p₀ + v T (s − s³ + s⁴/2) + r (10 s³ − 15 s⁴ + 6 s⁵)."""
 
     durations: Array  # [s] T, (...)
     coefficients: Array  # [m] of s⁰ to s⁵, (..., 6, 3)
@@ -34,9 +34,9 @@ class Braking(NamedTuple):
         Args:
             position: at first [m], (..., 3).
             velocity: at first [m/s], (..., 3).
-            vehicle: whose thrust counts.
+            vehicle: of which the maximum thrust and the mass are used.
             gravity: [m/s²].
-            floor: the height [m] below which it shall not end.
+            floor: the height [m] below which a path must not end.
         """
         deceleration = _BRAKING * (vehicle.max_specific_thrust - gravity)
         needed = np.linalg.norm(velocity, axis=-1) / deceleration
@@ -50,7 +50,7 @@ class Braking(NamedTuple):
         return cls(durations, np.stack(rows, axis=-2))
 
     def at(self, since: Array) -> tuple[Array, Array, Array, Array]:
-        """Position to jerk [m/s^k] at times [s] (T,), (T, ..., 3) each; at rest from its end on."""
+        """Return position to jerk [m/s^k] at times [s] (T,), (T, ..., 3) each; at rest after the end."""
         each = since.reshape(-1, *(1,) * self.durations.ndim)
         s = np.minimum(each / self.durations, 1.0)[..., None]
         parts, rates = [], self.coefficients
@@ -61,7 +61,7 @@ class Braking(NamedTuple):
             parts.append(value)
             powers = np.arange(1, rates.shape[-2])[:, None]
             rates = powers * rates[..., 1:, :] / self.durations[..., None, None]
-        parts[3] = np.where(s < 1.0, parts[3], 0.0)  # it jumps to rest
+        parts[3] = np.where(s < 1.0, parts[3], 0.0)  # jerk is discontinuous at the end
         return parts[0], parts[1], parts[2], parts[3]
 
     @property
@@ -71,9 +71,9 @@ class Braking(NamedTuple):
 
 
 def nearest_heading(q_world_body: Array) -> Array:
-    """The yaw [rad] (...) of the upright attitudes that are nearest to others (..., 4).
+    """Return the yaw [rad] (...) of the upright attitudes that are nearest to given attitudes (..., 4).
 
-    Unlike that of the body's x axis it does not jump where that axis is vertical.
+    Unlike the heading of the body's x axis, this yaw does not jump where that axis is vertical.
     """
     return 2.0 * np.arctan2(q_world_body[..., 3], q_world_body[..., 0])
 
@@ -81,7 +81,7 @@ def nearest_heading(q_world_body: Array) -> Array:
 def point_reference(
     position: Array, velocity: Array, acceleration: Array, jerk: Array, yaw: ArrayLike, gravity: float
 ) -> ReferencePoint:
-    """References of a point that moves; the controller leans as the acceleration asks.
+    """Return references of a moving point; the controller tilts the vehicle as the acceleration requires.
 
     Args:
         position: [m], (..., 3).

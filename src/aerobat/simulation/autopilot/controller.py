@@ -1,4 +1,4 @@
-"""The autopilot's controller as a component of the loop: along a path, towards a point, or in an attitude."""
+"""The autopilot's controller as a component of the loop: it tracks a path, a point or an attitude."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ from aerobat.kernels.vectors import add, dot, norm, subtract
 from aerobat.simulation.autopilot.attitude_law import Authority, slope_limited_error
 from aerobat.simulation.loop import Component, Signals
 
-_MIN_LIFT = 0.2  # [-] of gravity: towards a point it never thrusts less upwards, so that it stays upright
-_MAX_SIDEWAYS = 1.0  # [-] of gravity: nor more than this to a side
+_MIN_LIFT = 0.2  # [-] of gravity: least upward thrust on the way to a point; keeps the vehicle upright
+_MAX_SIDEWAYS = 1.0  # [-] of gravity: most horizontal thrust along x and along y on the way to a point
 
 
 class AutopilotModel(NamedTuple):
-    """The nominal vehicle, and what its rotors allow where errors are large."""
+    """The nominal vehicle, and the limits that its rotors set where errors are large."""
 
     tracking: ControllerModel
     authority: Authority
-    upright: Gains  # of the position loop towards points, slow enough for tilts that take their time
+    upright: Gains  # of the position loop towards points, slow enough for the time that tilting takes
 
 
 class Guidance(NamedTuple):
-    """Input of the controller: what of a reference is commanded; each is 1 where it holds, else 0."""
+    """Input of the controller: the parts of the reference that are commanded, each flag 1 or 0."""
 
-    by_attitude: Scalar  # its attitude, rates and thrust; else its position
-    upright: Scalar  # towards a position, no further tilted than an autopilot would
+    by_attitude: Scalar  # 1: attitude, body rates and thrust are commanded; 0: position is
+    upright: Scalar  # 1: tilt is limited on the way to a position
 
 
 @dataclass(frozen=True)
 class AutopilotController(Component):
-    """The tracking controller of a vehicle that takes attitudes, points, and points of a path."""
+    """The tracking controller of a vehicle that accepts attitudes, points, and points of a path."""
 
     flags: FeatureFlags
 
@@ -84,10 +84,10 @@ class AutopilotController(Component):
 
 
 def _turning_thrust(ops: Ops, model: ControllerModel, b3: Vector, attitude: AttitudeCommand) -> Scalar:
-    """The collective thrust [N] that keeps rotors able to turn the body: sin(θ/2) of its weight.
+    """Return the collective thrust [N] that lets rotors turn the body: sin(θ/2) of the weight.
 
-    The less they give, the less they have to take from one side; the smaller the angle θ to the desired
-    direction, the less is needed.
+    Rotors with little thrust cannot take much from one side to make a moment. θ is the angle to the desired
+    direction of thrust; a smaller angle needs less thrust.
     """
     f = attitude.specific_thrust
     cosine = dot(f, b3) / (norm(ops, f) + TINY)
@@ -96,18 +96,18 @@ def _turning_thrust(ops: Ops, model: ControllerModel, b3: Vector, attitude: Atti
 
 
 def _upright(ops: Ops, gravity: Scalar, outer: PositionLoopState, demand: ThrustDemand) -> PositionLoopState:
-    """The outer loop's answer, taken back to where the vehicle stays upright whatever the error.
+    """Return the position loop's answer, limited so that the vehicle stays upright whatever the error.
 
     Args:
         ops: of the arithmetic.
         gravity: [m/s²].
-        outer: the answer.
-        demand: the thrust that the reference asks for.
+        outer: the answer of the position loop.
+        demand: the thrust required by the reference.
     """
     sideways, lift = _MAX_SIDEWAYS * gravity, _MIN_LIFT * gravity
     x, y, z = add(demand.value, outer.acceleration)
     upright = clip(ops, x, -sideways, sideways), clip(ops, y, -sideways, sideways), ops.maximum(z, lift)
-    # what is held does not change either
+    # a saturated component has no rate
     jx, jy, jz = add(demand.rate, outer.jerk)
     rate = (
         ops.select(magnitude(ops, x) < sideways, jx, 0.0),

@@ -1,4 +1,4 @@
-"""The loop of vehicles under an autopilot's controller, whose references come from outside."""
+"""The loop of vehicles under an autopilot's controller, with references from outside."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
 RATE = 500.0  # [1/s] of the controller and the plant
-# what a position loop towards points has to wait for, slower where that takes longer
-_FREE_ERROR = 0.3  # [rad] of tilt that must not saturate rotors
-_LAG_COUNTED = 0.6  # [-] of the rotors' lag, which the attitude loop's lead makes up for while it is not
+# delays that a position loop towards points must allow for: its bandwidth is lower where they are longer
+_FREE_ERROR = 0.3  # [rad] tilt error that must not saturate rotors
+_LAG_COUNTED = 0.6  # [-] fraction of the rotors' lag that counts: the attitude loop's lead covers the rest
 
-KEPT = 0.04  # [s] for which commanded rates are kept where nothing newer comes; then the attitude is
+KEPT = 0.04  # [s] for which commanded rates are kept without a newer command; then the attitude is held
 
 
 def autopilot_setup(start: Body, vehicle: Vehicle, environment: Environment) -> LoopSetup:
-    """The loop of as many copies of a vehicle as there are states at first, leaves (copies,)."""
+    """Return the loop of copies of a vehicle, one for each initial state, leaves (copies,)."""
     copies = len(start.position[0])
     fleet = Fleet.of([vehicle] * copies)
     tracking = controller_parameters(vehicle.controller, fleet, environment)
     accelerations = hover_authority(fleet, environment)
-    # of yaw no more than of roll and pitch: turning about both at once takes of these
+    # at most that of roll and pitch, since turning about both at once shares these accelerations
     authority = Authority(
         accelerations[:, :2].min(axis=-1), accelerations.min(axis=-1), fleet.lags.max(axis=-1)
     )
@@ -42,12 +42,12 @@ def autopilot_setup(start: Body, vehicle: Vehicle, environment: Environment) -> 
 
 
 def autopilot_inputs(references: ReferencePoint, by_attitude: bool, upright: bool = True) -> LoopInput:
-    """Inputs of as many ticks as there are references, leaves (T, ...).
+    """Return the loop's inputs for as many ticks as there are references, leaves (T, ...).
 
     Args:
-        references: what is followed.
-        by_attitude: whether their attitude, rates and thrust are commanded, or their position.
-        upright: of positions, whether the vehicle stays upright on the way.
+        references: the references to follow.
+        by_attitude: whether attitude, body rates and thrust are commanded, or position.
+        upright: if position is commanded, whether the vehicle's tilt is limited on the way.
     """
     ticks = len(references.position[0])
     period = np.full(ticks, 1.0 / RATE)

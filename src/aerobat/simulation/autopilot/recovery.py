@@ -1,7 +1,7 @@
-"""The way back to a hover from every instant of a path: how long it takes, and how much height it costs.
+"""Recoveries to a hover from every instant of a path: how long they take and how much height they cost.
 
-What is flown is an autopilot's recovery: from the state that the path asks at an instant, the last attitude,
-rates and thrust are kept for as long as it takes until the loss is noticed; then it brakes to a hover.
+A recovery starts from the state that the path requires at an instant. The last attitude, body rates and
+thrust are kept for the reaction time, until the loss is noticed; then the autopilot brakes to a hover.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
 
-HORIZON = 15.0  # [s] in which a recovery comes to a hover, or never does
-INSTANTS_RATE = 100.0  # [1/s] of instants that nobody names
-MOST_INSTANTS = 2000  # of them; a longer path has them further apart
-_CHUNK = 100  # ticks flown at once, so that their references take little memory
-_HOVERING = 0.5  # [s] of all of them, which are not followed any longer then
-_FEW_SPANS = 3  # that a sentence names one by one
-_STILL = 0.2  # [m/s] of a hover
-_ALIGNED = 0.2  # [rad] likewise, of its thrust axis from the thrust that holds it there
+HORIZON = 15.0  # [s] time limit of a recovery; a vehicle that does not hover by then never recovers
+INSTANTS_RATE = 100.0  # [1/s] rate of instants, where the caller names none
+MOST_INSTANTS = 2000  # largest number of instants; on a longer path they lie further apart
+_CHUNK = 100  # ticks simulated at once, so that their references take little memory
+_HOVERING = 0.5  # [s] time for which all copies must hover before the simulation ends early
+_FEW_SPANS = 3  # number of spans up to which a sentence names each
+_STILL = 0.2  # [m/s] largest speed of a hover
+_ALIGNED = 0.2  # [rad] largest angle of a hover between thrust axis and the thrust for rest
 
 
 class UndeterminedAttitude(SpecError):
-    """Thrust vanishes on the way, and with it the attitude from which a recovery would begin."""
+    """Thrust vanishes on the path, so that the attitude from which a recovery begins is undetermined."""
 
 
 @short
@@ -56,14 +56,14 @@ class Recoveries:
     """The recoveries from instants of a path."""
 
     times: Series  # [s] of the instants, (T,)
-    heights: Series  # [m] of the path then, (T,)
-    lowest: Series  # [m] the least height from then on, (T,)
+    heights: Series  # [m] of the path at the instants, (T,)
+    lowest: Series  # [m] the least height from the instant on, (T,)
     durations: Series  # [s] until it hovers; infinite where it never does, (T,)
-    reaction: float  # [s] for which the last command is kept before each
-    ground: float | None  # [m] below which there is none; None: no ground
+    reaction: float  # [s] for which the last command is kept before each recovery
+    ground: float | None  # [m] height of the ground; None: no ground
 
     def __post_init__(self) -> None:
-        """Check that there is one of each for every instant."""
+        """Check that every instant has a height, a lowest height and a duration."""
         if not len(self.times) == len(self.heights) == len(self.lowest) == len(self.durations) > 0:
             raise SpecError(
                 "recoveries need a height, a lowest height and a duration for each of their times"
@@ -76,13 +76,13 @@ class Recoveries:
 
     @property
     def possible(self) -> NDArray[np.bool_]:
-        """True where it comes to a hover, and that above the ground, (T,)."""
+        """True where the recovery reaches a hover without touching the ground, (T,)."""
         floor = -inf if self.ground is None else self.ground
         return np.asarray((self.lowest > floor) & np.isfinite(self.durations))
 
     @property
     def no_return(self) -> tuple[TimeInterval, ...]:
-        """The spans of instants from which there is none, each out to the instants that have one."""
+        """The spans of instants without a recovery, widened to the neighbouring instants that have one."""
         lost = np.flatnonzero(~self.possible)
         runs = np.split(lost, np.flatnonzero(np.diff(lost) > 1) + 1) if len(lost) else []
         last = len(self.times) - 1
@@ -92,7 +92,7 @@ class Recoveries:
         )
 
     def __str__(self) -> str:
-        """One sentence."""
+        """Return one sentence."""
         if not self.possible.any():
             above = "" if self.ground is None else " above the ground"
             return f"from no instant does it come back to a hover{above}"
@@ -136,18 +136,18 @@ def recoveries(
     reaction: NonNegative = 0.1,
     environment: Environment | None = None,
 ) -> Recoveries:
-    """Fly the recovery to a hover from instants of a path.
+    """Simulate the recovery to a hover from instants of a path.
 
-    Raises SpecError for times outside the path, UndeterminedAttitude where its thrust vanishes.
+    Raises SpecError for times outside the path, UndeterminedAttitude where the path's thrust vanishes.
 
     Args:
         plan: the path; a bare trajectory needs a vehicle.
-        vehicle: what flies it, or its name, by default the plan's.
-        times: of the instants [s], (T,), rising; by default a hundred a second, at most 2000 evenly.
+        vehicle: the vehicle or its name, by default the plan's.
+        times: instants [s], (T,), rising; by default 100 per second, at most 2000 evenly spaced.
         ground: the height [m], in the path's own frame, that a recovery must stay above; by default the
             environment's, which may have none.
         reaction: the time [s] for which the last command is kept before the recovery begins.
-        environment: where, by default the problem's.
+        environment: the surroundings, by default the problem's.
     """
     vehicle, environment = vehicle_of(plan, vehicle).without_dead_rotors(), environment_of(plan, environment)
     path = as_trajectory(plan)
@@ -173,7 +173,7 @@ def recoveries(
 
 
 class _Flock:
-    """Copies of a vehicle, one at each instant, that fly at once."""
+    """Copies of a vehicle, one at each instant, that are simulated together."""
 
     def __init__(
         self, setpoint: Setpoint, thrusts: Array, vehicle: Vehicle, environment: Environment
@@ -196,13 +196,13 @@ class _Flock:
         self.durations = np.zeros(count)
 
     def keep(self, setpoint: Setpoint, seconds: float) -> None:
-        """Fly on by the commands of the instants for so many seconds."""
+        """Keep the commanded attitudes, body rates and thrusts of the instants for some time [s]."""
         since = np.arange(round(seconds * RATE)) / RATE
         for begin in range(0, len(since), _CHUNK):
             self._fly(_kept(setpoint, since[begin : begin + _CHUNK], self._vehicle), True)
 
     def brake(self, floor: float) -> None:
-        """Come to a hover, no lower than a floor [m]; a copy that does not by the horizon never does."""
+        """Brake to a hover at or above a floor [m]; the duration is infinite where a copy never hovers."""
         body, gravity = self._carry[2].body, self._environment.gravity
         velocity = from_components(body.velocity)
         way = Braking.of(from_components(body.position), velocity, self._vehicle, gravity, floor)
@@ -219,7 +219,7 @@ class _Flock:
 
     def _fly(self, references: ReferencePoint, by_attitude: bool) -> None:
         self._carry, body = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude))
-        self.lowest = np.fmin(self.lowest, np.fmin.reduce(body.position[2], axis=1))  # NaN: it flew to pieces
+        self.lowest = np.fmin(self.lowest, np.fmin.reduce(body.position[2], axis=1))  # NaN: no longer finite
         speed = np.linalg.norm(from_components(body.velocity), axis=-1)
         moving = ~((speed <= _STILL) & self._holds(from_components(body.q_world_body)))
         ticks = moving.shape[1]
@@ -228,7 +228,7 @@ class _Flock:
         self._time += ticks / RATE
 
     def _holds(self, q_world_body: Array) -> NDArray[np.bool_]:
-        """True for attitudes (..., 4) whose thrust points where it holds the vehicle still in the wind."""
+        """True for attitudes (..., 4) whose thrust axis is aligned with weight and drag at rest in wind."""
         carried = self._vehicle.drag_body * so3.unrotate(q_world_body, self._environment.wind)
         needed = self._vehicle.mass * self._environment.weight - so3.rotate(q_world_body, carried)
         along = np.sum(so3.thrust_axis(q_world_body) * needed, axis=-1)
@@ -236,13 +236,13 @@ class _Flock:
 
 
 def _body(signals: Signals) -> Body:
-    """The row of a log."""
+    """Return the row of the log: the body's state."""
     body: Body = signals.plant.body
     return body
 
 
 def _kept(setpoint: Setpoint, since: Array, vehicle: Vehicle) -> ReferencePoint:
-    """Commands of instants, kept for so long [s] (T,), leaves (T, instants)."""
+    """Return references that keep the commands of instants for times since [s] (T,), leaves (T, instants)."""
     age = np.minimum(since, KEPT)[:, None, None]
     omega_body = np.broadcast_to(setpoint.omega_body, (len(since), *setpoint.omega_body.shape))
     q = so3.multiply(setpoint.q_world_body, so3.exp(age * omega_body))

@@ -1,1 +1,1 @@
-"""Flights as they would really be flown: what each draws, and the components that bring it about."""
+"""Flights under realistic conditions: the random draws of each flight, and the components that apply them."""

@@ -1,4 +1,4 @@
-"""Draws of a flight from its conditions: the vehicle that really flies, its start, errors, disturbances."""
+"""Random draws of a flight from its conditions: true vehicle, start, sensor errors and disturbances."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
-STREAMS = ("imu", "imu_bias", "motion_capture", "wind")  # of random numbers along a flight
-_NORMALS = (  # standard normals of a draw, in this order, whatever the conditions
+STREAMS = ("imu", "imu_bias", "motion_capture", "wind")  # streams of random numbers along a flight
+_NORMALS = (  # standard normals of a draw, always all of them in this order, whatever the conditions
     ("mass", 1),
     ("inertia", 1),
     ("drag", 1),
@@ -36,26 +36,26 @@ _NORMALS = (  # standard normals of a draw, in this order, whatever the conditio
     ("gust", 5),
 )
 _ENDS = np.cumsum([count for _, count in _NORMALS]).tolist()
-# of a second-order gust's two filters [-]: the Cholesky factor of their covariance (1/2, 1/4; 1/4, 1/4)
+# Cholesky factor [-] of (1/2, 1/4; 1/4, 1/4), the covariance of the two filters of a second-order gust
 _GUST_FIRST, _GUST_SECOND = sqrt(0.5), sqrt(0.125)
-_SEED_WORDS = 3  # of 64 bits, in the state of a generator
+_SEED_WORDS = 3  # words of 64 bits in the state of a generator
 
 
 class Draws:
-    """Columns of what flights draw of their conditions: flight k of a seed, whatever others fly beside it.
+    """Columns of random draws for flights. Flight k of a seed is the same whatever other flights are drawn.
 
-    A cause that is switched off leaves what is drawn of the others as it was, so that flights under other
-    conditions can be compared pair by pair.
+    Switching one cause off leaves the draws of the others unchanged, so that flights under other conditions
+    can be compared pair by pair.
     """
 
-    columns: Mapping[str, Array]  # (flights,) or (flights, n), by names that the functions below explain
+    columns: Mapping[str, Array]  # (flights,) or (flights, n); the functions below explain the names
 
     def __init__(self, dispersion: Dispersion, rotors: int, seed: int, flights: Iterable[int]) -> None:
-        """Draw what varies.
+        """Draw the varied quantities of all flights.
 
         Args:
-            dispersion: what varies.
-            rotors: how many the vehicle has.
+            dispersion: the distributions.
+            rotors: the vehicle's number of rotors.
             seed: of all flights.
             flights: their numbers, from 0.
         """
@@ -68,7 +68,7 @@ class Draws:
             words[k] = own.generate_state(words[k].size, np.uint64).reshape(words[k].shape)
             generator = np.random.Generator(np.random.SFC64(_Seed(words[k, 0])))  # type: ignore[arg-type]
             generator.random(out=uniforms[k])
-            generator.standard_normal(out=normals[k])  # of rotors last: other vehicles draw the rest alike
+            generator.standard_normal(out=normals[k])  # rotors last: other vehicles draw the rest alike
         normal = {
             name: normals[:, end - count : end] for (name, count), end in zip(_NORMALS, _ENDS, strict=True)
         }
@@ -86,7 +86,7 @@ class Draws:
         return len(self.flights)
 
     def starts(self, reference: BodyState) -> BodyState:
-        """The true states at the start of flights whose reference starts so."""
+        """Return the true states at the start of flights whose reference starts at `reference`."""
         position, velocity, turn = (
             self.columns[f"start_{name}"] for name in ("position", "velocity", "attitude")
         )
@@ -95,23 +95,23 @@ class Draws:
         return BodyState(reference.position + position, reference.velocity + velocity, q, omega)
 
     def stream(self, name: str) -> list[ISeedSequence]:
-        """The seeds of the random numbers of one of STREAMS along each flight."""
+        """Return the seeds of the random numbers of one of STREAMS, one seed per flight."""
         return [_Seed(words) for words in self._words[:, 1 + STREAMS.index(name)]]
 
 
 class _Seed(ISeedSequence):
-    """Seed of a generator whose words are known: a flight's are made at once for all its generators."""
+    """Seed of a generator with known words: those of all generators of a flight are made at once."""
 
     def __init__(self, words: NDArray[np.uint64]) -> None:
         self._words = words
 
     def generate_state(self, n_words: int, dtype: Any = np.uint64) -> NDArray[np.uint64]:
-        """The words."""
+        """Return the first words."""
         return self._words[:n_words]
 
 
 def _of_vehicle(conditions: Dispersion, normal: Mapping[str, Array], each_rotor: Array) -> dict[str, Array]:
-    """Factors over the nominal vehicle, unmodelled drag over its mass [1/s], offsets of the start [SI]."""
+    """Return factors of nominal parameters, unmodelled drag over mass [1/s], offsets of the start [SI]."""
     return {
         "mass": _factors(conditions.mass, normal["mass"][:, 0]),
         "inertia": _factors(conditions.inertia, normal["inertia"][:, 0]),
@@ -125,7 +125,7 @@ def _of_vehicle(conditions: Dispersion, normal: Mapping[str, Array], each_rotor:
 
 
 def _of_sensors(conditions: Dispersion, normal: Mapping[str, Array]) -> dict[str, Array]:
-    """Biases at the start, errors of the pose known before, misfits of the second camera system [SI]."""
+    """Return initial biases, errors of the first pose, and misfits of the second camera system [SI]."""
     imu = conditions.imu or Imu()
     capture = conditions.motion_capture or MotionCapture()
     hand_off = capture.hand_off or HandOff()
@@ -143,7 +143,7 @@ def _of_sensors(conditions: Dispersion, normal: Mapping[str, Array]) -> dict[str
 def _of_surroundings(
     conditions: Dispersion, normal: Mapping[str, Array], uniforms: Array
 ) -> dict[str, Array]:
-    """The charge [-], wind beyond the environment's [m/s], states of gusts [-] and their heading [rad]."""
+    """Return battery charge [-], added mean wind [m/s], states of gusts [-] and gust heading [rad]."""
     gusts = conditions.gusts or Gusts()
     used, turn = uniforms.T
     along, *across = normal["gust"].T
@@ -158,7 +158,7 @@ def _of_surroundings(
 
 
 def _factors(spread: float, normals: Array) -> Array:
-    """Log-normal factors, never negative, with mean 1 and standard deviation `spread`."""
+    """Return log-normal factors, never negative, with mean 1 and standard deviation `spread`."""
     variance = np.log1p(spread**2)
     return np.asarray(np.exp(np.sqrt(variance) * normals - 0.5 * variance))
 
@@ -169,7 +169,7 @@ def _directions(normals: Array) -> Array:
 
 
 def dispersed_fleet(nominal: Vehicle, draws: Draws) -> Fleet:
-    """The vehicles that really fly, as arrays: `Fleet.of` of each draw's vehicle, without making those."""
+    """Return the vehicles that really fly, as arrays: `Fleet.of` each draw's vehicle, made directly."""
     one, shape = Fleet.of([nominal]), (len(draws),)
     drag = draws.columns["drag"] * nominal.mass
 

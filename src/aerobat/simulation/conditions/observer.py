@@ -1,4 +1,4 @@
-"""The loop's observers: the filter, fed by IMU and motion capture, and what the controller's model lacks."""
+"""Observers of the loop: the Kalman filter of IMU and motion capture, and the disturbance observer."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from aerobat.simulation.loop import Component, Estimate, Signals, Source, due_ti
 
 
 class DisturbanceParameters(NamedTuple):
-    """A nominal model, and how slowly it is found wrong."""
+    """The nominal model of a disturbance observer, and its time constants."""
 
     model: ControllerModel
     time_constant: Scalar  # [s] of the filter
@@ -29,10 +29,10 @@ class DisturbanceParameters(NamedTuple):
 
 @dataclass(frozen=True)
 class DisturbanceObserver(Component):
-    """The low-passed difference between what is measured and the nominal model, of force and of moment.
+    """The low-pass filtered difference between measurement and nominal model, of force and of moment.
 
-    The model's is that of the rotors as the controller takes them to be, of drag at the estimated state, and
-    of the gyroscopic moment; the angular acceleration that is measured is the change of the gyro's rates.
+    The nominal model has the rotor thrusts that the controller assumes, drag at the estimated state, and the
+    gyroscopic moment. The angular acceleration is measured as the difference of the gyro's successive rates.
     """
 
     def init(
@@ -75,22 +75,22 @@ class DisturbanceObserver(Component):
 
 
 class ObserverParameters(NamedTuple):
-    """A filter in a loop."""
+    """The parameters of a filter in a loop."""
 
     ekf: EkfParameters
     tick: Scalar  # [s]
 
 
 class ObserverInput(NamedTuple):
-    """A tick of the observer."""
+    """The inputs of the observer at a tick."""
 
     elapsed: Scalar  # [s] since the last sample of the IMU, 0 at the first tick
     exposes: Scalar  # 1 if a pose is taken at this tick
-    arrives: Scalar  # 1 if one arrives
+    arrives: Scalar  # 1 if a pose arrives at this tick
 
 
 class FilterState(NamedTuple):
-    """A filter, and what it has to carry back."""
+    """The state of a filter, and its past poses that delayed measurements are compared with."""
 
     filter: EkfState
     exposures: tuple[Pose, ...]  # the filter's own poses at the latest exposures, the latest first
@@ -98,7 +98,7 @@ class FilterState(NamedTuple):
 
 @dataclass(frozen=True)
 class EkfObserver(Component):
-    """The error-state Kalman filter; it knows the reference's start, and of the flight what sensors say."""
+    """The error-state Kalman filter; it knows the reference's start and what sensors measure."""
 
     exposure_period: int  # ticks
     latency: int  # ticks
@@ -106,7 +106,7 @@ class EkfObserver(Component):
     def init(
         self, ops: Ops, parameters: ObserverParameters, inputs: ObserverInput, signals: Signals
     ) -> Estimate:
-        """See `Component.init`; the velocity is taken for the reference's."""
+        """See `Component.init`; the initial velocity estimate is that of the reference."""
         pose = signals.of(MocapState).delivered.pose
         state = ekf.init(parameters.ekf, pose, signals.reference.velocity)
         waiting = self.latency // self.exposure_period + 1
@@ -138,7 +138,7 @@ class EkfObserver(Component):
         exposures: tuple[Pose, ...],
         signals: Signals,
     ) -> tuple[EkfState, tuple[Pose, ...]]:
-        """The filter, and its poses at exposures, after the pose that arrives, if it is valid."""
+        """Return the filter and its poses at exposures after fusing the pose that arrives, if valid."""
         measured = signals.of(MocapState).delivered
         before = ekf.predict_covariance(ops, parameters.ekf, state)
         age = self.latency * parameters.tick
@@ -151,7 +151,7 @@ class EkfObserver(Component):
 
 
 def observer_source(sensor: MotionCaptureSensor, rate: float) -> Source:
-    """Return the source of when poses of a sensor are taken and arrive, for so many ticks a second."""
+    """Return the source of the ticks at which a sensor's poses are taken and arrive, at a tick rate [1/s]."""
 
     def inputs(begin: int, end: int) -> ObserverInput:
         return ObserverInput(

@@ -1,4 +1,4 @@
-"""Conditions as parts of the loop: components, what they are made of, and where their inputs come from."""
+"""Parts of the loop made from a flight's conditions: components, their parameters and sources of inputs."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
-SLOW = 100.0  # [1/s] at which what changes slowly steps: biases, charge, and wind that is not gustier
-GUSTY = 20.0  # [-] steps of the wind in the time in which its gusts change
-MAX_QUEUE = 8  # poses on their way at once
-WHOLE = 1e-6  # [-] of a tick
-_MOVING = 1e-3  # [m/s] a path that is slower has no direction
+SLOW = 100.0  # [1/s] rate of slow components: sensor biases, battery charge, and wind without fast gusts
+GUSTY = 20.0  # [-] steps of the wind in one time constant of its gusts
+MAX_QUEUE = 8  # largest number of poses in transit at once
+WHOLE = 1e-6  # [-] relative tolerance of whole numbers of ticks
+_MOVING = 1e-3  # [m/s] a slower path has no direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,30 +56,30 @@ class DispersedFlights:
     """The flights for which conditions are made."""
 
     draws: Draws
-    fleet: Fleet  # that really flies
+    fleet: Fleet  # vehicles that really fly, unlike the nominal one
     nominal: Vehicle
     environment: Environment
     rate: float  # [1/s] of the ticks
     trajectory: Trajectory  # that is flown
-    gates: tuple[Gate, ...] = ()  # on its way; they or the trajectory say where a hand-off is that does not
+    gates: tuple[Gate, ...] = ()  # on its way; the first gate is the default plane of a hand-off
 
     def each(self, name: str) -> Tree:
-        """A field of the draws: a leaf (vehicles,), or for an array a tuple of them."""
+        """Return a field of the draws: a leaf (vehicles,), or for an array a tuple of leaves."""
         values = self.draws.columns[name]
         return values if values.ndim == 1 else components(values)
 
     @property
     def effectiveness(self) -> Array:
-        """Of the rotors [-], (vehicles, n)."""
+        """The effectiveness of the rotors [-], (vehicles, n)."""
         return self.draws.columns["effectiveness"]
 
     def slow_period(self, rate: float = SLOW) -> int:
-        """The number of ticks in a step of a component that steps at `rate` [1/s], or somewhat faster."""
+        """Return the ticks per step of a component that steps at `rate` [1/s], or somewhat faster."""
         return max(1, int(self.rate / rate + WHOLE))
 
 
 def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[LoopPart, ...]:
-    """The parts of some conditions, in their order in the loop, before observer, controller and plant.
+    """Return the parts of some conditions, in their order in the loop, before observer, controller and plant.
 
     Raises SpecError for sensors whose rates do not fit the ticks.
     """
@@ -96,7 +96,7 @@ def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[
 
 
 def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
-    """Mean wind and gusts."""
+    """Return the part for mean wind and gusts."""
     time_constant = gusts.length / gusts.airspeed
     period = flights.slow_period(max(SLOW, GUSTY / time_constant))
     mean = flights.environment.wind + flights.draws.columns["mean_wind"]
@@ -119,9 +119,9 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
 
 
 def gust_filter(step: float) -> GustFilter:
-    """The exact discretisation of the gusts' filters over `step` of their time constants [-].
+    """Return the exact discretisation of the gust filters over `step` of their time constants [-].
 
-    The two filters of a component across have the stationary covariance P = (1/2, 1/4; 1/4, 1/4) and the
+    The two filters of a lateral component have the stationary covariance P = (1/2, 1/4; 1/4, 1/4) and the
     transition Φ = e^(−h) (1, 0; h, 1); their inputs have the covariance P − Φ P Φᵀ.
     """
     decay = np.exp(-step)
@@ -136,7 +136,7 @@ def gust_filter(step: float) -> GustFilter:
 
 
 def battery_part(battery: Battery, flights: DispersedFlights) -> LoopPart:
-    """A battery that the nominal vehicle's hover empties within its endurance."""
+    """Return the part for a battery that hover of the nominal vehicle empties within its endurance."""
     nominal = Fleet.of([flights.nominal])
     hover = flights.nominal.mass * flights.environment.gravity * np.abs(nominal.mixer[0, :, 0])
     radii = np.array([rotor.radius for rotor in flights.nominal.rotors])
@@ -147,7 +147,7 @@ def battery_part(battery: Battery, flights: DispersedFlights) -> LoopPart:
 
 
 def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
-    """An IMU's biases, and the IMU."""
+    """Return the parts for an IMU's biases and for the IMU."""
     slow = flights.slow_period()
     walk = np.sqrt(slow / flights.rate)
     biases = BiasParameters(
@@ -171,7 +171,7 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
 
 
 def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> LoopPart:
-    """Motion capture."""
+    """Return the part for motion capture."""
     period = whole_ticks(flights.rate, capture.rate, "motion_capture.rate")
     latency = round(capture.latency * flights.rate)
     if latency >= MAX_QUEUE * period:
@@ -197,7 +197,7 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
 
 
 def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
-    """The plane of hand-off; without one, some plane, and no misfit."""
+    """Return the plane of hand-off; without a hand-off, an arbitrary plane without misfit."""
     point, normal = hand_off_plane(hand_off or HandOff(), flights.trajectory, flights.gates)
     rotation = so3.exp(flights.draws.columns["hand_off_rotation"])
     return Seam(
@@ -210,9 +210,9 @@ def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
 
 
 def hand_off_plane(hand_off: HandOff, path: Trajectory, gates: Sequence[Gate]) -> tuple[Array, Array]:
-    """Point [m] and unit normal of the plane of hand-off, (3,) each, by itself or by what is flown.
+    """Return point [m] and unit normal of the plane of hand-off, (3,) each.
 
-    That is the first gate's, or where there is none the plane across the trajectory half-way.
+    The default is the first gate's plane or, without gates, the plane across the trajectory at half its time.
     """
     half = 0.5 * path.duration
     point = gates[0].position if gates else path.evaluate(half, 0)
@@ -227,7 +227,7 @@ def hand_off_plane(hand_off: HandOff, path: Trajectory, gates: Sequence[Gate]) -
 
 
 def whole_ticks(rate: float, sensor_rate: float, field: str) -> int:
-    """The ticks, at `rate` [1/s], of a sensor's period. Raises SpecError, naming its field, for fractions."""
+    """Return a sensor's period in ticks at `rate` [1/s]. Raises SpecError, naming `field`, for fractions."""
     ticks = rate / sensor_rate
     if ticks < 1.0 - WHOLE or abs(ticks - round(ticks)) > WHOLE * ticks:
         raise SpecError(

@@ -1,7 +1,8 @@
-"""Random numbers along flights, drawn on demand, each vehicle's from a generator of its own.
+"""Random numbers along flights, drawn on demand, for each vehicle from a generator of its own.
 
-A standard normal is the quantile of 16 random bits, as many as a sensor's converter has: half the cost of
-NumPy's own, of which a flight with an IMU takes ten thousand, and the same with every version of NumPy.
+A standard normal is the quantile of 16 random bits, the resolution of a sensor's converter. This takes half
+the time of NumPy's normals, of which a flight with an IMU draws ten thousand, and is the same with every
+version of NumPy.
 """
 
 from __future__ import annotations
@@ -22,17 +23,17 @@ Words: TypeAlias = NDArray[np.uint16]
 Arrange: TypeAlias = Callable[[Sequence[Coded], Array, NDArray[np.intp]], Tree]
 
 _LEVELS = 2**16
-_WORDS_AT_ONCE = 4  # 16-bit words in a number of the generator
-_TOGETHER = 128  # vehicles whose words are turned at once, so that they stay in a cache
-_APART = 8  # numbers of the generator between vehicles' words: rows a power of two apart share a cache badly
-_DRAWN_AT_ONCE = 256  # samples of a vehicle: a call of its generator takes as long as some hundred words
+_WORDS_AT_ONCE = 4  # 16-bit words in one 64-bit number of the generator
+_TOGETHER = 128  # vehicles whose words are transposed at once, so that they stay in a cache
+_APART = 8  # padding [64-bit numbers] between vehicles' rows: rows a power of two apart conflict in a cache
+_DRAWN_AT_ONCE = 256  # samples of a vehicle: one call of its generator costs as much as some hundred words
 
 
 class RandomSource:
-    """Standard normals and uniform numbers of a component that steps at every so many ticks.
+    """Standard normals and uniform numbers of a component that steps every `period` ticks.
 
-    The numbers are drawn by blocks of samples that begin at multiples of their size, so that any cuts of the
-    ticks into chunks, in any order, give the same bits. Only ticks at which the component steps draw numbers.
+    The numbers are drawn in blocks of samples that begin at multiples of the block size, so that any cuts of
+    ticks, in any order, give the same bits. Only ticks at which the component steps draw numbers.
     """
 
     def __init__(
@@ -45,16 +46,16 @@ class RandomSource:
         period: int = 1,
         block: int = 256,
     ) -> None:
-        """Prepare to draw.
+        """Prepare the generators.
 
         Args:
-            seeds: of each vehicle.
+            seeds: one for each vehicle.
             arrange: makes a component's inputs of the normals, of the uniforms (numbers, samples, vehicles),
                 and of the ticks at which the component steps, (samples,).
-            normals: standard normals a sample.
-            uniforms: numbers in (0, 1) a sample.
+            normals: standard normals per sample.
+            uniforms: numbers in (0, 1) per sample.
             period: ticks from one sample to the next.
-            block: samples whose numbers lie together in the generator's, a multiple of 4.
+            block: samples whose numbers are consecutive in the generator's sequence, a multiple of 4.
         """
         self._seeds = seeds
         self._arrange = arrange
@@ -66,7 +67,7 @@ class RandomSource:
         self._restart()
 
     def chunk(self, begin: int, end: int) -> Tree:
-        """Return inputs of the ticks from `begin` to before `end`, held from one sample to the next."""
+        """Return the inputs of the ticks from `begin` to before `end`, held from one sample to the next."""
         first = begin // self._period
         words = self._samples(first, (end - 1) // self._period + 1)
         high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]
@@ -76,14 +77,14 @@ class RandomSource:
         return samples if self._period == 1 else Held(np.arange(begin, end) // self._period - first, samples)
 
     def _samples(self, begin: int, end: int) -> Words:
-        """Random words (words, samples, vehicles) of some samples."""
+        """Return the random words (words, samples, vehicles) of some samples."""
         blocks = [self._block(k) for k in range(begin // self._size, (end - 1) // self._size + 1)]
         words = blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
         offset = begin // self._size * self._size
         return words[:, begin - offset : end - offset]
 
     def _block(self, number: int) -> Words:
-        """Random words (words, samples, vehicles) of a block."""
+        """Return the random words (words, samples, vehicles) of a block."""
         turn = number // self._blocks
         if turn < self._turn:
             self._restart()
@@ -93,7 +94,7 @@ class RandomSource:
         return block
 
     def _draw(self) -> None:
-        """The next blocks of all vehicles, some of which are drawn and turned while they lie in a cache."""
+        """Draw the next blocks of all vehicles; transpose the words of some vehicles while in the cache."""
         count, vehicles = self._blocks * self._words * self._size, len(self._generators)
         numbers = count // _WORDS_AT_ONCE
         drawn = np.empty((min(_TOGETHER, vehicles), numbers + _APART), dtype="<u8")
@@ -113,7 +114,7 @@ class RandomSource:
 
 @cache
 def _quantiles() -> Array:
-    """Of the standard normal, in the middles of equally likely intervals, scaled to a variance of 1."""
+    """Return standard normal quantiles at the midpoints of equally likely intervals, scaled to variance 1."""
     from scipy.special import ndtri
 
     middles = ndtri((np.arange(_LEVELS) + 0.5) / _LEVELS)

@@ -27,7 +27,7 @@ from aerobat.simulation.loop import Component, Signals, Source
 
 @dataclass(frozen=True)
 class Wind(Component):
-    """The wind, held from one step to the next; the plant and the accelerometer feel it."""
+    """The wind, held from one step to the next; it acts on the plant and on the accelerometer."""
 
     def init(self, ops: Ops, parameters: WindParameters, noise: GustNoise, signals: Signals) -> WindState:
         """See `Component.init`."""
@@ -41,7 +41,7 @@ class Wind(Component):
 
 
 def wind_source(draws: Draws, period: int) -> Source:
-    """Return the random numbers of gusts, for a component that steps at every so many ticks."""
+    """Return the random numbers of gusts, for a component that steps every `period` ticks."""
 
     def noise(x: Sequence[Coded], *_: object) -> GustNoise:
         return GustNoise(x[0], (x[1], x[2]), (x[3], x[4]))
@@ -51,7 +51,7 @@ def wind_source(draws: Draws, period: int) -> Source:
 
 @dataclass(frozen=True)
 class BatterySag(Component):
-    """The battery, emptied by the rotors' thrusts; the plant's ceilings are what it leaves of them."""
+    """The battery, discharged by the rotors' thrusts; it lowers the rotors' maximum thrusts."""
 
     def init(
         self, ops: Ops, parameters: BatteryParameters, inputs: tuple[()], signals: Signals
@@ -87,7 +87,7 @@ class ImuBias(Component):
 
 
 class FeltParameters(NamedTuple):
-    """An IMU, and what it is carried by."""
+    """An IMU, and the airframe and environment that determine what the IMU measures."""
 
     airframe: Airframe
     environment: EnvironmentParameters
@@ -96,7 +96,7 @@ class FeltParameters(NamedTuple):
 
 @dataclass(frozen=True)
 class ImuSensor(Component):
-    """An IMU at the centre of mass, biased as `ImuBias` says; its sample ends at the tick of its step."""
+    """An IMU at the centre of mass, with the biases of `ImuBias`; its sample ends at the tick of its step."""
 
     def init(self, ops: Ops, parameters: FeltParameters, noise: ImuSample, signals: Signals) -> ImuState:
         """See `Component.init`."""
@@ -131,23 +131,23 @@ def imu_source(draws: Draws, stream: str, period: int, block: int = 256) -> Sour
 
 
 class MocapState(NamedTuple):
-    """Poses on their way, the latest first."""
+    """Poses in transit, the latest first."""
 
     queue: tuple[PoseSample, ...]
 
     @property
     def delivered(self) -> PoseSample:
-        """The one that arrives or has arrived last, at ticks from its arrival to its successor's exposure."""
+        """The pose that arrived last; it stays until the exposure of its successor."""
         return self.queue[-1]
 
 
 @dataclass(frozen=True)
 class MotionCaptureSensor(Component):
-    """Motion capture: a pose is taken at every step, and arrives `latency` ticks later.
+    """Motion capture: a pose is taken at every step and arrives `latency` ticks later.
 
-    It steps at exposures alone. At the tick t of an arrival `MocapState.delivered` is the pose of tick
-    t − latency. Before the first arrival it is a pose from before the flight, not valid as a measurement,
-    with an error of its own.
+    The component steps at exposures only. At the tick t of an arrival, `MocapState.delivered` is the pose of
+    tick t − latency. Before the first arrival it is a pose from before the flight, marked invalid as a
+    measurement, with a random error of its own.
     """
 
     period: int  # ticks from one exposure to the next

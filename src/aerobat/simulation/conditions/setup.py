@@ -1,4 +1,4 @@
-"""Flights under conditions before they are flown: who really flies, from where, seen by which sensors."""
+"""Setups of flights under conditions: the true vehicles, their starts, sensors, filter and controller."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
-MAX_TICKS = 20  # in a period of the controller, where no IMU says how many
-_LEAST_START_VELOCITY = 0.01  # [m/s] 1σ that the filter reckons with at least
-_SLOWEST_ANSWERED = 0.05  # [s] of rotors' lag: slower ones answer disturbances too late, which costs attitude
+MAX_TICKS = 20  # largest number of ticks in a period of the controller, where no IMU sets the rate
+_LEAST_START_VELOCITY = 0.01  # [m/s] smallest initial standard deviation of velocity in the filter
+_SLOWEST_ANSWERED = 0.05  # [s] largest rotor lag with a disturbance observer: slower rotors answer too late
 
 
 def dispersed_setup(
@@ -43,14 +43,14 @@ def dispersed_setup(
     config: FlightConfig,
     conditions: Dispersion,
 ) -> FlightSetup:
-    """The flights of a config under its conditions.
+    """Return the setup of the flights of a config under conditions.
 
     Args:
-        plan: what is flown.
+        plan: the plan or trajectory to fly.
         nominal: the vehicle that the controller knows.
-        environment: where, without gusts.
-        config: whose seed and flights are drawn.
-        conditions: what they are drawn from.
+        environment: the surroundings, without gusts.
+        config: with the seed and the numbers of the flights.
+        conditions: the distributions to draw from.
 
     Raises SpecError for a vehicle that cannot hover, for rates that do not fit each other, and for a delay of
     more than a period of the controller.
@@ -91,7 +91,7 @@ def dispersed_setup(
 
 
 def _tick_rate(conditions: Dispersion, control_rate: float) -> float:
-    """Ticks a second: the IMU's, or so many that a period and the delay of the controller are whole ticks."""
+    """Return the tick rate [1/s]: the IMU's, or the lowest with control period and delay in whole ticks."""
     delay, imu = conditions.computation_delay, conditions.imu
     rates = [control_rate * k for k in range(1, MAX_TICKS + 1)] if imu is None else [imu.rate]
     for rate in rates:
@@ -105,7 +105,7 @@ def _tick_rate(conditions: Dispersion, control_rate: float) -> float:
 
 
 def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequence[LoopPart]) -> LoopPart:
-    """The filter behind the sensors, where there are any, or the true state."""
+    """Return the Kalman filter behind the sensors, or, without sensors, the observer of the true state."""
     imu, capture = conditions.imu, conditions.motion_capture
     if imu is None or capture is None:
         return LoopPart(StateObserver())
@@ -126,7 +126,10 @@ def _controller(
     config: FlightConfig,
     settings: Controller,
 ) -> tuple[LoopPart, ...]:
-    """The controller at its own period, its reference that of its commands' effect, and its delay."""
+    """Return the controller at its own period, its delay, its disturbance observer and its inner loop.
+
+    The controller's reference is that of the time when its commands take effect.
+    """
     nominal, environment, rate = flights.nominal, flights.environment, flights.rate
     model = controller_model(settings, (nominal,), known, environment)
     period = whole_ticks(rate, config.control_rate, "control_rate")
@@ -139,7 +142,7 @@ def _controller(
     observer: tuple[LoopPart, ...] = ()
     slowest = max(rotor.lag for rotor in nominal.rotors)
     if settings.disturbance_filter > 0.0 and conditions.imu is not None and slowest <= _SLOWEST_ANSWERED:
-        # a filter faster than the rotors takes their lag's misfit for a disturbance, and unsettles the loop
+        # a filter faster than the rotors takes errors of their modelled lag for disturbances: unstable
         times = max(settings.disturbance_filter, slowest), delay / rate
         observer = (LoopPart(DisturbanceObserver(), DisturbanceParameters(model, *times), period=period),)
     source = None

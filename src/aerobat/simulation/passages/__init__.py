@@ -1,4 +1,4 @@
-"""Passages of flights: through gates, as far as the body leaves them; by waypoints; past obstacles."""
+"""Passages of flights: through gates, with the body's clearance; by waypoints; past obstacles."""
 
 from aerobat.simulation.passages.log import log_rows, passages_in_log
 from aerobat.simulation.passages.obstacles import (

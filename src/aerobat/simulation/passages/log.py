@@ -1,4 +1,4 @@
-"""A flight's log judged as a flight is while it is flown: the same kernels, scanned over the log's rows."""
+"""Metrics of a logged flight: the kernels of the online metrics, scanned over the log's rows."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from aerobat.vehicle import Ellipsoid
 
 
 class PlaceKernel(Protocol):
-    """A kernel that follows a flight about one place, tick by tick: a module of `kernels.gates`."""
+    """A kernel that follows a flight near one place, tick by tick: a module of `kernels.gates`."""
 
     def __hash__(self) -> int:
-        """By its identity: its loop is made once."""
+        """Return the hash by identity, so that a kernel's loop is compiled once."""
 
     def init(self, place: Tree, /) -> Tree:
-        """The state before the first tick."""
+        """Return the state before the first tick."""
 
     def step(
         self,
@@ -40,25 +40,25 @@ class PlaceKernel(Protocol):
         counted: tuple[Scalar, Scalar],
         /,
     ) -> Tree:
-        """The state a tick later."""
+        """Return the state a tick later."""
 
 
 class ScannedRow(NamedTuple):
     """A row of a log."""
 
     snapshot: Snapshot
-    follows: Scalar  # 1 behind another row, 0 for the first
+    follows: Scalar  # 1 for a row after another, 0 for the first
 
 
 def log_rows(times: Array, position: Array, velocity: Array, q_world_body: Array) -> Snapshot:
-    """Rows of a log as kernels read them, leaves (T,); of times (T,) and states (T, ·)."""
+    """Return rows of a log as kernels read them, leaves (T,), from times (T,) and states (T, ·)."""
     return Snapshot(times, *map(components, (position, velocity, q_world_body)))
 
 
 def scan_log(kernel: PlaceKernel, places: Sequence[Tree], rows: Snapshot) -> list[Tree]:
-    """The state of a kernel at the end of a log for each of some places, leaves (1,).
+    """Return the final state of a kernel over a log, for each of some places, leaves (1,).
 
-    Places that are alike are followed side by side, as vehicles are in flight.
+    Places with equally many numbers are processed together, as vehicles of a batch are.
     """
     row = ScannedRow(rows, np.minimum(np.arange(len(rows.time), dtype=np.float64), 1.0))
     found: dict[int, Tree] = {}
@@ -76,7 +76,7 @@ def scan_log(kernel: PlaceKernel, places: Sequence[Tree], rows: Snapshot) -> lis
 
 @lru_cache
 def _functions(kernel: PlaceKernel) -> tuple[Init, Step]:
-    """The loop over rows, whose carry is the kernel's state and the row before; a row of it is the state."""
+    """Return the loop over rows; its carry is the kernel's state and the previous row, its row the state."""
 
     def init(ops: Ops, place: Tree, row: ScannedRow) -> Tree:
         return kernel.init(place), row.snapshot
@@ -92,12 +92,12 @@ def _functions(kernel: PlaceKernel) -> tuple[Init, Step]:
 def passages_in_log(
     rows: Snapshot, planned: Sequence[PlannedPassage], body: Ellipsoid | None, stop: Array
 ) -> tuple[Passage, ...]:
-    """Passages of one flight that was logged, fields (1,).
+    """Return the passages of one logged flight, fields (1,).
 
     Args:
         rows: of its log.
-        planned: what was to be passed.
-        body: what encloses its vehicle; without it the clearance is unknown.
+        planned: the planned passages.
+        body: the ellipsoid that encloses the vehicle; without it the clearance is unknown.
         stop: when the flight diverged [s], NaN where it did not, (1,).
     """
     found = scan_log(progress, gate_places(planned, bounding_ellipsoid(body)), rows)

@@ -1,9 +1,10 @@
 """Flights past obstacles: the nearest obstacle on the way, or the first that the body touches.
 
-The body, an ellipsoid with its propellers inside, is judged at every row of a flight: a tick, in flights that
-are scored as they are flown. What it moves between two ticks is not looked at. Few rows are separated from
-few obstacles. Stretches of a flight lie in boxes, most far from every piece. A plane that separates at
-one row bounds the clearance at its neighbours from below; only what may be nearer is looked at again.
+The body is an ellipsoid that encloses the propellers. Its clearance is checked at every row of a flight (each
+tick, for flights that are scored as they are flown), not between rows. Bounds keep exact checks rare: the
+bounding boxes of stretches of a flight are far from most obstacle pieces, and a plane that separates body and
+piece at one row bounds the clearance at the neighbouring rows from below. Only rows whose bound may still be
+the minimum are checked exactly.
 """
 
 from __future__ import annotations
@@ -22,15 +23,15 @@ from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.simulation.passages.passage import PerFlight
 from aerobat.vehicle import Ellipsoid
 
-STRETCH = 32  # rows that share a box
-AS_NEAR = 1e-5  # [m] by which the clearance that is told may be above the least
-AT_ONCE = 2**18  # stretches times pieces that are compared at once, 20 MB
-NEVER = np.iinfo(np.intp).max  # the row of a contact that there is not
+STRETCH = 32  # rows that share a bounding box
+AS_NEAR = 1e-5  # [m] tolerance by which the reported clearance may exceed the true minimum
+AT_ONCE = 2**18  # stretches times pieces that are compared at once, which takes 20 MB
+NEVER = np.iinfo(np.intp).max  # row number that stands for no contact
 
 
 @by_value
 class NearestObstacle(PerFlight):
-    """The obstacle that a flight comes nearest to before it touches any, else the first that it touches."""
+    """The obstacle that a flight comes nearest to or, if it touches any, the first one that it touches."""
 
     obstacle: str  # its name; empty: unknown
     clearance: float  # [m] between body and obstacle; negative: they touch
@@ -38,28 +39,28 @@ class NearestObstacle(PerFlight):
 
     @property
     def failure(self) -> FlightFailure | None:
-        """One flight's contact; None where there is none."""
+        """The contact of one flight; None where there is none."""
         if not self.clearance < 0.0:
             return None
         return FlightFailure(self.time, Outcome.HIT_OBSTACLE, {"obstacle": self.obstacle})
 
 
 class FlownBodies(NamedTuple):
-    """Bodies of flights over time."""
+    """States of the bodies of flights over time."""
 
     times: Array  # [s], (T,)
     position: Array  # [m] of their centres of mass, (flights, T, 3)
     q_world_body: Array  # (flights, T, 4)
     centre: Array  # [m] of their ellipsoids, body axes, (flights, 3)
     semi_axes: Array  # [m], (flights, 3)
-    rows: NDArray[Any]  # that count of each, the first ones, (flights,)
+    rows: NDArray[Any]  # number of rows of each flight that are valid, from the first, (flights,)
 
 
 def nearest_obstacles(pieces: Pieces, flown: FlownBodies) -> NearestObstacle:
-    """The nearest obstacles of many flights, fields (flights,).
+    """Return the nearest obstacles of many flights, fields (flights,).
 
     Args:
-        pieces: Of all obstacles, at least one.
+        pieces: The convex pieces of all obstacles, at least one.
         flown: The flights.
     """
     count = len(flown.rows)
@@ -67,7 +68,7 @@ def nearest_obstacles(pieces: Pieces, flown: FlownBodies) -> NearestObstacle:
     size = max(1, AT_ONCE // (stretches * len(pieces)))
     found = [_NearestSearch(pieces, flown, slice(k, k + size)).found() for k in range(0, count, size)]
     piece, clearance, row = (np.concatenate(part) for part in zip(*found, strict=True))
-    names = np.array([*(each.name for each in pieces.pieces), ""])  # the last where none is known
+    names = np.array([*(each.name for each in pieces.pieces), ""])  # the last name: none is known
     known = piece >= 0
     numbers: dict[str, Any] = {
         "obstacle": names[piece],
@@ -80,14 +81,14 @@ def nearest_obstacles(pieces: Pieces, flown: FlownBodies) -> NearestObstacle:
 def nearest_in_log(
     pieces: Pieces, times: Array, position: Array, q_world_body: Array, body: Ellipsoid | None
 ) -> NearestObstacle | None:
-    """The nearest obstacle of a flight that was logged; None where there are none, or no body is known.
+    """Return the nearest obstacle of a logged flight; None where there are none, or no body is known.
 
     Args:
-        pieces: Of all obstacles.
+        pieces: The convex pieces of all obstacles.
         times: Of the log's rows [s], (T,).
         position: [m], (T, 3).
         q_world_body: (T, 4).
-        body: What encloses the vehicle.
+        body: The ellipsoid that encloses the vehicle.
     """
     if body is None or not len(pieces):
         return None
@@ -97,14 +98,14 @@ def nearest_in_log(
 
 
 class _Encounters(NamedTuple):
-    """Stretches of flights beside pieces."""
+    """Pairs of a stretch of a flight and a piece of an obstacle."""
 
     flight: Indices  # (m,)
     first: Indices  # its first row, (m,)
     piece: Indices  # (m,)
 
     def of(self, rows: Any) -> _Encounters:
-        """The encounters of some rows."""
+        """Return the pairs of some rows."""
         return _Encounters(*(part[rows] for part in self))
 
 
@@ -117,14 +118,14 @@ class _NearestSearch:
         self._position, self._attitude = flown.position[flights], flown.q_world_body[flights]
         self._centre, self._semi_axes = flown.centre[flights], flown.semi_axes[flights]
         last = np.maximum(flown.rows[flights].astype(np.intp) - 1, 0)
-        self._last = last  # a flight stays where it ends
+        self._last = last  # a flight keeps its last state
         self._piece = np.full(len(last), -1)
         self._clearance = np.full(len(last), inf)
         self._row = np.zeros(len(last), dtype=np.intp)
-        self._touched = np.full(len(last), NEVER)  # the first row that is known to
+        self._touched = np.full(len(last), NEVER)  # first row known to touch an obstacle
 
     def found(self) -> tuple[Indices, Array, Indices]:
-        """Of each flight the piece, −1 where none is known, the clearance [m] and its row, (flights,)."""
+        """Return each flight's nearest piece (−1: unknown), its clearance [m] and row, (flights,)."""
         apart = self._apart
         self._look_at(*self._likeliest(apart))
         encounters = _Encounters(*np.nonzero(apart < np.maximum(self._clearance, 0.0)[:, None, None]))
@@ -139,7 +140,7 @@ class _NearestSearch:
 
     @property
     def _apart(self) -> Array:
-        """How far at least bodies are from pieces [m] over each stretch, by boxes, (flights, S, P)."""
+        """Lower bounds by boxes of the distance of bodies from pieces [m] over stretches, (flights, S, P)."""
         flights, rows, _ = self._position.shape
         padded = np.empty((3, flights, -(-rows // STRETCH) * STRETCH))
         padded[..., :rows] = np.moveaxis(self._position, -1, 0)
@@ -156,7 +157,7 @@ class _NearestSearch:
         return np.asarray(apart - reach[:, None, None])
 
     def _likeliest(self, apart: Array) -> tuple[_Encounters, Indices]:
-        """Of each flight the stretch and piece whose boxes are nearest, and the middle row of the stretch."""
+        """Return each flight's stretch and piece whose boxes are nearest, and the stretch's middle row."""
         flights, _, pieces = apart.shape
         best = np.argmin(apart.reshape(flights, -1), axis=1)
         known = np.flatnonzero(np.isfinite(apart).all(axis=(1, 2)))
@@ -164,9 +165,9 @@ class _NearestSearch:
         return encounters, np.full(len(known), STRETCH // 2)
 
     def _nearer(self, encounters: _Encounters, bounds: Array) -> tuple[Indices, Indices]:
-        """The encounters that may be nearer than what is known, and which row of each to look at.
+        """Return the pairs that may be nearer than the best known clearance, and which row of each to check.
 
-        Of flights that are known to touch, the first row before that touches, if any does.
+        Of flights that are known to touch, this is the first earlier row whose bound allows a contact.
         """
         touched = self._touched[encounters.flight]
         before = encounters.first[:, None] + np.arange(STRETCH) < touched[:, None]
@@ -179,7 +180,7 @@ class _NearestSearch:
     def _best_of_flights(
         self, encounters: _Encounters, bounds: Array, rows: Indices, ticks: Indices
     ) -> tuple[Indices, Indices]:
-        """Of the rows and ticks those of the nearest encounter of each flight."""
+        """Return, of these rows and ticks, the nearest pair of each flight."""
         flights = encounters.flight[rows]
         order = np.lexsort((bounds[rows, ticks], flights))
         _, firsts = np.unique(flights[order], return_index=True)
@@ -187,14 +188,14 @@ class _NearestSearch:
         return rows[best], ticks[best]
 
     def _look_at(self, encounters: _Encounters, ticks: Indices) -> Array:
-        """Note how near one row of each encounter is, and return bounds for all rows, (m, STRETCH)."""
+        """Check one row of each pair exactly, note it, and return lower bounds for all rows, (m, STRETCH)."""
         bounds, gaps = self._separated(encounters, ticks)
         rows = encounters.first + ticks
         bounds[np.arange(len(ticks)), ticks] = np.maximum(bounds[np.arange(len(ticks)), ticks], gaps)
         touched = self._touched[encounters.flight]
         lower = gaps < self._clearance[encounters.flight]
         hit = (gaps < 0.0) & ((rows < touched) | ((rows == touched) & lower))
-        order = np.lexsort((gaps, rows))[::-1]  # of several of a flight, the last one stays
+        order = np.lexsort((gaps, rows))[::-1]  # the last assignment wins: a flight's earliest row
         self._note(encounters, rows, gaps, order[hit[order]])
         np.minimum.at(self._touched, encounters.flight[hit], rows[hit])
         nearer = (self._touched[encounters.flight] == NEVER) & lower
@@ -211,7 +212,7 @@ class _NearestSearch:
     def _separated(
         self, encounters: _Encounters, ticks: Indices, exact_within: float = inf
     ) -> tuple[Array, Array]:
-        """Bounds for all rows by the planes that separate at one, (m, STRETCH), and the gaps there, (m,)."""
+        """Return bounds for all rows by planes that separate at one, (m, STRETCH), and its gaps, (m,)."""
         flight, first, piece = encounters
         semi_axes, centre, last = self._semi_axes[flight], self._centre[flight], self._last[flight]
         row = np.minimum(first + ticks, last)

@@ -1,12 +1,12 @@
-"""Passages through gates: the crossing of each gate's plane, in its direction, next to the planned instant.
+"""Passages through gates: the crossing of each gate's plane in its direction, nearest the planned instant.
 
-A crossing counts once the vehicle's centre gets PASSAGE_DEPTH beyond the plane before it comes back to it;
-one that stops in the gate, turns back, or comes from the other side has not passed. A path may cross
-obliquely, as the paper's do, whose gates leave the velocity free: it is judged where it crosses, by the
-gate's plane all the same. One that moves along the plane passes no gate.
+A crossing counts once the vehicle's centre is PASSAGE_DEPTH beyond the plane before it returns to the plane.
+A vehicle that stops in the gate, turns back, or comes from the other side has not passed. A path may cross
+obliquely, as the paper's paths do, whose gates leave the velocity free; the crossing of the gate's plane
+decides in any case. A path along the plane passes no gate.
 
-The frame is judged by the body, an ellipsoid with its propellers inside: all that it sweeps of the gate's
-plane, from when it comes into the plane until it has left it, is to lie within the opening.
+Clearance from the frame is measured by an ellipsoid that encloses the body and its propellers. Everything
+that the ellipsoid sweeps of the gate's plane during the crossing must lie within the opening.
 """
 
 from __future__ import annotations
@@ -34,28 +34,28 @@ from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.vehicle import Ellipsoid
 
-PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is looked for
+PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is searched
 
 
 @dataclass(frozen=True, eq=False)
 class PerFlight:
-    """A finding of one flight, or of many: then fields that they do not share are arrays (flights,)."""
+    """A finding about one flight or about many; for many, the fields that differ are arrays (flights,)."""
 
     def __post_init__(self) -> None:
-        """Write-protect the arrays of many."""
+        """Write-protect the arrays."""
         for value in vars(self).values():
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
 
     def of_flight(self, k: int) -> Self:
-        """One flight's of many, in plain numbers, as are the findings that it holds."""
+        """Return the finding of one flight of many, in plain numbers, nested findings included."""
         return replace(
             self, **{field.name: _of_flight(getattr(self, field.name), k) for field in fields(self)}
         )
 
 
 def _of_flight(value: Any, k: int) -> Any:
-    """One flight's part of a field of many."""
+    """Return one flight's part of a field that holds many."""
     if isinstance(value, tuple):
         return tuple(_of_flight(each, k) for each in value)
     if isinstance(value, PerFlight):
@@ -65,36 +65,36 @@ def _of_flight(value: Any, k: int) -> Any:
 
 @by_value
 class Passage(PerFlight):
-    """A gate's plane crossed in its direction, next to the planned instant; NaN where it was not.
+    """The crossing of a gate's plane in its direction, nearest the planned instant; NaN where there is none.
 
-    Of many flights, the fields but the first two are arrays (flights,).
+    For many flights, all fields but the first two are arrays (flights,).
     """
 
     gate: str
     lap: int  # of a course
     time: float  # [s] of the crossing
-    miss: float  # [m] from the centre there
-    lateral: float  # [m] from the centre there along the gate's lateral axis, to the left
-    up: float  # [m] likewise along its upright
-    inside: bool  # true if the centre of mass went through the opening
-    speed: float  # [m/s]
-    attitude_error_deg: float  # angle between the thrust axis and where it shall point
-    attitude_tolerance_deg: float  # largest that is allowed; infinite where no attitude is asked
-    clearance: float  # [m] the least between body and frame; negative: so far into it; NaN: unknown
-    closest_time: float  # [s] when that was
-    closest_edge: str  # left, right, upper or lower, as who passes upright sees it; empty: unknown
-    closest_lateral: float  # [m] where on that edge: from the opening's centre to the left
-    closest_up: float  # [m] likewise along the gate's upright
-    needed_width: float  # [m] of the least opening about the same centre that it would have passed
-    needed_height: float  # [m] likewise
-    planned: float  # [s] when it was to be crossed; NaN where the flight had ended before
-    backward_time: float  # [s] of a crossing against the direction about then; infinite where there is none
-    max_distance: float  # [m] beyond the plane about then, negative: before it
-    min_distance: float  # [m] likewise
+    miss: float  # [m] distance from the gate's centre at the crossing
+    lateral: float  # [m] offset from the centre at the crossing along the gate's lateral axis, to the left
+    up: float  # [m] offset along the gate's upright axis
+    inside: bool  # true if the centre of mass crossed within the opening
+    speed: float  # [m/s] at the crossing
+    attitude_error_deg: float  # angle between the thrust axis and its required direction
+    attitude_tolerance_deg: float  # largest angle allowed; infinite where no attitude is required
+    clearance: float  # [m] smallest distance of body and frame; negative: penetration depth; NaN: unknown
+    closest_time: float  # [s] instant of the smallest clearance
+    closest_edge: str  # left, right, upper or lower, as seen in the direction of passage; empty: unknown
+    closest_lateral: float  # [m] nearest point on that edge: from the opening's centre to the left
+    closest_up: float  # [m] nearest point on that edge: along the gate's upright axis
+    needed_width: float  # [m] width of the smallest opening, with this centre, that the body passes
+    needed_height: float  # [m] height of that opening
+    planned: float  # [s] planned instant of the crossing; NaN where the flight had ended before
+    backward_time: float  # [s] of a crossing against the direction near `planned`; infinite: none
+    max_distance: float  # [m] largest distance beyond the plane near `planned`; negative: before the plane
+    min_distance: float  # [m] smallest distance beyond the plane near `planned`
 
     @property
     def failure(self) -> FlightFailure | None:
-        """The mistake of one flight; None where nothing is wrong, or known."""
+        """The failure of one flight at this gate; None where nothing is wrong or the passage is unknown."""
         if np.isnan(self.planned):
             return None
         if np.isnan(self.time):
@@ -110,7 +110,7 @@ class Passage(PerFlight):
         return None
 
     def _instead(self) -> FlightFailure:
-        """What happened in place of a crossing in the gate's direction."""
+        """Return the failure of a flight that did not cross the plane in the gate's direction."""
         if self.max_distance <= 0.0:
             return self._failed(Outcome.SHORT_OF_GATE, self.planned, short=-self.max_distance)
         if self.max_distance >= PASSAGE_DEPTH and np.isfinite(self.backward_time):
@@ -124,11 +124,11 @@ class Passage(PerFlight):
 
 
 def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Passage:
-    """Passages of many flights through one gate.
+    """Return the passages of many flights through one gate.
 
     Args:
-        planned: what was to be passed.
-        progress: of the vehicles, offsets from the gate's centre as positions; leaves (flights,).
+        planned: the planned passage.
+        progress: of the vehicles, whose positions are offsets from the gate's centre; leaves (flights,).
         stop: when flights diverged [s], NaN for those that did not, (flights,).
     """
     gate = planned.gate
@@ -162,12 +162,12 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Pa
 
 
 def _closest(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, Any]:
-    """What a swath leaves of the opening, and where it is least, each (flights,).
+    """Return a swath's smallest clearance from the opening's edges, its place and time, each (flights,).
 
     Args:
-        gate: what is passed.
-        swath: through its plane, leaves (flights,); none where the body is not known.
-        crossed: true where it is crossed.
+        gate: the gate.
+        swath: what the body sweeps of the gate's plane, leaves (flights,); empty where the body is not known.
+        crossed: true where the plane is crossed.
     """
     opening = gate.opening
     swath = swath or len(opening.probes) * (tree_map(partial(np.full, len(crossed)), NOWHERE),)
@@ -196,7 +196,7 @@ def _closest(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, 
 
 
 def _in_opening(probe: EdgeProbe, extreme: Extreme) -> Array:
-    """The points (left, up) of a gate's plane that reach the farthest along a probe [m], (flights, 2)."""
+    """Return the points (left, up) of a gate's plane that reach farthest along a probe [m], (flights, 2)."""
     left, up = probe.direction
     along, beside = extreme.point
     return np.stack([left * along - up * beside, up * along + left * beside], axis=-1)
@@ -205,9 +205,9 @@ def _in_opening(probe: EdgeProbe, extreme: Extreme) -> Array:
 def gate_places(
     planned: Sequence[PlannedPassage], ellipsoid: BoundingEllipsoid | tuple[()]
 ) -> list[tuple[GatePlane, BoundingEllipsoid | tuple[()]]]:
-    """Planned passages as kernels read them, leaves numbers, each with what encloses the vehicle.
+    """Return planned passages as kernels read them, leaves numbers, each with the enclosing ellipsoid.
 
-    Without that, no body is measured.
+    Without an ellipsoid, clearance is not measured.
     """
     return [
         (
@@ -228,14 +228,14 @@ def gate_places(
 
 
 def bounding_ellipsoid(body: Ellipsoid | None) -> BoundingEllipsoid | tuple[()]:
-    """The ellipsoid that encloses a vehicle as kernels read it, leaves numbers; () where none is known."""
+    """Return a vehicle's enclosing ellipsoid as kernels read it, with numbers as leaves; () where unknown."""
     if body is None:
         return ()
     return BoundingEllipsoid(components(body.centre), components(body.semi_axes))
 
 
 def _motion(gate: Gate) -> PlaceMotion | tuple[()]:
-    """The motion of a gate that moves."""
+    """Return the motion of a moving gate; () for a fixed one."""
     if gate.motion is None:
         return ()
     bends = zip(gate.motion.times.tolist(), gate.motion.turns, strict=True)
@@ -243,7 +243,7 @@ def _motion(gate: Gate) -> PlaceMotion | tuple[()]:
 
 
 def _directions(gate: Gate) -> tuple[PlaneDirection, ...]:
-    """The directions in which a body that passes a gate is measured."""
+    """Return the directions in the gate's plane along which the extent of a passing body is measured."""
     probes = gate.opening.probes
     turned = [probe.direction @ gate.plane_axes for probe in probes]
     beside = [np.array([-up, left]) @ gate.plane_axes for (left, up), *_ in probes]

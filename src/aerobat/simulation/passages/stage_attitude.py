@@ -1,4 +1,4 @@
-"""Attitudes of stages that flights came to: the nearest of the thrust axis about the planned instant."""
+"""Attitudes of flights at stages: the nearest of the thrust axis near the planned instant."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from aerobat.simulation.passages.passage import PASSAGE_WINDOW, PerFlight
 
 @by_value
 class PlannedAttitude:
-    """A stage's attitude to be taken at an instant."""
+    """An attitude that a stage requires at an instant."""
 
     stage: str
     up: Array  # unit vector along the thrust axis, world, (3,)
     time: float  # [s]
-    tolerance: float  # [rad] between the thrust axis and `up`, at most
+    tolerance: float  # [rad] largest angle allowed between the thrust axis and `up`
     lap: int = 1  # of a course
 
 
 @by_value
 class StageAttitude(PerFlight):
-    """The thrust axis where it comes nearest to a stage's next to the planned instant; NaN where unknown.
+    """The thrust axis where it is nearest to a stage's direction, near the planned instant; NaN: unknown.
 
-    Of many flights, the fields but the first three are arrays (flights,).
+    For many flights, all fields but the first three are arrays (flights,).
     """
 
     stage: str
     lap: int  # of a course
-    tolerance_deg: float  # the largest angle that is allowed
-    time: float  # [s]
-    angle_deg: float  # between the thrust axis and the planned one
-    planned: float  # [s] when it was planned; NaN where the flight had ended before
+    tolerance_deg: float  # the largest angle allowed
+    time: float  # [s] of the smallest angle
+    angle_deg: float  # smallest angle between the thrust axis and the planned direction
+    planned: float  # [s] planned instant; NaN where the flight had ended before
 
     @property
     def failure(self) -> FlightFailure | None:
-        """The mistake of one flight; None where nothing is wrong, or known."""
+        """The failure of one flight at this stage; None where nothing is wrong or known."""
         if np.isnan(self.planned) or self.angle_deg <= self.tolerance_deg:
             return None
         angles = {"angle": self.angle_deg, "tolerance": self.tolerance_deg}
@@ -50,10 +50,10 @@ class StageAttitude(PerFlight):
 
 
 def stage_attitudes(planned: PlannedAttitude, found: Pointing, stop: Array) -> StageAttitude:
-    """Attitudes of many flights at one stage.
+    """Return the attitudes of many flights at one stage.
 
     Args:
-        planned: what was to be taken.
+        planned: the planned attitude.
         found: of the vehicles, leaves (flights,).
         stop: when flights diverged [s], NaN for those that did not, (flights,).
     """
@@ -68,5 +68,5 @@ def stage_attitudes(planned: PlannedAttitude, found: Pointing, stop: Array) -> S
 
 
 def attitude_direction(planned: PlannedAttitude) -> Direction:
-    """A planned attitude as kernels read it, leaves numbers."""
+    """Return a planned attitude as kernels read it, leaves numbers."""
     return Direction(components(planned.up), planned.time, PASSAGE_WINDOW)

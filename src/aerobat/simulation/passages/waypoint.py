@@ -1,4 +1,4 @@
-"""Waypoints that flights came by: the nearest approach about the planned instant, against the radius."""
+"""Passages of flights by waypoints: the nearest approach near the planned instant, and the radius allowed."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from aerobat.problem.planned_passage import PlannedWaypoint
 from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, PerFlight
 
-# [m] beyond the radius that is no miss: paths of least time touch the ball, and no flight is its path
+# [m] excess over the radius that is no miss: time-optimal paths touch the ball, and flights deviate slightly
 GRAZING = 1e-3
 
 
 @by_value
 class WaypointPassage(PerFlight):
-    """The nearest approach to a waypoint next to the planned instant; NaN where there is none.
+    """The nearest approach to a waypoint near the planned instant; NaN where there is none.
 
-    Of many flights, the fields but the first three are arrays (flights,).
+    For many flights, all fields but the first three are arrays (flights,).
     """
 
     waypoint: str
     lap: int  # of a course
-    radius: float  # [m] within which it is met
+    radius: float  # [m] largest distance allowed
     time: float  # [s] of the approach
-    miss: float  # [m] from the waypoint there
-    speed: float  # [m/s]
-    planned: float  # [s] when it was to be met; NaN where the flight had ended before
+    miss: float  # [m] distance from the waypoint at the approach
+    speed: float  # [m/s] at the approach
+    planned: float  # [s] planned instant; NaN where the flight had ended before
 
     @property
     def failure(self) -> FlightFailure | None:
-        """The mistake of one flight; None where nothing is wrong, or known."""
+        """The failure of one flight at this waypoint; None where nothing is wrong or known."""
         if np.isnan(self.planned) or self.miss <= self.radius + GRAZING:
             return None
         numbers = {"waypoint": self.waypoint, "miss": self.miss, "radius": self.radius}
@@ -43,10 +43,10 @@ class WaypointPassage(PerFlight):
 
 
 def waypoint_passages(planned: PlannedWaypoint, found: Approach, stop: Array) -> WaypointPassage:
-    """Approaches of many flights to one waypoint.
+    """Return the approaches of many flights to one waypoint.
 
     Args:
-        planned: what was to be met.
+        planned: the planned passage of the waypoint.
         found: of the vehicles, leaves (flights,).
         stop: when flights diverged [s], NaN for those that did not, (flights,).
     """
@@ -62,5 +62,5 @@ def waypoint_passages(planned: PlannedWaypoint, found: Approach, stop: Array) ->
 
 
 def waypoint_target(planned: PlannedWaypoint) -> Target:
-    """A planned waypoint as kernels read it, leaves numbers."""
+    """Return a planned waypoint as kernels read it, leaves numbers."""
     return Target(components(planned.ball.centre), planned.time, PASSAGE_WINDOW)

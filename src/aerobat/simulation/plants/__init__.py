@@ -1,4 +1,4 @@
-"""Plants: whatever answers rotor commands with a state; here the physics that others wrote."""
+"""Plants, which turn rotor commands into a vehicle's state; here the simulators of others."""
 
 from aerobat.simulation.plants.plant import PLANTS, Actuation, Plant, PlantRun, PlantScene
 

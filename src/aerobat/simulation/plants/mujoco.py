@@ -1,10 +1,10 @@
-"""MuJoCo as a plant: contacts and rigid-body physics that others wrote, of a model made from ours.
+"""MuJoCo as a plant: rigid-body physics with contacts, in a MuJoCo model generated from vehicle and scene.
 
-The vehicle is a free body with an ellipsoid as its hull. Each rotor is an actuator at a site in its centre of
-mass: thrust along +z and the moments of its column of the allocation, a first-order lag. Drag is a force of
-its own, held for a step at what it is half-way. Gates are frames of bars, or walls where they have these; the
-ground is a plane. Obstacles are MuJoCo's own shapes where it has them, all others the meshes of their convex
-pieces.
+The vehicle is a free body with an ellipsoid as its hull. Each rotor is an actuator with a first-order lag at
+a site in the centre of mass; its gear is the rotor's column of the allocation (thrust along +z and moments).
+Drag is applied as an external force, evaluated at the middle of each step and held over the step. Gates are
+frames of bars, or walls if they have walls; the ground is a plane. Obstacles are MuJoCo's own shapes where
+MuJoCo has them, and otherwise the meshes of their convex pieces.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from aerobat.simulation.plants.plant import PLANTS, Actuation, Plant, PlantScene
 if TYPE_CHECKING:
     import mujoco
 
-FRAME_WIDTH = 0.05  # [m] of a gate's bars
-FRAME_DEPTH = 0.02  # [m] along the direction of passage
+FRAME_WIDTH = 0.05  # [m] width of the bars of a gate's frame
+FRAME_DEPTH = 0.02  # [m] depth of the bars along the direction of passage
 _VEHICLE, _GROUND, _GATE, _OBSTACLE = "vehicle", "ground", "gate", "obstacle"
 _KINDS = {
     _VEHICLE: Contact.NOTHING,
@@ -42,8 +42,8 @@ _KINDS = {
     _GATE: Contact.GATE,
     _OBSTACLE: Contact.OBSTACLE,
 }
-_AT_ONCE = 1e4  # [1/s] a rotor that is as fast has no lag here
-_ROUNDING = 1e-9  # of a step
+_AT_ONCE = 1e4  # [1/s] a rotor whose inverse time constant is at least this is simulated without lag
+_ROUNDING = 1e-9  # [-] rounding of a number of steps
 
 
 class Mujoco(Plant):
@@ -61,13 +61,13 @@ PLANTS.add("mujoco", Mujoco)
 
 
 class MujocoRun:
-    """A vehicle in MuJoCo, on its way; see `PlantRun`."""
+    """A vehicle that flies in MuJoCo; see `PlantRun`."""
 
     def __init__(self, scene: PlantScene, motion: VehicleState, contacts: bool, max_step: float) -> None:
         self._mujoco = import_extra("mujoco", "the plant mujoco needs MuJoCo", "aerobat[mujoco]")
         self._airframe = scene.airframe
         rates = [rate for rate in scene.airframe.rotors.inverse_time_constant if rate < _AT_ONCE]
-        self._max_step = min([max_step, *(1.0 / rate for rate in rates)])  # Runge-Kutta bears 2.8 times that
+        self._max_step = min([max_step, *(1.0 / rate for rate in rates)])  # RK4 is stable to 2.8 times that
         self._model: mujoco.MjModel = self._mujoco.MjModel.from_xml_string(mujoco_model(scene, contacts))
         self._data: mujoco.MjData = self._mujoco.MjData(self._model)
         self._lagging = np.flatnonzero(self._model.actuator_dyntype != self._mujoco.mjtDyn.mjDYN_NONE)
@@ -83,7 +83,7 @@ class MujocoRun:
         data.qvel[:] = [*body.velocity, *body.omega_body]
         data.ctrl[:] = motion.thrusts
         data.act[:] = np.array(motion.thrusts)[self._lagging]
-        self._last_velocity = np.array(body.velocity)  # [m/s] a step ago
+        self._last_velocity = np.array(body.velocity)  # [m/s] velocity at the previous step
         self._mujoco.mj_forward(self._model, data)
         self._feel()
 
@@ -120,7 +120,7 @@ class MujocoRun:
             self._feel()
 
     def _move_obstacles(self) -> None:
-        """Move those that move, gates too, to where they are now."""
+        """Move the mocap bodies, which are moving obstacles and gates, to their present places."""
         for place, motion in zip(self._data.mocap_pos, self._motions, strict=True):
             place[:] = motion.moved(np.array(self._data.time))
 
@@ -130,18 +130,18 @@ class MujocoRun:
 
 
 def moving_bodies(scene: PlantScene) -> list[ObstacleMotion]:
-    """The motions of the model's mocap bodies, in their order: of obstacles and gates that move."""
+    """Return the motions of the model's mocap bodies, moving obstacles and then gates, in their order."""
     moving = [each.motion for each in scene.obstacles for _ in _shapes(each)]
     moving += [gate.motion for gate in scene.gates if gate.wall is None]
     return [motion for motion in moving if motion is not None]
 
 
 def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
-    """The MuJoCo model (MJCF) of a vehicle, gates, obstacles and ground.
+    """Return the MuJoCo model (MJCF) of a vehicle, gates, obstacles and ground.
 
     Args:
-        scene: what there is.
-        contacts: with gates, obstacles and ground.
+        scene: the vehicle and its surroundings.
+        contacts: whether the vehicle collides with gates, obstacles and ground.
     """
     root = Element("mujoco", model="aerobat")
     SubElement(root, "option", integrator="RK4", gravity=f"0 0 {-scene.gravity!r}", density="0")
@@ -181,7 +181,7 @@ def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
 
 
 def _shapes(obstacle: Obstacle) -> Iterator[dict[str, str]]:
-    """The geoms of an obstacle; a convex hull by its vertices."""
+    """Yield the attributes of an obstacle's geoms; a convex piece is a mesh of its vertices."""
     match obstacle:
         case Box():
             length, width = obstacle.axes.T[:2]
@@ -205,14 +205,14 @@ def _shapes(obstacle: Obstacle) -> Iterator[dict[str, str]]:
 
 
 def _hull(piece: ConvexPiece) -> Array:
-    """Points of a piece [m] whose hull it is; of what is round, points all around."""
+    """Return points [m] whose convex hull is the piece; of a rounded piece, points all over its surface."""
     return surface_of(piece).points if piece.rounding.any() else piece.points
 
 
 def _frame_bars(gate: Gate) -> Iterator[tuple[Array, Array, tuple[float, float, float]]]:
-    """The bars about a gate's opening, each its centre [m], the direction outward and half its sizes [m].
+    """Yield the bars about a gate's opening: the centre [m], the direction outward and the half sizes [m].
 
-    These are along the gate's normal, outward and along the bar, which reaches over the corners.
+    The half sizes are along the gate's normal, outward and along the bar, which extends over the corners.
     """
     half = FRAME_WIDTH / 2
     for middle, normal, half_length in gate.opening.edges:
@@ -238,7 +238,7 @@ def _add_vehicle(world: Element, scene: PlantScene) -> None:
 
 
 def _actuators(airframe: Airframe) -> Iterator[dict[str, str]]:
-    """A rotor each: what a newton of its thrust does to the body, its limits and its lag."""
+    """Yield an actuator for each rotor: its wrench per newton of thrust, its limits and its lag."""
     rotors = airframe.rotors
     for low, high, rate, *column in zip(
         rotors.min_thrust, rotors.max_thrust, rotors.inverse_time_constant, *rotors.allocation, strict=True
@@ -248,7 +248,7 @@ def _actuators(airframe: Airframe) -> Iterator[dict[str, str]]:
             "site": "centre of mass",
             "gear": _text((0.0, 0.0, collective, *moments)),
             "ctrllimited": "true",
-            "ctrlrange": _text((low, max(high, low + 1e-9))),  # MuJoCo knows no dead actuators
+            "ctrlrange": _text((low, max(high, low + 1e-9))),  # MuJoCo accepts no empty range (failed rotor)
         }
         if rate < _AT_ONCE:
             actuator |= {"dyntype": "filter", "dynprm": repr(1.0 / float(rate))}

@@ -1,7 +1,7 @@
-"""The loop with a plant, a flight controller's firmware or both outside of it.
+"""The simulation loop with an external plant, external flight-controller firmware, or both.
 
-The rest of the loop is compiled as ever, and stepped tick by tick. The firmware takes measurements and the
-controller's rates; the plant takes the firmware's commands.
+The rest of the loop is compiled as usual and stepped tick by tick. The firmware takes measurements and the
+controller's body rates; the plant takes the firmware's rotor commands.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from aerobat.vehicle.ellipsoid import Ellipsoid
 
 @dataclass(frozen=True)
 class OutsidePlant(Component):
-    """A plant whose state is an input of every tick; its parameters are those of the vehicle's model."""
+    """A plant whose state is an input at every tick; its parameters are those of the vehicle's model."""
 
     def init(
         self, ops: Ops, parameters: PlantParameters, inputs: VehicleState, signals: Signals
@@ -71,7 +71,7 @@ class OutsidePlant(Component):
 
 @dataclass(frozen=True)
 class Actuator(Component):
-    """The inputs of the plant outside: commands, wind, and the rotors' limits as the battery leaves them."""
+    """The inputs of the external plant: commands, wind, and the rotor limits that the battery allows."""
 
     def init(self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Actuation:
         """See `Component.init`."""
@@ -98,7 +98,7 @@ class FirmwareInputs(NamedTuple):
 
 
 class OutsideRow(NamedTuple):
-    """The row of the log of a tick, and the inputs of plant and firmware outside of the loop."""
+    """The log row of a tick, and the inputs of external plant and firmware."""
 
     log: LogRow
     actuation: Actuation
@@ -106,7 +106,7 @@ class OutsideRow(NamedTuple):
 
 
 class RigidBodyRun:
-    """Our own rigid body and rotors, advanced outside of the loop; see `PlantRun`."""
+    """The built-in rigid body and rotors, advanced outside of the compiled loop; see `PlantRun`."""
 
     contact = Contact.NOTHING
 
@@ -127,11 +127,11 @@ class RigidBodyRun:
 
 
 def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, NDArray[np.int64]]:
-    """Rows of all ticks with leaves (1, ticks), and what was touched before each, by the codes of Contact.
+    """Return the rows of all ticks, leaves (1, ticks), and the contacts before each, as codes of Contact.
 
     Args:
-        setup: of one vehicle, its config's plant in the place of the rigid body, its autopilot in that of the
-            inner loop's model.
+        setup: of one vehicle; its config's plant replaces the rigid body, its config's autopilot the model of
+            the inner loop.
         gates: that the vehicle may touch.
 
     Raises:
@@ -175,7 +175,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
 
 
 def _begun(plant: Plant, scene: PlantScene, motion: VehicleState) -> PlantRun:
-    """The plant's vehicle at its start. Raises SpecError where a plant of one's own gives something else."""
+    """Return the plant's vehicle at its start. Raises SpecError if begin() returns something else."""
     run: Any = plant.begin(scene, motion)
     names = ("motion", "contact", "advance")
     missing = [
@@ -191,7 +191,7 @@ def _begun(plant: Plant, scene: PlantScene, motion: VehicleState) -> PlantRun:
 
 
 class _Firmware:
-    """The autopilot of a flight's config, if it has one, between the loop and the plant."""
+    """The firmware of a flight's config, if it has one, between the loop and the plant."""
 
     def __init__(self, setup: FlightSetup, scene: PlantScene) -> None:
         self._setup, self._scene = setup, scene
@@ -205,7 +205,7 @@ class _Firmware:
             self._run.close()
 
     def step(self, row: OutsideRow, motion: VehicleState, period: float) -> tuple[LogRow, Actuation]:
-        """The row of a tick, and the actuation until the next: by the firmware's commands where one flies."""
+        """Return the row of a tick and the actuation until the next, with the firmware's commands, if any."""
         actuation: Actuation = first_numbers(row.actuation)
         autopilot = self._setup.config.autopilot
         if autopilot is None:
@@ -223,7 +223,7 @@ class _Firmware:
         return row.log._replace(commands=logged), actuation._replace(commands=commands)
 
     def _felt(self, motion: VehicleState) -> Vector:
-        """The specific force of calm air, where no IMU measures it."""
+        """Return the specific force in calm air, used where no IMU measures it."""
         properties, rotors = self._scene.airframe
         thrust = motors.collective_thrust(rotors, motion.thrusts)
         environment = EnvironmentParameters(self._scene.gravity, ZERO)
@@ -243,7 +243,7 @@ def _firmware_row(signals: Signals) -> OutsideRow:
 
 
 def _with_motion(inputs: LoopInput, motion: VehicleState) -> LoopInput:
-    """The inputs of a tick with the plant's motion, which is the first component's."""
+    """Return the inputs of a tick with the plant's motion, which is the input of the first component."""
     return inputs._replace(own=(tree_map(np.float64, motion), *inputs.own[1:]))
 
 

@@ -1,4 +1,4 @@
-"""The interface to a plant of another simulator: its inputs and its answers, tick by tick."""
+"""The interface to a plant of another simulator: its inputs and its outputs, tick by tick."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from aerobat.vehicle.ellipsoid import Ellipsoid
 
 @dataclass(frozen=True, eq=False)
 class PlantScene:
-    """One vehicle and what it may touch, in the numbers of the kernels."""
+    """One vehicle and the objects that it may touch, in the numbers of the kernels."""
 
-    airframe: Airframe  # what really flies
+    airframe: Airframe  # of the vehicle that really flies
     gravity: float  # [m/s²]
     ground: float | None  # [m] its height; None for no ground
-    body: Ellipsoid  # that encloses the vehicle
+    body: Ellipsoid  # the ellipsoid that encloses the vehicle
     gates: tuple[Gate, ...]
     obstacles: tuple[Obstacle, ...] = ()  # the walls of gates among them
 
@@ -30,13 +30,13 @@ class PlantScene:
 class Actuation(NamedTuple):
     """The inputs of a plant from one tick to the next."""
 
-    commands: PerRotor  # [N] of the rotors, that are in effect
+    commands: PerRotor  # [N] rotor thrusts commanded and in effect
     wind: Vector  # [m/s] velocity of the air, world
     ceilings: PerRotor  # [N] the most that each rotor can give now
 
 
 class PlantRun(Protocol):
-    """A vehicle in another simulator, on its way."""
+    """A vehicle that flies in another simulator."""
 
     @property
     def motion(self) -> VehicleState:
@@ -44,16 +44,16 @@ class PlantRun(Protocol):
 
     @property
     def contact(self) -> Contact:
-        """The vehicle's contact since the last look; of several the last one of Contact."""
+        """The object touched since the property was last read; of several, the highest code of Contact."""
 
     def advance(self, actuation: Actuation, duration: float) -> None:
-        """Let some time [s] pass under what is held meanwhile."""
+        """Advance the simulation by `duration` [s] under held inputs."""
 
 
 class Plant(ABC):
     """Another simulator's physics, in place of ours.
 
-    A plant of one's own inherits from this class and is registered by `PLANTS.add("its-name", cls)`.
+    A custom plant inherits from this class and is registered by `PLANTS.add("its-name", cls)`.
     """
 
     kind: ClassVar[str] = ""  # its name in settings, set when it is registered
@@ -62,7 +62,7 @@ class Plant(ABC):
     def begin(self, scene: PlantScene, motion: VehicleState) -> PlantRun:
         """Return the vehicle of a scene at its start.
 
-        Raises BackendMissing where the simulator is not installed, SpecError for what it has not.
+        Raises BackendMissing where the simulator is not installed, SpecError for an unsupported scene.
         """
 
 

@@ -1,4 +1,4 @@
-"""RotorPy as a plant: its multirotor, with its aerodynamics, under our controller.
+"""RotorPy as a plant: its multirotor with aerodynamics, under our controller.
 
 Source: Folk, Paulos, Kumar, "RotorPy: A Python-based Multirotor Simulator with Aerodynamics for Education and
 Research", 2023.
@@ -23,11 +23,11 @@ from aerobat.simulation.outcome import Contact
 from aerobat.simulation.plants.plant import PLANTS, Actuation, Plant, PlantScene
 from aerobat.vehicle import Rotor, Vehicle
 
-GRAVITY = 9.81  # [m/s²] that RotorPy has written into it
-_GRAVITY_SPREAD = 0.05  # [m/s²] by which places on Earth differ
+GRAVITY = 9.81  # [m/s²] hard-coded in RotorPy
+_GRAVITY_SPREAD = 0.05  # [m/s²] by which gravity differs between places on Earth
 _ROTORS = 4  # RotorPy inverts a square allocation
-_THRUST_COEFFICIENT = 1e-5  # [N/(rad/s)²] of rotors that are given by their thrusts: it cancels
-_LEAST_LAG = 1e-3  # [s]: its integrator needs one
+_THRUST_COEFFICIENT = 1e-5  # [N/(rad/s)²] arbitrary: it cancels, since rotors are specified by their thrusts
+_LEAST_LAG = 1e-3  # [s] RotorPy's integrator needs a lag
 
 
 def _vehicle_name(value: Any) -> str | None:
@@ -39,7 +39,7 @@ def _vehicle_name(value: Any) -> str | None:
 class RotorPy(Plant):
     """RotorPy's multirotor; needs the package rotorpy.
 
-    Its rotors' speeds, not their thrusts, follow with a lag. It knows no contacts.
+    The rotors' speeds, not their thrusts, follow with a lag. RotorPy has no contacts.
     """
 
     # one of RotorPy's own, with its drag, lift and flapping, as hummingbird; left out, made of what flies
@@ -48,7 +48,7 @@ class RotorPy(Plant):
     def begin(self, scene: PlantScene, motion: VehicleState) -> RotorPyRun:
         """Return the vehicle of a scene at its start.
 
-        Raises BackendMissing without RotorPy, SpecError for more than four rotors and other gravity.
+        Raises BackendMissing without RotorPy, SpecError unless there are four rotors and Earth's gravity.
         """
         if len(motion.thrusts) != _ROTORS:
             raise SpecError(
@@ -64,7 +64,7 @@ PLANTS.add("rotorpy", RotorPy)
 
 
 class RotorPyRun:
-    """A vehicle in RotorPy, on its way; see `PlantRun`."""
+    """A vehicle that flies in RotorPy; see `PlantRun`."""
 
     def __init__(self, parameters: Mapping[str, Any], motion: VehicleState) -> None:
         body = motion.body
@@ -92,7 +92,7 @@ class RotorPyRun:
 
     @property
     def contact(self) -> Contact:
-        """Nothing: RotorPy has no contacts."""
+        """The contact, always NOTHING: RotorPy has no contacts."""
         return Contact.NOTHING
 
     def advance(self, actuation: Actuation, duration: float) -> None:
@@ -102,13 +102,13 @@ class RotorPyRun:
         self._state = self._vehicle.step(self._state, {"cmd_motor_speeds": speeds}, duration)
 
     def _speeds(self, thrusts: ArrayLike) -> Array:
-        """Speeds [rad/s] of rotors that give these thrusts [N] at rest."""
+        """Return the speeds [rad/s] of rotors that give these thrusts [N] at rest."""
         return np.asarray(np.sqrt(np.maximum(thrusts, 0.0) / self._thrust_coefficient))
 
 
 @validated
 def rotorpy_vehicle(name: str) -> Vehicle:
-    """Return one of RotorPy's vehicles as ours, its rotors' drag as at hover, parasitic drag left out.
+    """Return one of RotorPy's vehicles as ours, its rotor drag linearized at hover, without parasitic drag.
 
     Args:
         name: of a module of parameters in RotorPy, as "hummingbird" or "crazyflie".
@@ -145,7 +145,7 @@ def rotorpy_vehicle(name: str) -> Vehicle:
 
 
 def _parameters_of(airframe: Airframe) -> dict[str, Any]:
-    """RotorPy's parameters of an airframe. Raises SpecError for what it has none of."""
+    """Return RotorPy's parameters of an airframe. Raises SpecError where RotorPy cannot model it."""
     properties, rotors = airframe
     collective, mx, my, mz = np.array(rotors.allocation)
     if min(rotors.min_thrust) < 0.0:
@@ -175,7 +175,7 @@ def _parameters_of(airframe: Airframe) -> dict[str, Any]:
 
 
 def _parameters(name: str) -> dict[str, Any]:
-    """RotorPy's own parameters. Raises SpecError for a vehicle that it does not have."""
+    """Return the parameters of a vehicle of RotorPy. Raises SpecError for a vehicle that RotorPy lacks."""
     _import_multirotor()
     try:
         parameters: dict[str, Any] = import_module(f"rotorpy.vehicles.{name}_params").quad_params
