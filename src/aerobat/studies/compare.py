@@ -1,4 +1,4 @@
-"""compare(): one problem, every planner, side by side: how fast, how sure, how well flown."""
+"""compare(): all planners on one problem, side by side: duration, certificate and flight."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from aerobat.vehicle import Vehicle, as_vehicle
 
 @by_value
 class Entry:
-    """The result of one planner: a plan and its flight, or the reason why there is none."""
+    """The result of one planner: a plan and its flight, or the reason why there is no plan."""
 
     planner: str
     plan: Plan | None
@@ -33,7 +33,7 @@ class Entry:
 
     @property
     def certified(self) -> bool:
-        """True if there is a plan, proven to stay within the vehicle's limits."""
+        """True if there is a plan that is proven to stay within the vehicle's limits."""
         return self.plan is not None and self.plan.certified
 
 
@@ -41,14 +41,14 @@ class Entry:
 @in_notebooks
 @by_value
 class Comparison:
-    """All planners on one problem and one vehicle."""
+    """The results of all planners on one problem and one vehicle."""
 
     problem: Problem
     vehicle: Vehicle
     entries: tuple[Entry, ...]
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with the duration of each planner's plan."""
         found = (
             f"{entry.planner} {'no plan' if entry.plan is None else f'{entry.plan.duration:.3f} s'}"
             for entry in self.entries
@@ -57,7 +57,7 @@ class Comparison:
 
     @validated
     def ratio(self, entry: Entry) -> float | None:
-        """An entry's duration over the time-optimal plan's, where there are both."""
+        """Return an entry's duration over the time-optimal plan's; None unless both exist."""
         optimal = next((e.plan for e in self.entries if e.planner == "time-optimal"), None)
         return None if optimal is None or entry.plan is None else entry.plan.duration / optimal.duration
 
@@ -76,18 +76,18 @@ def compare(
 ) -> Comparison:
     """Plan a problem with each planner and fly each plan.
 
-    Where another planner's certified plan is faster than the time-optimal planner's, that one begins again
-    from it, and the better result is shown with a note. A planner that finds none, or whose solver is not
-    installed, has an entry that says so. Raises Infeasible when no planner finds any, SpecError for input
-    that makes no sense.
+    If another planner's certified plan is faster than the time-optimal planner's, the time-optimal planner is
+    started again from that plan (warm start); the better result is shown with a note. A planner without a
+    plan, or whose solver is not installed, has an entry that says so. Raises Infeasible when no planner finds
+    a plan, SpecError for invalid input.
 
     Args:
-        problem: What is planned, or its name.
-        vehicle: What flies it, or its name.
-        planners: Each with a name, or by its registered name, or that name alone; by default all that are
-            registered.
+        problem: The problem or its name.
+        vehicle: The vehicle or its name.
+        planners: Planners, registered names, or pairs of a name and either; by default all registered
+            planners.
         progress: Called with every attempt as it ends, of planners in this process.
-        begin: Called with each planner's name when its turn comes, or when another process is done with it.
+        begin: Called with each planner's name when it begins, or when another process is done with it.
         time_limit: For each planner [s]; the best plan that it finds by then counts.
         workers: Processes, or dask://HOST:PORT; by default this one, where no planner slows another down.
         executor: Any of `concurrent.futures` that plans instead, as a `dask.distributed` client's.
@@ -129,7 +129,7 @@ def compare(
 
 @dataclass(frozen=True)
 class _ComparisonTask:
-    """What all planners plan."""
+    """The data that all planners share."""
 
     problem: Problem
     vehicle: Vehicle
@@ -144,7 +144,7 @@ def _timed_entry(
 
 
 def _named(planner: tuple[str, Planner] | Planner | str) -> tuple[str, Planner]:
-    """The planner with its name."""
+    """Return the planner with its name."""
     if isinstance(planner, tuple):
         return planner[0], as_planner(planner[1])
     if isinstance(planner, str):
@@ -158,7 +158,7 @@ def _improved(
     others: Sequence[Entry],
     progress: Callable[[Attempt], None] | None,
 ) -> Entry:
-    """The time-optimal planner's entry, begun again from the fastest certified plan that beats it."""
+    """Return the time-optimal planner's entry, warm-started from the fastest certified plan that beats it."""
     faster = [other.plan for other in others if other.certified and other.plan is not None]
     best = min(faster, key=lambda plan: plan.duration, default=None)
     alone = None if entry.plan is None or not entry.certified else entry.plan.duration
@@ -175,7 +175,7 @@ def _improved(
 
 
 def _with_twin(entry: Entry, before: Sequence[Entry]) -> Entry:
-    """The entry, with a note where one before it has the very same path."""
+    """Return the entry, with a note if an earlier entry has exactly the same path."""
     for other in before:
         same = entry.plan and other.plan and entry.plan.trajectory == other.plan.trajectory
         if same:

@@ -20,11 +20,11 @@ from aerobat.studies.share import Share, Trials
 from aerobat.studies.workers import Pool, pool
 from aerobat.vehicle import Vehicle
 
-CHUNK = 50  # flights that are flown, kept and resumed as one, whatever the batches and the workers
-TOGETHER = 10  # chunks at most that a worker is handed at once: a quarter of a second of flying
-# after so many flights their share is looked at, and as soon as it decides no more are flown. Each look errs
-# with 2.5 % at most, all of them together with 4 % where 95 % succeed, with 0.6 % where 94 % do; where 98 %
-# succeed, 340 flights are flown on average, and 3 of 1000 plans stay undecided
+CHUNK = 50  # flights that are flown, kept and resumed as a unit, whatever the batches and the workers
+TOGETHER = 10  # largest number of chunks sent to a worker at once: a quarter of a second of flying
+# Numbers of flights after which the share is tested; flying stops at the first decision (sequential test).
+# Each test errs with probability 2.5 % at most. All tests together err with 4 % at a true probability of 95
+# %, and with 0.6 % at 94 %. At 98 %, 340 flights are flown on average, and 3 of 1000 plans stay undecided.
 LOOKS = (100, 200, 400, 800)
 Flights = Annotated[int, Field(ge=1, le=10**6, description="whole number from 1 to a million")]
 
@@ -34,7 +34,7 @@ class FlightTask:
     """A plan that a study flies, and the settings of its flights."""
 
     plan: Plan
-    vehicle: Vehicle  # that plan and controller know
+    vehicle: Vehicle  # the nominal vehicle of plan and controller
     conditions: Dispersion
     seed: int
     controller: Controller | ControlLaw
@@ -42,7 +42,7 @@ class FlightTask:
     batch: int = CHUNK  # flights that are flown side by side
 
     def config(self, flights: range) -> FlightConfig:
-        """Settings of some flights. An engine has its own rounding, so that one flies all, few or many."""
+        """Return the settings of some flights. The engine, and its rounding, is the same for any number."""
         config = FlightConfig(
             controller=self.controller, conditions=self.conditions, seed=self.seed, flights=flights
         )
@@ -59,9 +59,9 @@ def fly_scores(flying: Pool, tasks: tuple[FlightTask, ...], flights: range) -> l
     """Score the same flights of each task.
 
     Args:
-        flying: What flies them.
-        tasks: What is flown.
-        flights: Their numbers.
+        flying: The workers.
+        tasks: The plans and settings.
+        flights: The numbers of the flights.
     """
     parts = [(k, numbers) for k in range(len(tasks)) for numbers in cut(flights)]
     found = dict(flying.results(_score_chunk, tasks, parts, together=TOGETHER, compiles=True))
@@ -69,14 +69,14 @@ def fly_scores(flying: Pool, tasks: tuple[FlightTask, ...], flights: range) -> l
 
 
 def fly_trials(task: FlightTask, progress: Callable[[int, int], None] | None = None) -> Trials:
-    """Fly until it is decided whether enough of all flights succeed, or the flights of all LOOKS are flown.
+    """Fly until the share of successes is decided, or the flights of all LOOKS are flown.
 
     Args:
-        task: What is flown, and under which conditions.
-        progress: Called with the flights done, and of them those that succeeded.
+        task: The plan, its conditions and settings.
+        progress: Called with the number of finished flights and of successful ones.
     """
     flown, failures = 0, list[Outcome]()
-    with pool(1, None, 1) as flying:  # hundreds of flights are over before another process has begun
+    with pool(1, None, 1) as flying:  # hundreds of flights end before another process starts
         for look in LOOKS:
             (scores,) = fly_scores(flying, (task,), range(flown, look))
             flown, failures = look, [*failures, *(end for end in scores.outcomes if not end.is_success)]

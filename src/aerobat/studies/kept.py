@@ -1,4 +1,4 @@
-"""Finished parts of a study in a folder, from which one that was ended goes on."""
+"""Finished parts of a study in a folder, from which an interrupted study is resumed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FINGERPRINT = "fingerprint.json"
 
 @dataclass(frozen=True)
 class KeptParts:
-    """The folder of a study's finished parts, each a file of arrays that is whole or absent.
+    """The folder of a study's finished parts, each a file of arrays that is written whole or not at all.
 
     Without a folder, nothing is kept and nothing is found.
     """
@@ -35,12 +35,12 @@ class KeptParts:
     def of(
         cls, folder: PathName | None, what: tuple[str, str], asked: Callable[[], Mapping[str, Any]]
     ) -> KeptParts:
-        """The folder, new or of the same study.
+        """Return the folder, which is new or belongs to the same study.
 
         Args:
-            folder: Where parts are kept, if they are.
-            what: What the parts are called, and the study.
-            asked: Tells all that their numbers depend on, in few words; workers are not among it.
+            folder: Where parts are kept; None to keep none.
+            what: The names of the parts and of the study, for messages.
+            asked: Returns a summary of everything that the parts' numbers depend on.
 
         Raises SpecError, one sentence, for a folder of any other study.
         """
@@ -67,7 +67,7 @@ class KeptParts:
         return cls(folder)
 
     def read(self, name: str) -> dict[str, NDArray[Any]] | None:
-        """A finished part; None where there is none, or none as it was kept."""
+        """Return a finished part; None where there is none, or the file is damaged."""
         if self.folder is None:
             return None
         try:
@@ -77,7 +77,7 @@ class KeptParts:
             return None
 
     def write(self, name: str, arrays: Mapping[str, Any]) -> None:
-        """Keep a finished part, where there is a folder."""
+        """Keep a finished part, if there is a folder."""
         if self.folder is None:
             return
         with whole_file(self.folder / f"{name}.npz") as temporary, temporary.open("wb") as file:
@@ -90,5 +90,5 @@ def names_of_parts(folder: Path) -> list[str]:
 
 
 def fingerprint(table: Any) -> str:
-    """Return a few letters that tell one table, as files hold it, from all others."""
+    """Return a short hash that identifies a table."""
     return hashlib.sha256(json.dumps(table, sort_keys=True).encode()).hexdigest()[:16]

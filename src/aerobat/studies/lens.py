@@ -1,9 +1,9 @@
-"""Lenses: fields by the names that files use, looked up and changed in whatever a study varies.
+"""Lenses: read and change the fields that a study varies, by the names that files use.
 
-`limits.velocity`, `gate.tilt_deg`, `gates[1].position.z`, `maneuver.passage.speed` are a problem's;
-`vehicle.mass`, `planner.reserve`, `conditions.gusts.mean_wind` begin with what they are of. The last part
-alone stands for a field where no other field has it, as `speed`. Beside those there are `angle`, the tilt of
-a half-flip's gate [deg], and `vehicle.thrust_to_weight`, which spans the rotors' fields.
+`limits.velocity`, `gate.tilt_deg`, `gates[1].position.z`, `maneuver.passage.speed` are fields of a problem.
+`vehicle.mass`, `planner.reserve`, `conditions.gusts.mean_wind` begin with their owner. The last part alone
+names a field if no other field ends so, as `speed`. Two names are no fields of their own: `angle`, the tilt
+of a half-flip's gate [deg], and `vehicle.thrust_to_weight`, which changes the rotors' fields.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from aerobat.problem.heading import HeadingMode
 from aerobat.studies.units import DEGREES, unit_of
 from aerobat.vehicle import Vehicle
 
-GATE = "gate"  # in files, the only one of `gates`
-PROBLEM = "problem"  # whose fields need not be said to be its
+GATE = "gate"  # in files, the only entry of `gates`
+PROBLEM = "problem"  # prefix that may be left out of the names of its fields
 ANGLE = "angle"
-MAX_ANGLE = 90.0  # [deg] of a half-flip's gate
+MAX_ANGLE = 90.0  # [deg] largest tilt of a half-flip's gate
 THRUST_TO_WEIGHT = "thrust_to_weight"
-ALL_ROTORS = "rotor_defaults"  # in files, what all rotors share
+ALL_ROTORS = "rotor_defaults"  # in files, the fields that all rotors share
 AXES = ("x", "y", "z")
-FEW = 4  # names in a sentence
-_PART = re.compile(r"([^\W\d]\w*)((?:\[\d{1,6}\])*)")  # between the points of a name, as gates[0]
+FEW = 4  # largest number of names listed in a sentence
+_PART = re.compile(r"([^\W\d]\w*)((?:\[\d{1,6}\])*)")  # one part of a dotted name, as gates[0]
 
 Key = str | int
 Varied = TypeVar("Varied")
@@ -42,24 +42,24 @@ Varied = TypeVar("Varied")
 
 @dataclass(frozen=True)
 class Scenario:
-    """A problem, what shall fly it, and how that is planned and flown: what a study may vary."""
+    """A problem with vehicle, planner and conditions: all that a study may vary."""
 
     problem: Problem
     vehicle: Vehicle
-    planner: Planner | None = None  # None for the one that suits the problem
-    conditions: Dispersion | None = None  # None for flights as planned
+    planner: Planner | None = None  # None: the planner that suits the problem
+    conditions: Dispersion | None = None  # None: flights without disturbances
 
 
 @dataclass(frozen=True)
 class Lens:
-    """A field of what a study varies, which is a dataclass of values, as `Scenario`."""
+    """A field of a `Scenario`, or of another dataclass of values, that a study varies."""
 
-    name: str  # as it was given
-    keys: tuple[Key, ...]  # that lead to it from the outermost
+    name: str  # as given by the user
+    keys: tuple[Key, ...]  # keys that lead to the field from the outermost value
 
     @property
     def place(self) -> str:
-        """The whole name of the field."""
+        """The full name of the field."""
         return _joined(self.keys[self.keys[0] == PROBLEM :])
 
     @property
@@ -70,7 +70,7 @@ class Lens:
         return unit_of(tuple(key for key in self.keys if isinstance(key, str)))
 
     def get(self, whole: Any) -> Any:
-        """Return the field's value; a vector where one number stands for all of its entries."""
+        """Return the field's value; a vector if one number may stand for all of its entries."""
         if self._is_angle:
             return degrees(whole.problem.gates[0].angles[2])
         value = whole
@@ -79,10 +79,10 @@ class Lens:
         return value
 
     def set(self, whole: Varied, value: Any) -> Varied:
-        """Return the whole with this field at a value.
+        """Return a copy of the whole with this field at a value.
 
-        Raises FieldError: about `place` for a value that the field cannot take, about another one where the
-        two contradict each other.
+        Raises FieldError: for `place`, where the field cannot take the value; for another field, where that
+        field contradicts the value.
         """
         if self._is_angle:
             return _with(whole, PROBLEM, _tilted(_inner(whole, PROBLEM), value))  # type: ignore[no-any-return]
@@ -92,7 +92,7 @@ class Lens:
             raise FieldError(error.field.removeprefix(f"{PROBLEM}."), error.complaint) from None
 
     def require(self, whole: Any, values: Sequence[float]) -> None:
-        """Refuse a field that is no number, and values that it cannot take. Raises SpecError."""
+        """Raise SpecError for a field that is no number, and for values that the field cannot take."""
         if not self._is_angle:
             with within_field(self.place):
                 _require_number(self.get(whole), len(self.keys) > 1 and self._takes_number(whole))
@@ -108,7 +108,7 @@ class Lens:
         return self.keys == (ANGLE,)
 
     def _takes_number(self, whole: Any) -> bool:
-        """True for a vector for which one number stands too, as for limits per axis."""
+        """Return True for a vector for which one number may stand, as for limits per axis."""
         try:
             self.set(whole, 1)
         except FieldError:
@@ -117,13 +117,13 @@ class Lens:
 
 
 def lens(name: str, whole: Any) -> Lens:
-    """Return the lens on the field of a name.
+    """Return the lens for a field's name.
 
     Args:
         name: As in files: limits.velocity, gates[0].width, vehicle.mass, conditions.gusts.mean_wind.
-        whole: What holds the field: a Scenario, or another dataclass of values.
+        whole: The value that has the field: a Scenario, or another dataclass of values.
 
-    Raises SpecError, which names the nearest, where there is no such field.
+    Raises SpecError, which suggests the nearest name, where there is no such field.
     """
     keys = _parsed(name)
     problem: Problem | None = getattr(whole, PROBLEM, None)
@@ -145,7 +145,7 @@ def lens(name: str, whole: Any) -> Lens:
 
 
 def _parsed(name: str) -> tuple[Key, ...]:
-    """The keys of a dotted name. Raises SpecError for what is none."""
+    """Return the keys of a dotted name. Raises SpecError for text that is no dotted name."""
     keys: list[Key] = []
     for part in name.split("."):
         match = _PART.fullmatch(part)
@@ -158,12 +158,12 @@ def _parsed(name: str) -> tuple[Key, ...]:
 
 
 def _joined(keys: Sequence[Key]) -> str:
-    """The keys as a dotted name."""
+    """Return the keys as a dotted name."""
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).removeprefix(".")
 
 
 def _only(name: str, whole: Any) -> tuple[Key, ...]:
-    """The keys of the one field whose last part is a name. Raises SpecError where none or several have it."""
+    """Return the keys of the only field whose last part is `name`. Raises SpecError for none or several."""
     known = list(_leaves(whole, ()))
     meant = [keys for keys in known if keys[-1] == name]
     if not meant:
@@ -178,7 +178,7 @@ def _only(name: str, whole: Any) -> tuple[Key, ...]:
 
 
 def _leaves(value: Any, keys: tuple[Key, ...]) -> Iterator[tuple[Key, ...]]:
-    """The keys of all numbers, and vectors, of a declared value; of rotors those that all share."""
+    """Yield the keys of all numbers and vectors of a declared value; of rotors only the shared fields."""
     for name in _names(value):
         inner = _inner(value, name)
         if is_dataclass(inner):
@@ -191,7 +191,7 @@ def _leaves(value: Any, keys: tuple[Key, ...]) -> Iterator[tuple[Key, ...]]:
 
 
 def _names(value: Any) -> list[str]:
-    """The names of a declared value's fields, those of angles in degrees and of several together."""
+    """Return the names of a declared value's fields, with the names of angles in degrees and shorthands."""
     names = [field.name for field in fields(value)]
     names += [key for key in getattr(value, "SHORTHANDS", ()) if key.removesuffix(DEGREES) in names]
     if isinstance(value, Gate):
@@ -200,7 +200,7 @@ def _names(value: Any) -> list[str]:
 
 
 def _found(value: Any, keys: Sequence[Key]) -> tuple[Key, ...]:
-    """The keys that lead to a field, components by their numbers. Raises FieldError where there is none."""
+    """Return the keys of a field, with components as indices. Raises FieldError where there is none."""
     if not keys:
         return ()
     key, rest = keys[0], keys[1:]
@@ -218,7 +218,7 @@ def _found(value: Any, keys: Sequence[Key]) -> tuple[Key, ...]:
 
 
 def _require_number(value: Any, takes_one: bool) -> None:
-    """Refuse a value that is no number, None, or a vector for which one number stands. Raises FieldError."""
+    """Raise FieldError unless a value is a number, None, or a vector for which one number may stand."""
     is_vector = isinstance(value, np.ndarray) and value.ndim == 1
     if (is_vector and takes_one) or value is None:
         return
@@ -228,7 +228,7 @@ def _require_number(value: Any, takes_one: bool) -> None:
 
 
 def _inner(value: Any, key: Key) -> Any:
-    """The value behind a key."""
+    """Return the value at a key."""
     if isinstance(key, int):
         inner = value[key]
         return inner.item() if isinstance(inner, np.generic) else inner
@@ -243,10 +243,10 @@ def _inner(value: Any, key: Key) -> Any:
 
 
 def _changed(value: Any, keys: Sequence[Key], new: Any) -> Any:
-    """The value with the field at the end of keys at another. Raises FieldError."""
+    """Return a copy of the value with the field at the end of the keys changed. Raises FieldError."""
     if not keys:
         is_whole = isinstance(new, float) and new.is_integer()
-        return int(new) if is_whole else new  # whole numbers are no floats in files
+        return int(new) if is_whole else new  # files write whole numbers as integers
     key, rest = keys[0], keys[1:]
     with within_field(_joined([key])):
         if key == ALL_ROTORS:
@@ -260,12 +260,12 @@ def _changed(value: Any, keys: Sequence[Key], new: Any) -> Any:
 
 
 def _with(value: Any, name: str, inner: Any) -> Any:
-    """The declared value with one of its `_names` at another. Raises FieldError."""
+    """Return a copy of the declared value with one of its `_names` changed. Raises FieldError."""
     if name == THRUST_TO_WEIGHT:
         if inner <= 0:
             raise FieldError(name, f"must be positive, got {inner:g}")
         return value.with_thrust_to_weight(inner)
-    if not hasattr(value, "__checked_init__"):  # a plain dataclass, of values that are checked themselves
+    if not hasattr(value, "__checked_init__"):  # a plain dataclass of values that are themselves checked
         changes: dict[str, Any] = {name: inner}
         return replace(value, **changes)
     table = {field.name: getattr(value, field.name) for field in fields(value)}
@@ -281,7 +281,7 @@ def _with(value: Any, name: str, inner: Any) -> Any:
 
 
 def _tilted(problem: Problem, angle: float) -> Problem:
-    """The problem with the gate of its half-flip at another tilt [deg]. Raises FieldError."""
+    """Return the problem with its half-flip's gate at another tilt [deg]. Raises FieldError."""
     if not abs(angle) <= MAX_ANGLE:
         raise FieldError(ANGLE, f"must be from {-MAX_ANGLE:g} to {MAX_ANGLE:g} degrees, got {angle:g}")
     gates = problem.maneuver.with_gate_tilt(problem.gates, radians(angle))

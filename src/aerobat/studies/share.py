@@ -1,4 +1,4 @@
-"""Shares of flights, with what so many flights leave open of them."""
+"""Shares of flights, with confidence intervals of their probabilities."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from aerobat.errors import SpecError
 from aerobat.simulation import Outcome
 
 CONFIDENCE = 0.95  # of the intervals
-MAX_DIGITS = 6  # of a percentage, behind the point
+MAX_DIGITS = 6  # largest number of decimals of a percentage
 
 
 @dataclass(frozen=True)
 class Share:
-    """A number of flights of all, and the interval in which their probability lies at 95 % confidence."""
+    """A number of flights out of all, and the 95 % confidence interval of their probability."""
 
     count: int
     of: int
 
     def __post_init__(self) -> None:
-        """Check. Raises SpecError for a share of no flights, or of more than there are."""
+        """Check the counts. Raises SpecError for a share of no flights, or of more than there are."""
         if not 0 <= self.count <= self.of > 0:
             raise SpecError(
                 f"count must be from 0 to all flights, one or more, got {self.count} of {self.of}"
@@ -31,17 +31,17 @@ class Share:
 
     @classmethod
     def where(cls, holds: Mask) -> Share:
-        """The share of flights of which something holds, (flights,)."""
+        """Return the share of flights for which a condition holds, (flights,)."""
         return cls(int(holds.sum()), len(holds))
 
     @property
     def fraction(self) -> float:
-        """The part of all flights [-]."""
+        """The fraction of all flights [-]."""
         return self.count / self.of
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Clopper and Pearson's interval [-], which holds the probability at least as often as it says.
+        """The Clopper–Pearson interval [-], which covers the probability with at least the stated confidence.
 
         Its ends are quantiles of beta distributions; `scipy.stats.binomtest` gives the same, and takes a
         second and 45 MB to import.
@@ -56,17 +56,17 @@ class Share:
 
     @property
     def range(self) -> str:
-        """The interval in percent, rounded outward, so that its text excludes nothing that it holds."""
+        """The interval in percent as text, rounded outward, so that the text includes the whole interval."""
         low, high = self.interval
         return f"{percent(low, ROUND_FLOOR)} to {percent(high, ROUND_CEILING)} %"
 
     def __str__(self) -> str:
-        """The share in percent, with its interval."""
+        """Return the share in percent, with its interval."""
         return f"{percent(self.fraction)} % ({self.range})"
 
 
 def percent(fraction: float, rounding: str = ROUND_HALF_EVEN) -> str:
-    """A fraction in percent, with the digits that tell it from none and from all.
+    """Return a fraction in percent, with enough digits to differ from 0 and from 100 %.
 
     Args:
         fraction: From 0 to 1 [-].
@@ -82,21 +82,21 @@ def percent(fraction: float, rounding: str = ROUND_HALF_EVEN) -> str:
 
 @dataclass(frozen=True)
 class Trials:
-    """A number of flights under conditions, and how many of them succeed."""
+    """The share of successes of flights under conditions."""
 
-    NEEDED: ClassVar[float] = 0.95  # of all flights
+    NEEDED: ClassVar[float] = 0.95  # required fraction of all flights
 
     conditions: Dispersion
     seed: int
     share: Share
-    failures: tuple[Outcome, ...] = ()  # of those that do not, where they are known
+    failures: tuple[Outcome, ...] = ()  # outcomes of failed flights, where they are known
 
     @property
     def proven(self) -> bool:
-        """True if so many succeed that at least NEEDED of all do, at the share's confidence."""
+        """True if the share proves, at its confidence, that at least NEEDED of all flights succeed."""
         return self.share.interval[0] >= self.NEEDED
 
     @property
     def refuted(self) -> bool:
-        """True if so few succeed that less than NEEDED of all do, at the share's confidence."""
+        """True if the share proves, at its confidence, that less than NEEDED of all flights succeed."""
         return self.share.interval[1] < self.NEEDED

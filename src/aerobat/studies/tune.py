@@ -1,10 +1,9 @@
-"""tune(): controller gains for one vehicle, found over many flights as it would really be flown.
+"""tune(): controller gains for one vehicle, optimized over many simulated flights under conditions.
 
-The search is Nelder and Mead's, by SciPy, over the logarithms of the gains. It compares costs and takes no
-slopes of them, so that a quantile's kinks and the price of a lost flight do it no harm; six gains take it one
-or two hundred costs; and it draws nothing, so that all chance is in the flights. All costs of a search are of
-the same flights, each with its own draws (common random numbers): two sets of gains differ by what they do,
-not by their luck. The best set is judged on other flights, which the search has not seen.
+The search is Nelder–Mead (SciPy) over the logarithms of the gains. It is derivative-free, so the kinks of a
+quantile and the jumps of the failure cost do no harm. Six gains take one or two hundred cost evaluations.
+The search is deterministic, and all sets of gains fly the same draws (common random numbers), so that
+differences in cost come from the gains. The best set is validated on flights that the search has not seen.
 """
 
 from __future__ import annotations
@@ -43,12 +42,12 @@ TUNED = (
     "attitude_integral_gain",
 )
 TUNABLE = (*TUNED, "jerk_filter", "lead_time_constant")
-MAX_FACTOR = 4.0  # [-] by which a gain may be raised or lowered
-QUANTILE = 0.95  # of flights, whose largest position error is lowered
-FAILURE = DIVERGENCE_RADIUS  # [m] of cost if all flights failed: one in a hundred weighs 5 cm
-_FIRST_FACTOR = 1.4  # [-] of each gain in turn, when the search begins
-_RESOLUTION = 0.01  # [-] of a gain, finer than which no search goes
-_RESAMPLES = 1000  # of the fresh flights
+MAX_FACTOR = 4.0  # [-] largest factor by which a gain is raised or lowered
+QUANTILE = 0.95  # quantile over flights of the largest position error that is minimized
+FAILURE = DIVERGENCE_RADIUS  # [m] cost if all flights fail: 1 % of failures costs 5 cm
+_FIRST_FACTOR = 1.4  # [-] factor on each gain in turn in the initial simplex
+_RESOLUTION = 0.01  # [-] relative tolerance of the gains at which the search ends
+_RESAMPLES = 1000  # number of bootstrap samples of the fresh flights
 
 Flights = Annotated[int, Field(ge=2, le=100_000, description="whole number from 2 to 100000")]
 Evaluations = Annotated[int, Field(ge=1, le=100_000, description="whole number from 1 to 100000")]
@@ -56,14 +55,14 @@ Evaluations = Annotated[int, Field(ge=1, le=100_000, description="whole number f
 
 @by_value
 class FlightCosts:
-    """Many flights of some plans under one set of gains; arrays (plans, flights)."""
+    """Errors and failures of many flights of some plans with one set of gains; arrays (plans, flights)."""
 
-    max_position_error_m: Array  # of a flight that diverged, the radius from which none comes back
+    max_position_error_m: Array  # of a diverged flight, DIVERGENCE_RADIUS
     failed: Array  # 1 where a flight was lost, missed a gate or hit its frame, else 0
 
     @classmethod
     def of(cls, scores: Sequence[Score]) -> FlightCosts:
-        """The flights of these scores, one of each plan."""
+        """Return the costs of flights from their scores, one for each plan."""
         radius = DIVERGENCE_RADIUS
         errors = [
             np.where(np.isfinite(each.stop), radius, np.minimum(each.max_position_error_m, radius))
@@ -74,17 +73,17 @@ class FlightCosts:
 
     @property
     def error_quantile_m(self) -> float:
-        """The largest position error that 95 % of flights stay within, the mean over plans [m]."""
+        """The 95 % quantile over flights of the largest position error, averaged over plans [m]."""
         return float(np.quantile(self.max_position_error_m, QUANTILE, axis=-1).mean())
 
     @property
     def failed_fraction(self) -> float:
-        """Of all flights."""
+        """The fraction of all flights that failed [-]."""
         return float(self.failed.mean())
 
     @property
     def cost(self) -> float:
-        """The measure that is lowered [m]: `error_quantile_m`, and 5 cm for each hundredth that failed."""
+        """The minimized cost [m]: `error_quantile_m`, plus 5 cm for each 1 % of failed flights."""
         return self.error_quantile_m + FAILURE * self.failed_fraction
 
     def resampled(self, flights: NDArray[np.int64]) -> FlightCosts:
@@ -92,7 +91,7 @@ class FlightCosts:
         return FlightCosts(self.max_position_error_m[:, flights], self.failed[:, flights])
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with error and failures."""
         error = f"95 % of flights within {length(self.error_quantile_m)} of their path"
         return f"{error}, {100 * self.failed_fraction:.3g} % failed"
 
@@ -100,24 +99,24 @@ class FlightCosts:
 @in_notebooks
 @by_value
 class Tuning:
-    """The gains that a search found for a vehicle, and what they are worth on other flights."""
+    """The gains that a search found for a vehicle, and their validation on fresh flights."""
 
-    vehicle: Vehicle  # as it was
-    controller: Controller  # the best on the flights of the search
-    gains: tuple[str, ...]  # those of its settings that were sought
-    evaluations: int  # sets of gains that were flown
-    training: tuple[FlightCosts, FlightCosts]  # before and after, flights 0 to n − 1
-    fresh: tuple[FlightCosts, FlightCosts]  # before and after, flights n to 2n − 1
-    interval: tuple[float, float]  # [m] 95 % confidence of the cost after less before, on fresh flights
+    vehicle: Vehicle  # with its original gains
+    controller: Controller  # with the best gains on the training flights
+    gains: tuple[str, ...]  # names of the gains that were searched
+    evaluations: int  # number of sets of gains that were flown
+    training: tuple[FlightCosts, FlightCosts]  # with the old gains and the new, flights 0 to n − 1
+    fresh: tuple[FlightCosts, FlightCosts]  # with the old gains and the new, flights n to 2n − 1
+    interval: tuple[float, float]  # [m] 95 % confidence interval of the change in cost on fresh flights
 
     @property
     def is_better(self) -> bool:
-        """True if the gains lower the cost of fresh flights, with 95 % confidence."""
+        """True if the new gains lower the cost of fresh flights with 95 % confidence."""
         return self.interval[1] < 0.0
 
     @property
     def tuned_vehicle(self) -> Vehicle:
-        """The vehicle with the gains that were found. Raises SpecError where they are no better."""
+        """The vehicle with the new gains. Raises SpecError where they are no better."""
         if not self.is_better:
             raise SpecError(f"the gains of '{self.vehicle.name}' stay as they are: {self.verdict}")
         return replace(self.vehicle, controller=self.controller)
@@ -130,7 +129,7 @@ class Tuning:
         return f"the gains found are {found} on fresh flights, cost {low} to {high} cm (95 % confidence)"
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with the verdict and the costs before and after."""
         before, after = self.fresh
         return f"{self.vehicle.name}: {self.verdict}; before, {before}; after, {after}"
 
@@ -152,24 +151,23 @@ def tune(
 ) -> Tuning:
     """Search the controller gains with which a vehicle flies plans best under conditions.
 
-    Each gain may be changed by a factor of up to 4 from the vehicle's own. What is lowered is the largest
-    position error that 95 % of flights stay within, and 5 cm more for each flight in 100 that is lost, misses
-    a gate or hits its frame. The best gains are flown once more beside the vehicle's own, on as many flights
-    with other numbers; whether they are better there, the result says.
+    Each gain may change by a factor of up to 4 from the vehicle's own. The cost is the 95 % quantile of the
+    largest position error of flights, plus 5 cm for each 1 % of flights that are lost, miss a gate or hit its
+    frame. The best gains and the vehicle's own are then flown on as many flights with other numbers; the
+    result tells whether the new gains are better there.
 
     Args:
-        plan: What is flown, one or several for one vehicle.
-        conditions: What flights draw from, or the name of a preset or a file.
-        flights: How many of each plan each set of gains flies.
-        seed: Of their draws.
-        vehicle: Whose gains are sought, or its name, by default the plans' own.
+        plan: The plan, or several plans for one vehicle.
+        conditions: The distributions that flights draw from, or the name of a preset or a file.
+        flights: The number of flights of each plan for each set of gains.
+        seed: Of the flights' draws.
+        vehicle: The vehicle or its name, by default the plans' own.
         gains: The settings of its controller that may change: any of TUNABLE.
-        evaluations: How many sets of gains may be tried.
-        time_limit: Of the search [s]; the best gains until then are judged.
+        evaluations: The largest number of sets of gains to try.
+        time_limit: Of the search [s]; the best gains until then are validated.
         workers: Processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
         executor: Any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
-        progress: Called after each set of gains with how many there were, and the lowest cost so far [m].
-
+        progress: Called after each set of gains with the number of sets so far and the lowest cost [m].
     Raises SpecError for plans of several vehicles, and for gains that are unknown or zero.
     """
     plans = (plan,) if isinstance(plan, Plan) else tuple(plan)
@@ -191,7 +189,7 @@ def tune(
 
 
 def _vehicle_of(plans: Sequence[Plan], vehicle: Vehicle | str | None) -> Vehicle:
-    """The one vehicle that flies some plans."""
+    """Return the one vehicle that flies all plans."""
     if not plans:
         raise SpecError("plan must be one plan or more")
     first = vehicle_of(plans[0], vehicle)
@@ -201,7 +199,7 @@ def _vehicle_of(plans: Sequence[Plan], vehicle: Vehicle | str | None) -> Vehicle
 
 
 def _checked(gains: Sequence[str], controller: Controller) -> tuple[str, ...]:
-    """The names of gains that a factor can change."""
+    """Return the names of gains without repetition. Raises SpecError for unknown names and zero gains."""
     if not gains or isinstance(gains, str):
         raise SpecError(f"gains must be one or more of {', '.join(TUNABLE)}")
     for name in gains:
@@ -213,7 +211,7 @@ def _checked(gains: Sequence[str], controller: Controller) -> tuple[str, ...]:
 
 
 class _Ended(Exception):
-    """The search has had its time, or its share of tries."""
+    """The search has used its time or its evaluations."""
 
 
 def _search(
@@ -223,9 +221,10 @@ def _search(
     evaluations: int,
     progress: Callable[[int, float], None] | None,
 ) -> tuple[Controller, FlightCosts, int]:
-    """Return the best gains, what they cost, and how many sets were tried.
+    """Return the best gains, their costs, and the number of sets that were tried.
 
-    The vehicle's own gains are tried first, then others, until none are better or time or tries are over.
+    The vehicle's own gains are tried first. The search ends at convergence, or when time or evaluations are
+    used.
     """
     from scipy.optimize import minimize
 
@@ -263,7 +262,7 @@ def _search(
 
 
 def _confidence(before: FlightCosts, after: FlightCosts, seed: int) -> tuple[float, float]:
-    """The 95 % interval of the cost after less before, by resampling flights, each with both its gains."""
+    """Return the 95 % interval of the change in cost, by a paired bootstrap over flights."""
     rng = np.random.default_rng(seed)
     count: int = before.failed.shape[-1]
     picks = (rng.integers(count, size=(count,)) for _ in range(_RESAMPLES))

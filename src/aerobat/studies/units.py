@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-DEGREES = "_deg"  # ends the names of angles in files
+DEGREES = "_deg"  # suffix of the names of angles in files
 
-# as the comments beside the fields say, and docs/files.md; what is not here has none, or none of its own
+# as in the comments beside the fields and in docs/files.md; names that are not here have no unit
 UNITS = MappingProxyType(
     {
         "acceleration": "m/s²", "attitude_frequency": "rad/s", "attitude_integral_gain": "1/s³",
@@ -24,7 +24,7 @@ UNITS = MappingProxyType(
         "velocity_gain": "1/s", "width": "m", "wind": "m/s",
     }
 )  # fmt: skip
-OF = MappingProxyType(  # where a name says another thing than elsewhere, by what holds it
+OF = MappingProxyType(  # units of names that mean something else in these owners
     {
         "limits": {"lower": "m", "upper": "m"},
         "problem": {"min_thrust": "m/s²", "point": "m", "start": "rad"},
@@ -46,10 +46,11 @@ OF = MappingProxyType(  # where a name says another thing than elsewhere, by wha
 
 
 def unit_of(names: tuple[str, ...]) -> str:
-    """The unit of a number, empty where it has none.
+    """Return the unit of a number, empty where it has none.
 
     Args:
-        names: the keys that lead to it, from the problem, the vehicle and so on, without those of lists.
+        names: the keys that lead to the number, from the problem, the vehicle and so on, without list
+            indices.
     """
     holder = "limits" if names[1:2] == ("limits",) else names[0]
     own = OF.get(holder, {})

@@ -1,7 +1,7 @@
-"""Workers of a study: this process, processes of its own, a Dask cluster, or whatever an executor has.
+"""Workers of a study: this process, processes of its own, a Dask cluster, or the workers of an executor.
 
-A study hands its parts to a `Pool`. Parts say everything that their results depend on, so that neither the
-number of workers nor their order changes a bit. A part whose worker dies is done again.
+A study hands its parts to a `Pool`. The result of a part depends on the part and the shared task alone, so
+that neither the number of workers nor their order changes a bit. A part whose worker dies is repeated.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from aerobat.provenance import installed_versions
 
 MAX_WORKERS = 4096
 WORKERS = f"whole number from 1 to {MAX_WORKERS}, or dask://HOST:PORT"
-MAX_DEATHS = 3  # of workers, one after another without any part done, after which the parts are too much
-LIBRARIES = ("aerobat", "numpy", "scipy", "llvmlite", "jax")  # that numbers come from
-_QUEUED = 2  # groups of parts for each worker: one that it works at, and the next
-_QUEUED_ELSEWHERE = 256  # groups, for an executor that does not say how many workers it has
-_SHARES = 4  # groups at least that each worker gets of a study's parts, so that all end about together
-_WORKERS_ELSEWHERE = 16  # where an executor does not say how many it has
-_CONNECTING = 10.0  # [s] within which a scheduler answers
+MAX_DEATHS = 3  # consecutive deaths of workers, without a finished part, that end a study
+LIBRARIES = ("aerobat", "numpy", "scipy", "llvmlite", "jax")  # whose versions change numbers
+_QUEUED = 2  # groups of parts per worker: the one in progress and the next
+_QUEUED_ELSEWHERE = 256  # groups, for an executor that does not report its number of workers
+_SHARES = 4  # least number of groups per worker, so that all workers end at about the same time
+_WORKERS_ELSEWHERE = 16  # assumed number of workers of an executor that does not report it
+_CONNECTING = 10.0  # [s] time within which a scheduler must answer
 _DASK = re.compile(r"dask://([^\s/:]+|\[[0-9a-fA-F:]+\]):(\d{1,5})")
 
 Task = TypeVar("Task")
@@ -50,7 +50,7 @@ Found = TypeVar("Found")
 
 
 def read_workers(value: Any) -> int | str:
-    """Read a number of processes, or the address of a scheduler. Raises FieldError for what is neither."""
+    """Read a number of processes, or the address of a scheduler. Raises FieldError for anything else."""
     if isinstance(value, str) and _DASK.fullmatch(value):
         return value
     is_number = isinstance(value, int | str) and not isinstance(value, bool) and str(value).isdecimal()
@@ -67,14 +67,14 @@ Workers = Annotated[
 
 
 class WorkerEnded(SpecError):
-    """A process that plans or flies was killed, or ended by itself."""
+    """A worker process was killed, or ended by itself."""
 
 
 class Pool:
-    """The workers that do a study's parts; see `pool`."""
+    """The workers that process a study's parts; see `pool`."""
 
     def __init__(self, count: int = 1, executor: Executor | None = None) -> None:
-        """Take an executor of about so many workers, else so many processes, of which one is this process."""
+        """Use an executor of about `count` workers, or else `count` processes; 1 is this process alone."""
         self._count = count
         self._given = executor
         self._own = ExitStack()
@@ -90,17 +90,17 @@ class Pool:
         together: int = 1,
         compiles: bool = False,
     ) -> Iterator[tuple[Part, Found]]:
-        """Yield each part with its result, in the order in which they are done.
+        """Yield each part with its result, in the order in which they finish.
 
         Args:
-            function: What is done, a function that other processes can import.
-            task: What all parts share; each worker is told once.
-            parts: What is to be done; a deque may grow while results are read.
-            together: How many parts at most are handed to a worker at once, where they are quick.
-            compiles: True where this process does the first part before it is copied, so that its copies
-                have what that compiled.
+            function: The function to call, which other processes can import.
+            task: The data that all parts share, sent to each worker once.
+            parts: The parts; a deque may grow while results are read.
+            together: The largest number of parts sent to a worker at once, for quick parts.
+            compiles: True if this process does the first part before it is forked, so that its copies have
+                the compiled code.
 
-        Raises WorkerEnded where workers die over and over, and whatever the function raises.
+        Raises WorkerEnded where workers die repeatedly, and whatever the function raises.
         """
         waiting = parts if isinstance(parts, deque) else deque(parts)
         while waiting and (self.is_here or (compiles and self._given is None and self._started is None)):
@@ -135,7 +135,7 @@ class Pool:
         return self._given is None and self._count == 1
 
     def close(self) -> None:
-        """End the pool's own processes, and what an executor has not begun."""
+        """End the pool's own processes, and cancel parts that an executor has not begun."""
         self.__exit__(None, None, None)
 
     def __enter__(self) -> Pool:
@@ -150,7 +150,7 @@ class Pool:
     def _submit(
         self, function: Callable[[Any, Any], Any], shared: _Shared, waiting: deque[Any], size: int
     ) -> None:
-        """Hand on groups of parts, as many as keep all workers at work."""
+        """Submit groups of parts, enough to keep all workers busy."""
         executor = self._executor()
         queued = _QUEUED_ELSEWHERE if self._given is not None else _QUEUED * self._count
         while waiting and len(self._pending) < queued:
@@ -182,12 +182,12 @@ class Pool:
 def pool(
     workers: int | str | None, executor: Executor | None = None, parts: int = MAX_WORKERS
 ) -> Iterator[Pool]:
-    """Give the workers of a study, and end them with it, however it ends.
+    """Give the workers of a study, and end them when the block ends.
 
     Args:
         workers: A number of processes, by default one a core; or a Dask scheduler, as dask://HOST:PORT.
-        executor: What works instead.
-        parts: The number of parts, more processes than which would have nothing to do.
+        executor: An executor that works instead.
+        parts: The number of parts, which limits the number of processes.
 
     Raises SpecError where no scheduler answers, and BackendMissing where Dask is not installed.
     """
@@ -202,7 +202,7 @@ def pool(
 
 @contextmanager
 def _dask_pool(address: str) -> Iterator[Pool]:
-    """The workers of a scheduler."""
+    """Give the workers of a scheduler."""
     dask = import_extra("distributed", f"workers {address} need dask.distributed", "aerobat[cluster]")
     try:
         client = dask.Client(address.replace("dask://", "tcp://"), timeout=_CONNECTING, set_as_default=False)
@@ -216,14 +216,14 @@ def _dask_pool(address: str) -> Iterator[Pool]:
 
 
 def _is_death(error: BaseException) -> bool:
-    """True where an executor says that a worker died; of Dask, that one did wherever a part went."""
+    """True for an executor's error that a worker died, or, of Dask, that every worker with the part died."""
     dask = sys.modules.get("distributed")
     return isinstance(error, BrokenExecutor if dask is None else (BrokenExecutor, dask.KilledWorker))
 
 
 @dataclass(frozen=True, eq=False)
 class _Shared:
-    """What all parts share, which a worker unpacks once however many of them it does."""
+    """The data that all parts share; a worker unpickles it once for all of its parts."""
 
     task: Any
 
@@ -233,20 +233,20 @@ class _Shared:
     @cached_property
     def _packed(self) -> bytes:
         packed = pickle.dumps(self.task)
-        if b"__main__" in packed and "cloudpickle" in sys.modules:  # no other machine has that script
+        if b"__main__" in packed and "cloudpickle" in sys.modules:  # other machines do not have that script
             packed = sys.modules["cloudpickle"].dumps(self.task)
         return packed
 
 
 @lru_cache(maxsize=1)
 def _versions() -> tuple[tuple[str, str], ...]:
-    """The libraries that numbers come from, with their versions."""
+    """Return the libraries that the numbers depend on, with their versions."""
     return tuple(installed_versions(LIBRARIES).items())
 
 
 @lru_cache(maxsize=4)
 def _unpacked(packed: bytes, plugins: tuple[str, ...], versions: tuple[tuple[str, str], ...]) -> _Shared:
-    """Raises SpecError in a process whose numbers might be others."""
+    """Return the unpickled data. Raises SpecError in a process with other versions of the libraries."""
     if _versions() != versions:
         theirs, mine = (", ".join(map(" ".join, each)) for each in (versions, _versions()))
         raise SpecError(f"workers: one has {mine}, and not {theirs}; install the same versions for all")
@@ -260,28 +260,28 @@ def _done(function: Callable[[Any, Any], Any], shared: _Shared, parts: list[Any]
 
 
 def _can_fork() -> bool:
-    """True on Linux without JAX: libraries of macOS do not survive forks, and JAX's locks no fork frees."""
+    """Return True on Linux without JAX: macOS libraries break in forks, and JAX's locks stay locked."""
     return sys.platform == "linux" and "jax" not in sys.modules
 
 
 def _return_freed_memory() -> None:
-    """Give back to the system what a compiler has freed, which every copy of this process would hold too."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # of glibc alone
+    """Return freed memory to the system after compiling, since every fork would hold that memory too."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # in glibc only
     if trim is not None:
         trim(0)
 
 
 @contextmanager
 def processes(count: int, forked: bool) -> Iterator[ProcessPoolExecutor]:
-    """Give so many processes, which end with the block.
+    """Give `count` processes, which end with the block.
 
-    An exception in the block, Ctrl-C among them, ends them at once, as does the death of this process: each
-    watches one end of a pipe. Raises WorkerEnded where one is killed or ends by itself.
+    An exception in the block, such as Ctrl-C, ends them at once, as does the death of this process: each
+    process watches one end of a pipe. Raises WorkerEnded where one is killed or ends by itself.
 
     Args:
-        count: How many.
-        forked: True for copies of this process, where the system has such, that share its memory and its
-            compiled code; else each imports and compiles its own.
+        count: The number of processes.
+        forked: True for forks of this process, where the system supports forks, which share its memory and
+            compiled code; false for new processes, each of which imports and compiles.
     """
     context: Any = multiprocessing.get_context("fork" if forked and _can_fork() else "spawn")
     if sys.platform == "linux":
@@ -290,7 +290,8 @@ def processes(count: int, forked: bool) -> Iterator[ProcessPoolExecutor]:
     pool = ProcessPoolExecutor(count, context, _begin, (watched, held, imported_plugins()))
     try:
         with warnings.catch_warnings():
-            # forked beside threads: those of engines and BLAS know of forks, and no other is waited for
+            # fork beside threads: the threads of engines and BLAS handle forks, and no other thread is waited
+            # for
             warnings.filterwarnings("ignore", ".*fork", DeprecationWarning)
             yield pool
         pool.shutdown()
@@ -303,9 +304,9 @@ def processes(count: int, forked: bool) -> Iterator[ProcessPoolExecutor]:
 
 
 def _begin(watched: Connection, held: Connection, plugins: tuple[str, ...]) -> None:
-    """Begin a worker: interrupts are for the process that it works for, whose end is the worker's."""
+    """Initialize a worker: it ignores interrupts, which its parent handles, and ends when its parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # which a copy of the process would handle as that does
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # a fork inherits its parent's handler
     held.close()
     threading.Thread(target=_end_with, args=(watched,), daemon=True).start()
     for path in plugins:
@@ -313,7 +314,7 @@ def _begin(watched: Connection, held: Connection, plugins: tuple[str, ...]) -> N
 
 
 def _end_with(watched: Connection) -> None:
-    """End this process when nobody holds the other end of a pipe any more."""
+    """End this process when no process holds the other end of a pipe any more."""
     try:
         watched.recv()
     except (EOFError, OSError):

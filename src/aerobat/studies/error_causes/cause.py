@@ -1,4 +1,4 @@
-"""Causes of error as values: what each changes in how a maneuver is planned and flown; the paper's four."""
+"""Causes of error as values: the changes that each makes to planning and flight; the paper's four causes."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from aerobat.errors import SpecError
 from aerobat.planning import Planner
 from aerobat.studies.lens import lens
 
-OFFSET, TURN = 0.05, radians(2.0)  # [m], [rad] of the second camera system, as an old calibration leaves it
-SLOWER = 1.5  # times as slow as tuned are the loops of the detuned controller
+OFFSET, TURN = 0.05, radians(2.0)  # [m], [rad] of the second camera system, as by an old calibration
+SLOWER = 1.5  # factor by which the loops of the detuned controller are slower than tuned
 
 
 def _read_only(changes: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -47,7 +47,7 @@ class Cause:
     changes: Annotated[Mapping[str, Any], AfterValidator(_read_only)]  # values by paths of fields
 
     def applied(self, trial: Trial) -> Trial:
-        """The trial with this cause in it.
+        """Return the trial with this cause applied.
 
         Raises SpecError for a path that names no field, and for a value that the field does not take.
         """
@@ -57,7 +57,7 @@ class Cause:
 
 
 def together(causes: Iterable[Cause], name: str) -> Cause:
-    """All causes as one. Raises SpecError where two change the same: they are not independent."""
+    """Return all causes as one. Raises SpecError where two of them change the same field."""
     changes: dict[str, Any] = {}
     owners: dict[str, str] = {}
     for cause in causes:
@@ -72,15 +72,15 @@ def together(causes: Iterable[Cause], name: str) -> Cause:
 
 
 def _overlap(path: str, other: str) -> bool:
-    """True where one path is the other, or leads into it."""
+    """Return True where the paths are equal, or one path leads into the other."""
     return f"{path}.".startswith(f"{other}.") or f"{other}.".startswith(f"{path}.")
 
 
 def four_causes(conditions: Dispersion, controller: Controller) -> tuple[Cause, ...]:
-    """Rotors that the plan does not know, a bad hand-off, jerk as the input, gains that are not tuned.
+    """Return four causes: rotors unknown to the plan, a bad hand-off, jerk as the input, detuned gains.
 
-    They suit a planner with an order, 4 or more without them. Raises SpecError for conditions without motion
-    capture, which hands nothing over.
+    They suit a planner whose `order` is 4 or more. Raises SpecError for conditions without motion capture,
+    which have no hand-off.
     """
     capture = conditions.motion_capture
     if capture is None:

@@ -1,4 +1,4 @@
-"""error_causes(): flights with no cause of error, with each alone, with all, and the cost of each."""
+"""error_causes(): flights with no cause of error, with each alone, and with all, and the effect of each."""
 
 from __future__ import annotations
 
@@ -44,24 +44,24 @@ def error_causes(
     """Plan and fly a maneuver with no cause of error, with each alone, and with all together.
 
     Flight k has the same draws in every trial, whatever a cause scales or adds, so that errors are compared
-    flight by flight. Where a cause changes the planner, the maneuver is planned again.
+    flight by flight. If a cause changes the planner, the maneuver is planned again.
 
     Args:
-        problem: what is planned, with gates, or its name.
-        vehicle: what flies it, or its name.
-        causes: each with a name of its own; no two change the same.
-        planner: how it is planned without them, or a registered planner's name.
-        conditions: under which it is flown without them, or their name.
-        controller: how it is controlled without them, by default the vehicle's own.
-        flights: how many, of each trial.
+        problem: the problem, which needs gates, or its name.
+        vehicle: the vehicle or its name.
+        causes: each with a name of its own; no two may change the same field.
+        planner: the planner without causes, or a registered planner's name.
+        conditions: the conditions without causes, or their name.
+        controller: the controller settings without causes, by default the vehicle's own.
+        flights: number of flights in each trial.
         seed: of all flights.
         workers: processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
         executor: any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
-        begin: called with each trial's name when its turn comes.
+        begin: called with each trial's name when the trial begins.
 
     Raises:
         SpecError: causes overlap, share a name or name no field; or the problem has no gate.
-        Infeasible: with a cause nothing is planned, which the sentence names.
+        Infeasible: there is no plan with some cause, which the sentence names.
     """
     problem, vehicle = as_problem(problem), as_vehicle(vehicle)
     if not problem.gates:
@@ -96,10 +96,10 @@ def _planned(cause: str, problem: Problem, planner: Planner, vehicle: Vehicle | 
 
 @by_value
 class Cost:
-    """The growth of an error by a cause: the median over pairs of flights, with the cause and without.
+    """The median increase of an error due to a cause, over pairs of flights with and without the cause.
 
-    The interval holds the median of all such differences at the confidence, whatever their distribution: its
-    ends are order statistics, by the sign test. With too few pairs for the test the interval is infinite.
+    The interval contains the true median of the differences with the given confidence, whatever their
+    distribution: its ends are order statistics, by the sign test. With too few pairs it is infinite.
     """
 
     median: float
@@ -108,7 +108,7 @@ class Cost:
 
     @classmethod
     def of(cls, without: Array, with_cause: Array, confidence: float) -> Cost:
-        """The cost between errors of the same flights, (flights,); two infinite ones differ by nothing."""
+        """Return the cost from errors of the same flights, (flights,); two infinite errors differ by zero."""
         from scipy.stats import binom  # takes a quarter of a second
 
         with np.errstate(invalid="ignore"):
@@ -121,35 +121,35 @@ class Cost:
 @short
 @by_value
 class TrialResult:
-    """Flights of one trial. Errors are arrays (flights,), infinite where a gate was not crossed."""
+    """The flights of one trial. Errors are arrays (flights,), infinite where a gate was not crossed."""
 
-    cause: str  # its name, NONE or ALL
+    cause: str  # the cause's name, NONE or ALL
     trial: Trial
     plan: Plan
     scores: Score
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with the cause and the scores."""
         return f"{self.cause}: {self.scores}"
 
     @property
     def position_error(self) -> Array:
-        """The largest of each flight [m]."""
+        """The largest position error of each flight [m]."""
         return np.asarray(np.nan_to_num(self.scores.max_position_error_m, nan=np.inf))
 
     @property
     def gate_error(self) -> Array:
-        """The distance from the gate's centre as its plane is crossed [m], the largest of several gates."""
+        """The distance from the gate's centre where its plane is crossed [m], the largest over the gates."""
         return self._worst("miss")
 
     @property
     def gate_attitude_error(self) -> Array:
-        """The angle of the thrust axis off the attitude asked there [deg], the largest of several gates."""
+        """The angle of the thrust axis off the required attitude [deg], the largest over the gates."""
         return self._worst("attitude_error_deg")
 
     @property
     def clearance(self) -> Array:
-        """The least between body and frame [m], negative: so far into it; −∞ where a gate was not crossed."""
+        """The smallest clearance of body and frame [m], negative: penetration; −∞ where a gate is missed."""
         return -self._worst("clearance", -1.0)
 
     @property
@@ -159,12 +159,12 @@ class TrialResult:
 
     @validated
     def cleared_opening(self, width: Positive, height: Positive) -> Share:
-        """The share of flights whose body would have cleared gates of that opening [m]."""
+        """Return the share of flights whose body would have cleared gates with this opening [m]."""
         fits = (self._worst("needed_width") <= width) & (self._worst("needed_height") <= height)
         return Share.where(fits)
 
     def _worst(self, field: str, sign: float = 1.0) -> Array:
-        """The largest of a field of the passages, times a sign; infinite where it is not known."""
+        """Return the maximum of a passage's field over the gates, times a sign; infinite where unknown."""
         values = [sign * getattr(passage, field) for passage in self.scores.passages]
         return np.asarray(np.max(np.nan_to_num(values, nan=np.inf), axis=0))
 
@@ -181,24 +181,24 @@ class ErrorCauses:
         return len(self.results[0].scores)
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with the median error and the cost of each cause."""
         costs = ", ".join(f"{r.cause} {length(self.cost(r.cause).median)}" for r in self.results[1:])
         median = float(np.median(self.none.position_error))
         return f"{len(self)} flights, position error {length(median)} at the median; more with {costs}"
 
     @property
     def none(self) -> TrialResult:
-        """With no cause."""
+        """The result without causes."""
         return self.results[0]
 
     @property
     def together(self) -> TrialResult:
-        """With all causes."""
+        """The result with all causes."""
         return self.results[-1]
 
     @validated
     def of(self, cause: Label) -> TrialResult:
-        """With one cause, by its name. Raises SpecError where there is no such cause."""
+        """Return the result of one cause, by its name. Raises SpecError where there is no such cause."""
         for result in self.results:
             if result.cause == cause:
                 return result
@@ -206,7 +206,7 @@ class ErrorCauses:
 
     @validated
     def cost(self, cause: Label, confidence: Probability = 0.95) -> Cost:
-        """The cost of a cause in position error [m], flight by flight against none.
+        """Return the cost of a cause in position error [m], flight by flight against no cause.
 
         Raises SpecError where there is no such cause.
         """

@@ -1,4 +1,4 @@
-"""The limits of what is possible: over values of two fields, and the least that a problem needs."""
+"""Feasibility over the values of two fields, and the smallest values that a problem needs."""
 
 from aerobat.studies.feasibility.feasibility_map import Axis, Cell, FeasibilityMap, feasibility_map
 from aerobat.studies.feasibility.min_requirements import Requirement, min_requirements

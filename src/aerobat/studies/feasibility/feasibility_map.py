@@ -37,15 +37,15 @@ from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
-MAX_CELLS = 10_000  # of a map: hours, where most are refused
-DIGITS = 12  # that values of a range are rounded to: steps of 0.1 add up to 0.3
-ROUNDING = 1e-9  # of a step
+MAX_CELLS = 10_000  # cells of a map: hours of planning
+DIGITS = 12  # decimals to which values of a range are rounded: steps of 0.1 add up to 0.3
+ROUNDING = 1e-9  # [-] of a step, tolerance for the end of a range
 MAX_AXES = 2
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A field's name, and its values in their order."""
+    """The name of a field, and its values in order."""
 
     name: str
     values: tuple[float, ...]
@@ -58,7 +58,7 @@ class Axis:
 
     @classmethod
     def of(cls, name: str, values: object) -> Axis:
-        """Return the axis of a sequence of numbers. Raises SpecError unless they are finite and differ."""
+        """Return the axis of a sequence of numbers. Raises SpecError unless they are finite and distinct."""
         try:
             row = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError):
@@ -75,7 +75,7 @@ class Axis:
 
     @classmethod
     def parse(cls, text: str) -> Axis:
-        """Read an axis from a text: NAME=FIRST:LAST:STEP, or NAME= and values separated by commas."""
+        """Parse an axis from text: NAME=FIRST:LAST:STEP, or NAME= and values separated by commas."""
         name, separator, numbers = text.partition("=")
         name = name.strip()
         if not separator or not name or not numbers.strip():
@@ -99,7 +99,7 @@ def _number(text: str, whole: str) -> float:
 
 
 def _range(name: str, first: float, last: float, step: float) -> tuple[float, ...]:
-    """The values from the first to the last in equal steps, the last included where a step ends there."""
+    """Return the values from first to last in equal steps; last is included if a step ends there."""
     if step == 0.0:
         raise SpecError(f"the step of {name} is 0; give another, or one value, as {name}={first:g}")
     count = floor((last - first) / step + ROUNDING) + 1
@@ -115,15 +115,15 @@ def _range(name: str, first: float, last: float, step: float) -> tuple[float, ..
 
 @by_value
 class Cell:
-    """The answer for one value of each field."""
+    """The result for one value of each field."""
 
     values: tuple[float, ...]  # in the axes' order
     feasibility: Feasibility
     duration: float | None  # [s] of the plan; None where there is none
-    limits: tuple[str, ...]  # that bind, by the names of their fields; none where that is not known
-    reserve: float | None  # of its range, that every rotor is proven to keep from either limit
-    sentence: str  # the proof, or why there is none
-    passed: Share | None = None  # of flights under the scenario's conditions; None where none were flown
+    limits: tuple[str, ...]  # names of the fields of the limits that bind; empty where unknown
+    reserve: float | None  # fraction of its range that every rotor provably keeps from either limit
+    sentence: str  # the proof, or the reason why there is no plan
+    passed: Share | None = None  # of flights under the scenario's conditions; None without conditions
 
     @property
     def is_planned(self) -> bool:
@@ -132,7 +132,7 @@ class Cell:
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays that files keep of it."""
+        """The arrays that files keep of the cell."""
         numbers = [nan if number is None else number for number in (self.duration, self.reserve)]
         passed = [] if self.passed is None else [self.passed.count, self.passed.of]
         words = [self.feasibility.value, self.sentence, *self.limits]
@@ -140,7 +140,7 @@ class Cell:
 
     @classmethod
     def of(cls, values: tuple[float, ...], arrays: Mapping[str, NDArray[Any]] | None) -> Cell | None:
-        """Read the cell of these values from the arrays of a file; None where the file holds no cell."""
+        """Return the cell of these values from the arrays of a file; None where the arrays are no cell."""
         if arrays is None or set(arrays) != {"numbers", "passed", "words"}:
             return None
         duration, reserve = (None if isnan(number) else number for number in arrays["numbers"].tolist())
@@ -152,15 +152,15 @@ class Cell:
 @in_notebooks
 @by_value
 class FeasibilityMap:
-    """For which values of one or two fields a problem has a plan: a cell for each, row by row."""
+    """The feasibility of a problem over the values of one or two fields: a cell for each, row by row."""
 
     problem: Problem
     vehicle: Vehicle
     axes: tuple[Axis, ...]
-    cells: tuple[Cell, ...]  # of the first field's first value with each of the second's, and so on
+    cells: tuple[Cell, ...]  # row-major: the first field's first value with each of the second's, and so on
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with the number of cells of each kind."""
         over = " and ".join(axis.name for axis in self.axes)
         counts = ", ".join(f"{count} {feasibility}" for feasibility, count in self.counts.items())
         return f"{self.problem.name} on {self.vehicle.name} over {over}: {counts}"
@@ -173,10 +173,10 @@ class FeasibilityMap:
 
     @property
     def table(self) -> Mapping[str, NDArray[Any]]:
-        """A row a cell: a column for each field by its name, then what there is to say of it.
+        """The cells as a table, a row for each: a column for each field by its name, then the results.
 
-        Columns `feasibility`, `limits` and `sentence` are text, `duration_s`, `reserve` and `passed` numbers,
-        NaN where there is no plan, or no flight.
+        Columns `feasibility`, `limits` and `sentence` are text; `duration_s`, `reserve` and `passed` are
+        numbers, NaN where there is no plan, or no flight.
         """
         columns = {axis.name: np.array([c.values[i] for c in self.cells]) for i, axis in enumerate(self.axes)}
         columns |= {
@@ -206,26 +206,26 @@ def feasibility_map(
     keep: PathName | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> FeasibilityMap:
-    """Plan a problem for all values of one or two fields, and say which limits bind.
+    """Plan a problem for all values of one or two fields, and report which limits bind.
 
-    Every cell is planned by itself, as `plan` would with those values, none is inferred from another; but a
-    refusal tries no changes that would help, and what contradicts itself is refused without a search.
+    Every cell is planned independently, as `plan` would with these values. Unlike `plan`, a refusal tries no
+    changes that would help, and contradictory requirements are refused without a search.
 
     Args:
-        problem: what is planned, or its name.
+        problem: the problem or its name.
         over: the values of each field, by its name: `{"angle": [0, 45, 90], "speed": range(2, 21, 2)}`. Names
             are those of `lens`, as `limits.velocity`, `gates[0].width`, `vehicle.mass`, `planner.reserve`;
             the last part alone where no other field has it; `angle` for the tilt of a half-flip's gate.
-        vehicle: what flies it, or its name.
-        planner: how, or its registered name, by default the one that suits each problem.
-        time_limit: of each cell [s].
-        conditions: under which each plan is flown too, or their name; their fields can be varied then.
-        flights: how many of each plan there are under conditions.
+        vehicle: the vehicle or its name.
+        planner: the planner or its registered name, by default the one that suits each problem.
+        time_limit: for each cell [s].
+        conditions: conditions or their name, under which each plan is flown; their fields can be varied too.
+        flights: number of flights of each plan under conditions.
         seed: of the flights.
         workers: processes, by default one a core; 1 plans in this process; dask://HOST:PORT on a cluster.
         executor: any of `concurrent.futures` that plans instead, as a `dask.distributed` client's.
-        keep: a folder for finished cells, from which a map that was ended goes on; it stays.
-        progress: called with the cells done, and of them those that are planned, as they are finished.
+        keep: a folder for finished cells, from which an interrupted map is resumed; it stays.
+        progress: called, as cells finish, with the number of finished cells and of planned ones.
 
     Raises SpecError for names of no field, for values that a field cannot take, and for a folder that keeps
     another map's cells.
@@ -262,7 +262,7 @@ def _name(values: tuple[float, ...]) -> str:
 
 
 def _asked(axes: Sequence[Axis], task: ProbedTask) -> dict[str, Any]:
-    """All that the answers of cells depend on, beside their values."""
+    """Return a summary of everything, beside their values, that the results of cells depend on."""
     parts = vars(task.scenario).items()  # the problem, the vehicle and so on
     return {
         **{name: None if part is None else fingerprint(to_table(part)) for name, part in parts},
@@ -273,7 +273,7 @@ def _asked(axes: Sequence[Axis], task: ProbedTask) -> dict[str, Any]:
 
 
 def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Lens, ...]:
-    """The fields of axes. Raises SpecError for what is no map of a scenario."""
+    """Return the fields of axes. Raises SpecError for axes that are no map of a scenario."""
     if not 1 <= len(axes) <= MAX_AXES:
         raise SpecError(f"over must name one field or two, got {len(axes)}")
     cells = prod(len(axis.values) for axis in axes)

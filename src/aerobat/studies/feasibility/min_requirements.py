@@ -1,4 +1,4 @@
-"""min_requirements(): the least thrust-to-weight ratio, the lowest ceiling, the smallest gates that do."""
+"""min_requirements(): the smallest thrust-to-weight ratio, ceiling and gates that allow a plan."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ from aerobat.studies.lens import Scenario
 from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
-GROWTH = 1.5  # from one value to the next, where what there is does not suffice
-MAX_STEPS = 5  # of it: 7.6 times as much at most
+GROWTH = 1.5  # factor between tried values while no plan is found
+MAX_STEPS = 5  # largest number of such steps: up to 7.6 times the original value
 Tolerance = Annotated[float, Bounds(ge=1e-4, le=0.5, description="number from 0.0001 to 0.5")]
 
 
 @by_value
 class Requirement:
-    """The least of a quantity for which a plan is found, proven by it, and what is refused just below.
+    """The smallest value of a quantity with a plan, which proves it, and a refused value just below.
 
-    Without a plan even the most that was tried is refused. Where feasibility is not monotone, less still may
-    be feasible again; nothing is said about that.
+    Without a plan, the refused value is the largest one tried. Where feasibility is not monotone, smaller
+    values may be feasible again; the result makes no statement about them.
     """
 
     quantity: str  # thrust-to-weight, ceiling or gate
     unit: str
-    value: float | None  # for which there is the plan, infinite for no limit; None where none was found
-    plan: Plan | None  # certified, and it flies
-    refused: float  # for which there is none, beside `value`
-    feasibility: Feasibility  # there
-    refusal: str  # why, a sentence
-    trials: int  # plans that were tried
+    value: float | None  # smallest value with a plan, infinite for no limit; None where no plan was found
+    plan: Plan | None  # certified, with a successful flight
+    refused: float  # a value without a plan, close below `value`
+    feasibility: Feasibility  # of the refused value
+    refusal: str  # the reason, a sentence
+    trials: int  # number of plans that were tried
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with the value, its plan and the refusal."""
         if self.value is None or self.plan is None:
             return f"{self.quantity}: none will do, {self.shown(self.refused)} neither: {self.refusal}"
         return (
@@ -54,7 +54,7 @@ class Requirement:
         )
 
     def shown(self, value: float) -> str:
-        """A value of the quantity with its unit."""
+        """Return a value of the quantity with its unit, as text."""
         return f"{value:.4g} {self.unit}".rstrip() if isfinite(value) else "no limit"
 
 
@@ -71,28 +71,29 @@ def min_requirements(
     executor: Executor | None = None,
     progress: Callable[[str, float, bool], None] | None = None,
 ) -> tuple[Requirement, ...]:
-    """Find the least of each quantity for which a problem has a plan, the others as they are, by bisection.
+    """Find, by bisection, the smallest value of each quantity with which a problem has a plan.
 
-    Each answer comes with a plan, certified and flown, and with a value less by the tolerance or so at which
-    none was found. Where what there is does not suffice, more is tried, up to 7.6 times as much.
+    The other quantities keep their values. Each result comes with a plan, certified and flown, and with a
+    value lower by about the tolerance at which no plan was found. If there is no plan at the original value,
+    larger values are tried, up to 7.6 times as large.
 
     Args:
-        problem: what is planned, or its name.
-        vehicle: what flies it, or its name.
-        of: any of "thrust-to-weight", the rotors' full thrust in weights; "ceiling", the height that the path
-            stays below; "gate", the openings of all gates as parts of their sizes; "gate-height", their
-            heights alone, which makes slits of them. By default all that the problem has, but the last.
-        planner: how, or its registered name, by default the one that suits each problem.
-        tolerance: between the answer and the refusal, as a part of the answer, of a ceiling of its height
-            above what is met below it, or of a metre where that is more.
-        time_limit: of each plan [s]; where none is found by then, it counts as refused.
+        problem: the problem or its name.
+        vehicle: the vehicle or its name.
+        of: any of "thrust-to-weight", the rotors' full thrust over the weight; "ceiling", the height that the
+            path stays below; "gate", the openings of all gates as fractions of their sizes; "gate-height",
+            their heights alone, which makes slits of them. By default all that the problem has but the last.
+        planner: the planner or its registered name, by default the one that suits each problem.
+        tolerance: relative gap between the answer and the refused value; for a ceiling, relative to its
+            height above the highest point required, or to a metre where that is more.
+        time_limit: of each plan [s]; a value without a plan by then counts as refused.
         workers: processes, by default one a core; 1 plans in this process; dask://HOST:PORT on a cluster.
         executor: any of `concurrent.futures` that plans instead, as a `dask.distributed` client's.
-        progress: called with each quantity, value and whether it is planned, as they are tried.
+        progress: called with each quantity, value and whether it has a plan, as values are tried.
 
     Raises:
-        SpecError: quantities are unknown, or the problem has no such thing.
-        Infeasible: nothing suffices, whichever quantity grows; the sentence says why.
+        SpecError: quantities are unknown, or the problem does not have one of them.
+        Infeasible: no quantity has a sufficient value; the sentence says why.
     """
     chosen = None if planner is None else as_planner(planner)
     scenario = Scenario(as_problem(problem), as_vehicle(vehicle), chosen)
@@ -119,17 +120,17 @@ def _probe(tasks: tuple[ProbedTask, ...], part: tuple[int, float]) -> Probe:
 
 @dataclass(eq=False)
 class _Search:
-    """The bisection of one quantity, between a value that is refused and one for which there is a plan."""
+    """The bisection of one quantity, between a refused value and one with a plan."""
 
     quantity: NeededQuantity
     scenario: Scenario
     tolerance: float
-    planned: tuple[float, Probe] | None = None  # the least so far
-    refused: tuple[float, Probe] | None = None  # the most so far
+    planned: tuple[float, Probe] | None = None  # smallest value with a plan so far
+    refused: tuple[float, Probe] | None = None  # largest refused value so far
     trials: int = 0
 
     def run(self) -> Generator[float, Probe, None]:
-        """The values to be tried, one after another, each answered by a probe."""
+        """Yield the values to try, one after another; the caller sends the probe of each."""
         quantity = self.quantity
         floor = quantity.floor(self.scenario)
         yield from self._climb(quantity.own(self.scenario))
@@ -139,7 +140,7 @@ class _Search:
             least, most = self.planned[0], floor if self.refused is None else self.refused[0]
             gap = self._gap(least)
             if least - most > gap:
-                # the plan's own highest point, say, is as good as proven
+                # a value that the plan itself needs, such as its highest point, is feasible without a trial
                 is_loose = self._used - most > gap
                 yield from self._try(0.5 * (most + (min(least, self._used) if is_loose else least)))
             elif self.refused is None:
@@ -166,17 +167,17 @@ class _Search:
 
     @property
     def _used(self) -> float:
-        """How much of the quantity the last plan uses."""
+        """The amount of the quantity that the last plan needs."""
         assert self.planned is not None, "there is a plan"
         assert self.planned[1].plan is not None
         return self.quantity.used(self.planned[1].plan)
 
     def _gap(self, value: float) -> float:
-        """The largest distance between the answer and the refusal below it at which the search ends."""
+        """Return the gap between answer and refused value at which the search ends."""
         return self.tolerance * max(value - self.quantity.floor(self.scenario), self.quantity.least_size)
 
     def _climb(self, value: float) -> Generator[float, Probe, None]:
-        """Try a value, and more while it is refused."""
+        """Yield a value to try, and larger ones while they are refused."""
         floor = self.quantity.floor(self.scenario)
         for _ in range(MAX_STEPS + 1):
             is_planned = yield from self._try(value)

@@ -1,4 +1,4 @@
-"""One scenario planned: whether there is a plan, which limits bind, or why there is none."""
+"""Plan one scenario: report a plan and its binding limits, or why there is no plan."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.problem.limits import UNITS
 from aerobat.studies.lens import Scenario
 
-AS_NEAR = 0.01  # of a limit's size: closer than plans that use all of it come to tell apart
-TIME_LIMIT = 30.0  # [s] of planning, where no other is given: most scenarios take one
+AS_NEAR = 0.01  # of a limit's size, tolerance within which limits bind equally
+TIME_LIMIT = 30.0  # [s] default time limit of planning: most scenarios take 1 s
 
 
 class Feasibility(StrEnum):
-    """An answer to whether there is a plan."""
+    """The result of an attempt to plan a scenario."""
 
-    PLANNED = "planned"  # certified, and it flies
-    NOT_FLYABLE = "not flyable"  # planned, but not certified, or its own flight is not as it should be
-    NO_PLAN = "no plan"  # the planner finds none, which proves nothing
-    REFUSED = "refused at sight"  # what is asked contradicts itself, the limits or the vehicle
-    NO_ANSWER = "no answer"  # in the time given
+    PLANNED = "planned"  # certified, with a successful flight
+    NOT_FLYABLE = "not flyable"  # planned, but not certified, or with an unsuccessful flight
+    NO_PLAN = "no plan"  # the planner finds none, which does not prove infeasibility
+    REFUSED = "refused at sight"  # provably infeasible: contradictory requirements, limits or vehicle
+    NO_ANSWER = "no answer"  # within the time limit
 
 
 @dataclass(frozen=True, eq=False)
 class Probe:
-    """The answer for one scenario."""
+    """The result of planning one scenario."""
 
     feasibility: Feasibility
-    sentence: str  # the proof, or why there is none
-    limits: tuple[str, ...]  # that bind, by the names of their fields; none where that is not known
+    sentence: str  # the proof, or the reason why there is no plan
+    limits: tuple[str, ...]  # names of the fields of the limits that bind; empty where unknown
     plan: Plan | None = None
 
     @property
@@ -47,24 +47,24 @@ class Probe:
 
 
 class Variable(Protocol):
-    """Something of a scenario that can be set to a number."""
+    """A quantity of a scenario that can be set to a number."""
 
     def set(self, whole: Scenario, value: float) -> Scenario:
-        """The scenario with it at a value. Raises SpecError where that cannot be."""
+        """Return the scenario with the quantity at a value. Raises SpecError for an impossible value."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProbedTask:
-    """A scenario of which something varies, and how each is planned."""
+    """A scenario with the variables that are changed, and the settings of planning and flights."""
 
     scenario: Scenario
     variables: tuple[Variable, ...]
-    time_limit: float  # [s] of each
+    time_limit: float  # [s] for each plan
     flights: range = range(0)  # of each plan, under the scenario's conditions
     seed: int = 0  # of the flights
 
     def varied(self, values: Sequence[float]) -> Scenario:
-        """The scenario where the variables have these values. Raises SpecError where that cannot be."""
+        """Return the scenario with these values of the variables. Raises SpecError for impossible values."""
         scenario = self.scenario
         for variable, value in zip(self.variables, values, strict=True):
             scenario = variable.set(scenario, value)
@@ -72,7 +72,7 @@ class ProbedTask:
 
 
 def probe(task: ProbedTask, values: Sequence[float]) -> Probe:
-    """The answer where the variables have these values."""
+    """Return the result for these values of the variables."""
     try:
         scenario = task.varied(values)
         found = contradiction(scenario.problem, scenario.vehicle)
@@ -106,9 +106,9 @@ def _planned(scenario: Scenario, task: ProbedTask) -> Probe:
 
 
 def binding_limits(plan: Plan) -> tuple[str, ...]:
-    """The limits that a certified plan comes nearest to, as parts of their sizes, and all that are as near.
+    """Return the limits to which a certified plan comes nearest, relative to their sizes, with near ties.
 
-    Where it begins and ends does not count: there it is as it was asked to be.
+    Start and goal of the path do not count, since their states are prescribed.
     """
     assert plan.certificate is not None, "a plan for a vehicle has a certificate"
     ends = (0.0, plan.duration)
@@ -124,14 +124,14 @@ def binding_limits(plan: Plan) -> tuple[str, ...]:
 
 
 def least_reserve(plan: Plan) -> float | None:
-    """The fraction of its range that every rotor is proven to keep from either limit; None where unknown."""
+    """Return the fraction of its range that every rotor provably keeps from either limit; None if unknown."""
     if plan.certificate is None or plan.certificate.worst is None:
         return None
     return reserve_shortfalls(plan.certificate, 1.0)[0].kept
 
 
 def _size(finding: Finding, plan: Plan) -> float:
-    """The size of what a limit is about, in its unit: of positions how far the path goes."""
+    """Return the scale of a finding's quantity in its unit; for positions, the extent of the path."""
     assert finding.limit is not None, "a finding about a limit has one"
     if finding.unit != UNITS[0]:
         return finding.size or abs(finding.limit) or 1.0

@@ -1,4 +1,4 @@
-"""Quantities of which a problem needs a minimum: how each is set to a value, and where to seek the least."""
+"""Quantities with a minimum that a problem needs: how to read, set and bound each."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ from aerobat.studies.lens import Scenario, lens
 
 
 class NeededQuantity(ABC):
-    """Something of which less makes a scenario harder."""
+    """A quantity whose reduction makes a scenario harder."""
 
     name: ClassVar[str]
     unit: ClassVar[str] = ""
-    least_size: ClassVar[float] = 0.0  # above the floor: steps and tolerances count smaller sizes as this one
-    unasked: ClassVar[bool] = True  # whether it is sought where nobody names quantities
+    least_size: ClassVar[float] = 0.0  # above the floor; steps and tolerances treat smaller sizes as this
+    unasked: ClassVar[bool] = True  # whether it is searched by default
 
     @abstractmethod
     def own(self, scenario: Scenario) -> float:
-        """Return what the scenario has, infinite where it has no bound."""
+        """Return the scenario's value, infinite where it has no bound."""
 
     @abstractmethod
     def set(self, whole: Scenario, value: float) -> Scenario:
-        """Return the scenario with so much of it. Raises SpecError where that contradicts the rest."""
+        """Return the scenario with this value. Raises SpecError where the value contradicts the rest."""
 
     def floor(self, scenario: Scenario) -> float:
         """Return the lowest value worth trying, from which growth and tolerance are measured."""
         return 0.0
 
     def used(self, plan: Plan) -> float:
-        """Return how much of the quantity a plan uses; infinite where the plan does not tell."""
+        """Return the value that a plan needs; infinite where the plan does not tell."""
         return inf
 
 
 class ThrustToWeight(NeededQuantity):
-    """All rotors at full thrust, in weights on Earth, each its part of them as it is."""
+    """Full thrust of all rotors over the weight on Earth; rotors keep their relative strengths."""
 
     name = "thrust-to-weight"
 
     def own(self, scenario: Scenario) -> float:
-        """Return the vehicle's."""
+        """Return the vehicle's thrust-to-weight ratio."""
         return scenario.vehicle.thrust_to_weight
 
     def set(self, whole: Scenario, value: float) -> Scenario:
-        """Return the scenario with rotors as strong."""
+        """Return the scenario with rotors scaled to this ratio."""
         return lens("vehicle.thrust_to_weight", whole).set(whole, value)
 
 
@@ -74,41 +74,41 @@ class Ceiling(NeededQuantity):
         return float(np.max([point[2] for point in points]))
 
     def used(self, plan: Plan) -> float:
-        """Return the height of its highest point."""
+        """Return the height of the plan's highest point."""
         return float(plan.trajectory.component_range(0)[1][2])
 
     def set(self, whole: Scenario, value: float) -> Scenario:
-        """Return the scenario under such a ceiling."""
+        """Return the scenario with this ceiling."""
         return lens("limits.upper.z", whole).set(whole, value)
 
 
 class GateSize(NeededQuantity):
-    """The openings of all gates, as parts of what they are."""
+    """The openings of all gates, as fractions of their sizes."""
 
     name = "gate"
     unit = "of its size"
 
     def own(self, scenario: Scenario) -> float:
-        """Return one. Raises SpecError where there is no gate."""
+        """Return 1. Raises SpecError where there is no gate."""
         if not scenario.problem.gates:
             raise SpecError(f"'{scenario.problem.name}' has no gate that could be smaller; leave gate out")
         return 1.0
 
     def set(self, whole: Scenario, value: float) -> Scenario:
-        """Return the scenario with openings of that part of their size."""
+        """Return the scenario with openings scaled by this fraction."""
         gates = tuple(gate.resized(value, value) for gate in whole.problem.gates)
         return replace(whole, problem=replace(whole.problem, gates=gates))
 
 
 class GateHeight(GateSize):
-    """The heights of all gates' openings, as parts of what they are: how narrow a slit may be."""
+    """The heights of all gates' openings, as fractions of their heights: how narrow a slit may be."""
 
     name = "gate-height"
     unit = "of its height"
     unasked = False
 
     def set(self, whole: Scenario, value: float) -> Scenario:
-        """Return the scenario with openings of that part of their height, of circles of their size."""
+        """Return the scenario with heights of openings scaled by this fraction, circles as a whole."""
         gates = tuple(gate.resized(1.0, value) for gate in whole.problem.gates)
         return replace(whole, problem=replace(whole.problem, gates=gates))
 
@@ -119,7 +119,7 @@ QUANTITIES: dict[str, NeededQuantity] = {
 
 
 def named_quantities(names: Sequence[str] | None, problem: Problem) -> tuple[NeededQuantity, ...]:
-    """The quantities of these names, by default all that a problem has. Raises SpecError for others."""
+    """Return the quantities of these names, by default all of a problem. Raises SpecError for others."""
     if names is None:
         usual = (each for each in QUANTITIES.values() if each.unasked)
         return tuple(each for each in usual if problem.gates or not isinstance(each, GateSize))

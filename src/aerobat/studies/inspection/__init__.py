@@ -1,4 +1,4 @@
-"""A recorded flight's error, told apart by what caused it."""
+"""The position error of a recorded flight, split into its causes."""
 
 from aerobat.studies.inspection.inspect_flight import inspect_flight
 from aerobat.studies.inspection.result import CAUSES, ErrorShare, Inspection

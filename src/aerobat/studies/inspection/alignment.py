@@ -11,23 +11,23 @@ from aerobat.errors import SpecError
 from aerobat.simulation import Flight
 from aerobat.trajectory import Trajectory
 
-MISFIT = 0.01  # [m] between set-points and the plan's path, RMS, from which on the plan is another one
-_ROWS = 60  # of the log that are compared while the shift is sought
-_SHIFTS = 201  # that are tried at first
+MISFIT = 0.01  # [m] RMS distance of set-points from the plan's path above which the plan is another one
+_ROWS = 60  # rows of the log that are compared in the search for the time shift
+_SHIFTS = 201  # time shifts of the initial grid
 
 
 @by_value
 class Alignment:
-    """The move that brings a plan onto a log: turned about the vertical, moved, and begun later."""
+    """The transformation of a plan onto a log: a turn about the vertical, a translation and a time shift."""
 
-    time_shift: float  # [s] of the log's clock when the plan begins
-    yaw: float  # [rad] of the plan's axes in the log's
+    time_shift: float  # [s] time on the log's clock when the plan begins
+    yaw: float  # [rad] of the plan's axes in the log's axes
     translation: Array  # [m] of the plan's origin in the log's axes, (3,)
-    misfit: float  # [m] that remains between set-points and the plan's path, RMS
+    misfit: float  # [m] remaining RMS distance of set-points from the plan's path
 
     @property
     def moved(self) -> float:
-        """The translation's length [m]."""
+        """The length of the translation [m]."""
         return float(np.linalg.norm(self.translation))
 
     @property
@@ -37,7 +37,7 @@ class Alignment:
 
 
 def aligned(flight: Flight, trajectory: Trajectory) -> Alignment:
-    """Lay a plan's path onto a log's set-points. Raises SpecError where the log is of another plan."""
+    """Align a plan's path with a log's set-points. Raises SpecError where the log is of another plan."""
     rows = np.unique(np.linspace(0, len(flight.times) - 1, _ROWS).astype(int))
     times, wanted = flight.times[rows], flight.setpoint_position[rows]
 

@@ -1,7 +1,7 @@
-"""A centre of mass off the one planned for, by the moment that turned a logged vehicle beside its rotors'.
+"""An offset of the centre of mass, identified from the moment that the logged rotor thrusts do not explain.
 
 Rotors of the collective thrust T about a centre of mass at (x, y) from the planned one give M_x = −y T and
-M_y = x T beyond the moment planned for: x and y are found by regression.
+M_y = x T beyond the planned moment: x and y are found by regression.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from aerobat.simulation import Flight
 from aerobat.studies.inspection.result import Fault
 from aerobat.vehicle import Vehicle
 
-_OFF = 0.05  # of the longest arm, by which the centre is off: four times what a lab's rotors pull unevenly
-_EXPLAINED = 0.5  # [-] of the missing moment of roll and pitch (mean square), that it explains at least
+_OFF = 0.05  # of the longest arm, smallest offset that is a fault: four times that of uneven rotors
+_EXPLAINED = 0.5  # [-] least part of the unexplained roll and pitch moment (mean square) due to the offset
 
 
 def balance_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
-    """Return how far a log shows the centre of mass off the vehicle's, None where it shows no such thing."""
+    """Return the offset of the centre of mass that a log shows, None where it shows none."""
     omega, thrusts = (0.5 * (each[1:] + each[:-1]) for each in (flight.omega_body, flight.thrusts))
     turned = np.diff(flight.omega_body, axis=0) / np.diff(flight.times)[:, None] @ vehicle.inertia
     moment = turned + so3.cross(omega, omega @ vehicle.inertia)

@@ -1,13 +1,13 @@
-"""Accelerations of a logged vehicle that its controller did not ask for, split by their causes.
+"""Accelerations of a logged vehicle that its position loop does not explain, split by cause.
 
-The error is e = p − p_ref; the position loop's own answer to the error is F(e) = −(k_p e + k_v e' + k_i ∫e).
+The error is e = p − p_ref; the position loop's feedback to an error is F(e) = −(k_p e + k_v e' + k_i ∫e).
 Thus
 
-    e'' = F(e) + [F(ê) − F(e)] + [a_thrust − a_ref − F(ê)] + [a − a_thrust].
+e'' = F(e) + [F(ê) − F(e)] + [a_thrust − a_ref − F(ê)] + [a − a_thrust].
 
-Here ê is the error as the observer had it, and a_thrust is the acceleration of the nominal vehicle under the
-logged thrusts. The brackets are the observer's part, the part that was not delivered, and the part that the
-vehicle's model leaves out.
+Here ê is the error that the observer estimates, and a_thrust is the acceleration of the nominal vehicle under
+the logged thrusts. The brackets are the effect of estimation errors, the part of the command that thrust and
+attitude did not deliver, and the part that the vehicle's model does not contain.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ from aerobat.vehicle.allocation import rotor_thrusts
 from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
-_RECOVERY = 3.0  # time constants 1/ω_n of the attitude loop, after a saturation that is still felt
-_SLACK = 0.02  # of a rotor's range, by which derivatives taken between rows may err
-_CLOCK = 1e-6  # [s] to which clocks are read
-_LONGEST_DELAY = 0.2  # [s] that is looked for
+_RECOVERY = 3.0  # time constants 1/ω_n of the attitude loop for which a saturation has an effect
+_SLACK = 0.02  # of a rotor's range, error of derivatives taken between rows
+_CLOCK = 1e-6  # [s] resolution of clocks
+_LONGEST_DELAY = 0.2  # [s] longest delay that is tried
 
 
 @dataclass(frozen=True)
 class PositionLoop:
-    """Gains of the position loop, and how long the attitude loop takes to forget."""
+    """Gains of the position loop, and the recovery time of the attitude loop."""
 
     position: float  # [1/s²]
     velocity: float  # [1/s]
     integral: float  # [1/s³]
-    recovery: float  # [s]
+    recovery: float  # [s] for which a saturation has an effect
 
     @classmethod
     def of(cls, controller: Controller, vehicle: Vehicle, flight: Flight) -> PositionLoop:
-        """Gains that a controller has for a vehicle."""
+        """Return the gains that a controller has for a vehicle."""
         gains: Gains = controller_parameters(controller, Fleet.of([vehicle]), flight.environment).gains
         p, v, i, stiffness = (
             float(np.ravel(gain)[0])
@@ -53,28 +53,28 @@ class PositionLoop:
         return cls(p, v, i, _RECOVERY / np.sqrt(max(stiffness, 1e-9) / 2.0))
 
     def feedback(self, times: Array, error: Array, rate: Array) -> Array:
-        """The answer [m/s²] to errors [m] and their rates [m/s], (T, 3)."""
+        """Return the feedback [m/s²] to errors [m] and their rates [m/s], (T, 3)."""
         steps = np.diff(times)[:, None] * _between(error)
         integral = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
         return -(self.position * error + self.velocity * rate + self.integral * integral)
 
 
 class ShortfallCause(IntEnum):
-    """The origin of the acceleration that was not delivered between two rows."""
+    """The reason for an acceleration that was commanded but not delivered between two rows."""
 
     UNSATURATED = 0
-    ASKED_BY_PLAN = 1  # the set-points themselves ask rotors for more than they can
-    LED_TO = 2  # they do not: an error that was there before does
+    ASKED_BY_PLAN = 1  # saturation, since the set-points themselves exceed the rotors' limits
+    LED_TO = 2  # saturation by feedback to an earlier error, with feasible set-points
 
 
 @dataclass(frozen=True)
 class Disturbances:
     """Mean accelerations [m/s²] between rows, world, (T − 1, 3) each."""
 
-    observer: Array  # by what the observer saw wrongly
-    vehicle: Array  # by what the vehicle's model leaves out
-    missing: Array  # not delivered
-    kinds: Array  # ShortfallCause of what is missing, (T − 1,)
+    observer: Array  # due to estimation errors
+    vehicle: Array  # due to errors of the vehicle's model
+    missing: Array  # commanded but not delivered
+    kinds: Array  # ShortfallCause of `missing`, (T − 1,)
 
 
 def disturbances(flight: Flight, vehicle: Vehicle, loop: PositionLoop) -> Disturbances:
@@ -104,17 +104,17 @@ def disturbances(flight: Flight, vehicle: Vehicle, loop: PositionLoop) -> Distur
 
 @dataclass(frozen=True)
 class CommandDelay:
-    """The time from commands to the rotors that obey them."""
+    """The delay from commands to rotor thrusts."""
 
-    time: float  # [s] 0 to 0.2
-    unexplained: float  # [N²] of what thrusts change by in a row, the mean square that it leaves
+    time: float  # [s] from 0 to 0.2
+    unexplained: float  # [N²] mean square residual of the change of thrust in a row
 
 
 def command_delay(flight: Flight, vehicle: Vehicle) -> CommandDelay:
-    """The time from commands to the rotors that obey them, by the rotors' nominal lags.
+    """Return the delay from commands to rotor thrusts, identified with the rotors' nominal lags.
 
-    Rotors with lag τ that take up commands d late, d within one row, miss what they would give at once by
-    (u' − u) (e^(−(h − d)/τ) − e^(−h/τ)), where u follows u': of which d is told by regression.
+    For rotors of lag τ and a delay d of at most one row h, a command change from u to u' leaves the error
+    (u − u') (e^(−(h − d)/τ) − e^(−h/τ)) against no delay. The factor, and so d, is found by regression.
     """
     steps = np.diff(flight.times)
     h = float(np.median(steps))
@@ -138,7 +138,7 @@ def command_delay(flight: Flight, vehicle: Vehicle) -> CommandDelay:
 
 
 def _lift(flight: Flight, vehicle: Vehicle) -> Array:
-    """The acceleration [m/s²] of the nominal vehicle under the logged thrusts, (T, 3)."""
+    """Return the acceleration [m/s²] of the nominal vehicle under the logged thrusts, (T, 3)."""
     q, air = flight.q_world_body, flight.environment
     drag = so3.rotate(q, vehicle.drag_body * so3.unrotate(q, flight.velocity - air.wind))
     collective = flight.thrusts.sum(axis=-1)[:, None] * so3.thrust_axis(q)
@@ -146,7 +146,7 @@ def _lift(flight: Flight, vehicle: Vehicle) -> Array:
 
 
 def _kinds(flight: Flight, vehicle: Vehicle, recovery: float) -> Array:
-    """Kind of what is missing between rows, until the `recovery` [s] after a saturation, (T − 1,)."""
+    """Return the ShortfallCause between rows; a saturation counts for `recovery` [s] after it, (T − 1,)."""
     begin = flight.times[:-1]
     beyond = flight.saturated & _asked_too_much(flight, vehicle)
     saturated, asked = (
@@ -161,7 +161,7 @@ def _kinds(flight: Flight, vehicle: Vehicle, recovery: float) -> Array:
 
 
 def _asked_too_much(flight: Flight, vehicle: Vehicle) -> Array:
-    """True where the set-points ask any rotor for thrust, or a lead of its lag, beyond its limits, (T,)."""
+    """Return True where set-points need thrust, with lag compensation or without, beyond limits, (T,)."""
     asked = rotor_thrusts(vehicle, flight.setpoint.wrench)
     slack = _SLACK * (flight.max_thrusts - flight.min_thrusts)
     led = asked + vehicle.lags * np.gradient(asked, flight.times, axis=0)

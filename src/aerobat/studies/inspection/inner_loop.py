@@ -1,7 +1,8 @@
-"""Faults of a flight controller's inner loop, by what its log says it was asked, measured and commanded.
+"""Faults of a flight controller's inner loop, found by regression on its logged inputs and commands.
 
-An inner loop as its model is commands J (p (r − ω) + i ∫(r − ω) − d ω'). Motors in another order command the
-same by other rotors; other rates, p (s r − ω) + …; other gains, another p. All are told by regression.
+The nominal inner loop commands the moment J (p (r − ω) + i ∫(r − ω) − d ω'). With motors in another order,
+other rotors receive these commands; with other rates the commands are p (s r − ω) + …; with other gains, p
+differs.
 """
 
 from __future__ import annotations
@@ -27,23 +28,23 @@ from aerobat.studies.inspection.rotors import lag_fault
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
-_SMOOTHED = 0.008  # [s] of each of two lags, which leave what noise and filters do not make
-_OTHER_ORDER = 0.6  # [-] of the misfit of commands, that another order leaves at most
-_OTHER_RATES = 0.5  # [-] of what the model does not explain, that other rates leave at most
-_RATES_OFF = 0.15  # [-] by which rates are others
-_GAIN_OFF = 0.4  # [-] by which a gain is another one: rounding, filters and delays take 0.2
-_ERRORS = 4.0  # standard errors of a gain, beside that
-_EXCITED = 0.05  # [rad/s] of the rate error, RMS, that tells a gain
-_FEWEST = 20  # rows without saturation that tell a gain
+_SMOOTHED = 0.008  # [s] of each of two low-pass lags, which suppress noise and the effect of filters
+_OTHER_ORDER = 0.6  # [-] misfit with permuted rotors over that without, at most, for a fault of order
+_OTHER_RATES = 0.5  # [-] residual with scaled rates over that without, at most, for a fault of rates
+_RATES_OFF = 0.15  # [-] smallest deviation of the rate scale from 1 that is a fault
+_GAIN_OFF = 0.4  # [-] smallest deviation of a gain that is a fault: rounding, filters and delays cause 0.2
+_ERRORS = 4.0  # standard errors of a gain that are added to _GAIN_OFF
+_EXCITED = 0.05  # [rad/s] RMS rate error from which a gain can be identified
+_FEWEST = 20  # rows without saturation from which a gain can be identified
 _AXES = ("roll", "pitch", "yaw")
 
 
 def inner_loop_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
-    """Return the fault of the inner loop that a log shows, None where it shows none, or no inner loop.
+    """Return the fault of the inner loop that a log shows; None where there is none, or no inner loop.
 
     Args:
         flight: The log of one flight.
-        vehicle: The vehicle that the inner loop was set for.
+        vehicle: The vehicle that the inner loop was configured for.
     """
     if not flight.has_inner_loop:
         return None
@@ -53,13 +54,13 @@ def inner_loop_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
 
 @dataclass(frozen=True, eq=False)
 class _InnerLoopLog:
-    """A log beside the model of its inner loop."""
+    """A log with the nominal model of its inner loop."""
 
     flight: Flight
     vehicle: Vehicle
     fleet: Fleet
     period: float  # [s] between rows
-    free: Array  # rows that no saturation is felt in, (T,)
+    free: Array  # True in rows unaffected by saturation, (T,)
 
     @classmethod
     def of(cls, flight: Flight, vehicle: Vehicle) -> _InnerLoopLog:
@@ -69,7 +70,7 @@ class _InnerLoopLog:
         return cls(flight, vehicle, Fleet.of([vehicle]), period, free)
 
     def order(self) -> Fault | None:
-        """Other rotors than the model's do what it commands."""
+        """Return a fault if other rotors than the model's carry out its commands."""
         expected = self._model_commands()
         misfit = np.mean((self.flight.commands[:, :, None] - expected[:, None, :]) ** 2, axis=0)
         rotors, meant = linear_sum_assignment(misfit)
@@ -81,7 +82,7 @@ class _InnerLoopLog:
         return Fault("motor order", f"motors are in another order: {', '.join(swapped)}")
 
     def rates(self) -> Fault | None:
-        """The commands are those for a multiple of the rates asked."""
+        """Return a fault if the commands fit a multiple of the commanded rates."""
         asked, rest = self._asked, self._commanded + self._model_feedback
         factors, unexplained, before = [], 0.0, 0.0
         for axis in range(len(_AXES)):
@@ -102,7 +103,7 @@ class _InnerLoopLog:
         return Fault("rates", f"the inner loop turns at {factor:.2f} of the rates asked in {axis_name}")
 
     def gains(self) -> Fault | None:
-        """The commands are those of another proportional gain."""
+        """Return a fault if the commands fit another proportional gain."""
         off = [
             f"{factor:.1f} times as large in {axis}"
             for axis, (factor, error) in zip(_AXES, self._gain_factors(), strict=False)
@@ -111,12 +112,12 @@ class _InnerLoopLog:
         return Fault("rate gains", f"the inner loop's gain is {', '.join(off)}") if off else None
 
     def _gain_factors(self) -> Iterator[tuple[float, float]]:
-        """The proportional gain over the model's, and its standard error, by axis."""
+        """Yield the proportional gain over the model's, and its standard error, by axis."""
         omega, setpoint = self.flight.omega_body, self.flight.rate_setpoint
         error = setpoint - omega
         terms = (error, self._integral(error), np.gradient(omega, self.period, axis=0))
         smoothed = [self._smoothed(term) for term in (*terms, self._commanded)]
-        correlated = 8.0 * _SMOOTHED / self.period  # rows of which one is worth as much alone
+        correlated = 8.0 * _SMOOTHED / self.period  # rows per independent sample
         for axis, gain in enumerate(self._gains.proportional):
             *columns, goal = (term[self.free, axis] for term in smoothed)
             if len(goal) < max(_FEWEST, 2.0 * correlated):
@@ -136,18 +137,18 @@ class _InnerLoopLog:
 
     @property
     def _commanded(self) -> Array:
-        """The angular acceleration [rad/s²] that the commands ask of the nominal vehicle, (T, 3)."""
+        """The angular acceleration [rad/s²] of the nominal vehicle under the logged commands, (T, 3)."""
         moment = self.flight.commands @ self.fleet.allocation[0, 1:].T
         return np.asarray(moment @ np.linalg.inv(self.fleet.inertia[0]).T)
 
     @property
     def _asked(self) -> Array:
-        """The part of the model's commands that its set-points make [rad/s²], (T, 3)."""
+        """The part of the model's commands from the rate set-points [rad/s²], (T, 3)."""
         return self._proportional_integral(self.flight.rate_setpoint)
 
     @property
     def _model_feedback(self) -> Array:
-        """The part that the measured rates make, its sign turned [rad/s²], (T, 3)."""
+        """The part of the model's commands from the measured rates, with opposite sign [rad/s²], (T, 3)."""
         omega = self.flight.omega_body
         slope = np.asarray(self._gains.derivative) * np.gradient(omega, self.period, axis=0)
         return np.asarray(self._proportional_integral(omega) + slope)
@@ -166,7 +167,7 @@ class _InnerLoopLog:
         return np.asarray(lfilter(*lags, values - values[:1], axis=0))
 
     def _model_commands(self) -> Array:
-        """The commands [N] of the model for what the log says was asked and measured, (T, n)."""
+        """Return the model's commands [N] for the logged set-points and measurements, (T, n)."""
         known = controller_parameters(self.vehicle.controller, self.fleet, self.flight.environment)
         airframe, mixer = first_numbers(airframe_parameters(self.fleet)), first_numbers(known.mixer)
         model = RateLoopModel(airframe, mixer, GYRO, DERIVATIVE)

@@ -1,4 +1,4 @@
-"""inspect_flight(): the causes of a recorded flight's error, by what its log shows."""
+"""inspect_flight(): the causes of a recorded flight's position error, identified from its log."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from aerobat.studies.inspection.rotors import rotor_fault
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
 
-_DIGITS = 9  # of a row's duration [s], so that rows alike are stepped alike
-_ANSWERED = 1e-3  # [m/s²] of feedback, below which it answers nothing but rounding
-NAMES = ("start", "hand-off", "vehicle", "saturation", "delay", "gains")  # of every flight
-FEWEST = 10  # rows of a log in which anything can be seen
-NOTICED = 0.002  # [s] of delay that is more than the rotors' lags leave uncertain
+_DIGITS = 9  # decimals of a row's duration [s], so that equal rows share a step
+_ANSWERED = 1e-3  # [m/s²] feedback below this is rounding
+NAMES = ("start", "hand-off", "vehicle", "saturation", "delay", "gains")  # causes in every flight
+FEWEST = 10  # fewest rows of a log that can be inspected
+NOTICED = 0.002  # [s] smallest delay beyond the uncertainty of the rotors' lags
 
 
 def responses(
@@ -43,19 +43,19 @@ def responses(
     unsaturated: str,
     fault: str | None = None,
 ) -> dict[str, Array]:
-    """Errors [m] by their causes, (T, 3) each.
+    """Return the errors [m] by cause, (T, 3) each.
 
-    What is missing in a saturation that the plan did not ask for goes to the cause whose error was the
-    largest when it began: that error is what the controller was answering. Where the inner loop has a fault,
-    all that is missing goes to it, but for what the plan asked too much.
+    Acceleration missing in a saturation that the plan did not cause is assigned to the cause with the largest
+    error when the saturation began, since the controller responded to that error. If the inner loop has a
+    fault, all missing acceleration is assigned to the fault, except where the plan exceeded the limits.
 
     Args:
         times: Of the rows [s], (T,).
         start: The error of position [m] and of velocity [m/s] in the first row, (3,) each.
         found: Accelerations held between rows.
         loop: The position loop.
-        unsaturated: The cause of what is missing without a saturation, of NAMES.
-        fault: The cause that is the inner loop's, if it has a fault.
+        unsaturated: The cause, of NAMES, of acceleration missing without a saturation.
+        fault: The cause that is the inner loop's fault, if it has one.
     """
     names = NAMES if fault is None else (*NAMES, fault)
     state = np.zeros((3, len(names), 3))  # position, velocity, integral
@@ -83,7 +83,7 @@ def responses(
 
 
 def _cause(kind: ShortfallCause, state: Array, loop: PositionLoop, unsaturated: int) -> int:
-    """The number of the cause of what is missing from now on."""
+    """Return the index of the cause of the acceleration missing from now on."""
     if kind is ShortfallCause.ASKED_BY_PLAN:
         return NAMES.index("saturation")
     if kind is ShortfallCause.UNSATURATED:
@@ -94,7 +94,7 @@ def _cause(kind: ShortfallCause, state: Array, loop: PositionLoop, unsaturated: 
 
 
 def _step(h: float, loop: PositionLoop) -> tuple[Array, Array]:
-    """The closed loop over one row: x → A x + b d."""
+    """Return A and b of the closed loop over one row: x → A x + b d."""
     rates = np.zeros((4, 4))
     rates[0, 1] = rates[1, 3] = rates[2, 0] = 1.0
     rates[1, :3] = -loop.position, -loop.velocity, -loop.integral
@@ -109,20 +109,20 @@ def inspect_flight(
     vehicle: Vehicle | str | None = None,
     controller: Controller | None = None,
 ) -> Inspection:
-    """Tell apart by its causes the position error of a flight.
+    """Split the position error of a flight into its causes.
 
-    The flight's acceleration differs from what its controller would have had it do by what the observer saw
-    wrongly, what rotors and attitude did not deliver, and what the vehicle's model leaves out. Each, and the
-    start's offset, is carried through the closed position loop; the errors that come of it add up to the
-    flight's own. Where an inner loop held the rates, its commands are compared with those of its model.
+    The flight's acceleration differs from the controller's command for three reasons: estimation errors,
+    acceleration that rotors and attitude did not deliver, and errors of the vehicle's model. Each of these,
+    and the initial error, is propagated through the closed position loop; the resulting errors add up to the
+    flight's error. With an inner loop, its commands are compared with those of its model.
 
-    Raises SpecError for a batch, for a log too short, and for one that is not of the plan.
+    Raises SpecError for a batch, for a log that is too short, and for a log of another plan.
 
     Args:
         flight: The log of one flight.
-        plan: What was flown; the log's clock and axes may be others than the plan's.
-        vehicle: The vehicle that it was flown for, or its name, by default the plan's.
-        controller: Of the flight, by default the vehicle's.
+        plan: The plan that was flown; the log may have another clock and other axes.
+        vehicle: The vehicle that the flight was configured for, or its name, by default the plan's.
+        controller: The controller settings of the flight, by default the vehicle's.
     """
     if flight.is_batch:
         raise SpecError("flight: inspect takes one flight at a time; of a batch, inspect flight[k]")

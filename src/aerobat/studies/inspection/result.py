@@ -1,4 +1,4 @@
-"""An inspection's result: how many centimetres of a flight's error each cause accounts for."""
+"""The result of an inspection: how much of a flight's position error each cause explains."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from aerobat.declaration import by_value, short
 from aerobat.simulation.outcome import length
 from aerobat.studies.inspection.alignment import Alignment
 
-NEGLIGIBLE = 0.005  # [m] of error at most that calls for no cause: millimetres remain in the best flights
-_SHOWN = 5e-4  # [m] that is more than nothing in a line
+NEGLIGIBLE = 0.005  # [m] largest error without a cause: the best flights have errors of millimetres
+_SHOWN = 5e-4  # [m] smallest part of an error that is shown
 _RISE = 1e-9  # [m] below which an error has no direction
 CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
@@ -61,7 +61,7 @@ CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
     }
 )
-UNOBSERVED = (  # of a log that does not tell what an observer saw, in the place of a delay
+UNOBSERVED = (  # of a log without the observer's state, in place of a delay
     "delay, or an observer whose state the log does not hold,",
     "log that state, which tells them apart; then shorten `computation_delay`, or see `motion_capture`",
 )
@@ -69,34 +69,34 @@ UNOBSERVED = (  # of a log that does not tell what an observer saw, in the place
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault that a log shows of a flight controller's inner loop, or of rotors, whatever it cost."""
+    """A fault of a flight controller's inner loop or of rotors, which a log shows, whatever its effect."""
 
-    cause: str  # of CAUSES
+    cause: str  # a key of CAUSES
     evidence: str  # a sentence with its numbers
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return the evidence."""
         return self.evidence
 
 
 @dataclass(frozen=True)
 class ErrorShare:
-    """One cause's part of the largest position error."""
+    """The part of the largest position error that is due to one cause."""
 
-    cause: str  # of CAUSES
-    error: float  # [m] along the largest error, below 0 where it made that smaller
-    begin: float  # [s] when its own error first exceeded half of its largest
-    end: float  # [s] when it last did
+    cause: str  # a key of CAUSES
+    error: float  # [m] component along the largest error; negative where the cause reduced it
+    begin: float  # [s] first time at which the cause's own error exceeded half of its maximum
+    end: float  # [s] last time of that
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with the cause and its part."""
         felt = f"felt from {self.begin:.2f} to {self.end:.2f} s"
         part = f"{CAUSES[self.cause][0]}: {100 * self.error:+.1f} cm"
         return f"{part}, {felt}" if self.is_felt else part
 
     @property
     def is_felt(self) -> bool:
-        """True where its part is large enough to be told."""
+        """True where the part is large enough to be shown."""
         return abs(self.error) >= _SHOWN
 
 
@@ -107,26 +107,26 @@ class Inspection:
 
     times: Array  # [s] of the log, (T,)
     error: Array  # [m] position less set-point, world, (T, 3)
-    errors: Mapping[str, Array]  # [m] by causes of CAUSES, (T, 3), which add up to it
-    delay: float  # [s] from commands to rotors, by the log
-    saturated: float  # [-] part of the rows
-    observed: bool  # false where the log does not tell what an observer saw
+    errors: Mapping[str, Array]  # [m] by keys of CAUSES, (T, 3); their sum is `error`
+    delay: float  # [s] from commands to rotors, identified from the log
+    saturated: float  # [-] fraction of rows with a saturated rotor
+    observed: bool  # false where the log lacks the observer's state
     alignment: Alignment
     fault: Fault | None = None  # of the inner loop or of rotors, whatever it cost
 
     def __post_init__(self) -> None:
-        """Write-protect."""
+        """Write-protect the arrays."""
         for series in (self.error, *self.errors.values()):
             series.flags.writeable = False
 
     @property
     def cause(self) -> str | None:
-        """The fault that the log shows, whatever it cost; else the largest error's main cause, if any."""
+        """The fault that the log shows, whatever its effect; else the largest error's main cause, if any."""
         return self._main_cause if self.fault is None else self.fault.cause
 
     @property
     def _main_cause(self) -> str | None:
-        """The largest error's main cause, None where the error is too small for one."""
+        """The main cause of the largest error; None where the error is negligible."""
         return None if self.largest < NEGLIGIBLE else self.shares[0].cause
 
     @property
@@ -136,17 +136,17 @@ class Inspection:
 
     @property
     def time(self) -> float:
-        """When the error was largest [s]."""
+        """The time of the largest error [s]."""
         return float(self.times[self._worst])
 
     @property
     def direction(self) -> Array:
-        """The largest error's, a unit vector in world axes, (3,); zero where there is no error."""
+        """The direction of the largest error, a unit vector in world axes, (3,); zero without an error."""
         return np.asarray(self.error[self._worst] / max(self.largest, _RISE))
 
     @cached_property
     def shares(self) -> tuple[ErrorShare, ...]:
-        """Each cause's part of the largest error, the largest first."""
+        """The part of the largest error that is due to each cause, the largest first."""
         shares = (self._share(cause, series) for cause, series in self.errors.items())
         return tuple(sorted(shares, key=lambda share: -share.error))
 
@@ -163,7 +163,7 @@ class Inspection:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences on what limits the result, a line each."""
+        """Sentences on the limits of the result."""
         place = self.alignment
         shift = f"the log's clock reads {place.time_shift:.3f} s when the plan begins"
         moved = f"its axes are turned by {np.rad2deg(place.yaw):.2f}° and moved by {length(place.moved)}"
@@ -179,7 +179,7 @@ class Inspection:
 
     @property
     def verdict(self) -> str:
-        """The main cause and what would mend it, in a sentence; before it a fault that the log shows."""
+        """The main cause and its remedy in a sentence, after a fault that the log shows."""
         if self.fault is None or self.fault.cause == self._main_cause:
             return self._explanation
         return f"{self.fault}; {CAUSES[self.fault.cause][1]}. Of the error: {self._explanation}"
@@ -196,5 +196,5 @@ class Inspection:
         return f"{name} explains {of}; {remedy}"
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return the verdict."""
         return self.verdict

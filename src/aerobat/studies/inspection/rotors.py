@@ -1,8 +1,8 @@
-"""Faults of rotors, by what a log says they were commanded and gave: less thrust, or later.
+"""Faults of rotors, identified from logged commands and thrusts: too little thrust, or too much lag.
 
-A rotor of lag τ moves within a row of h by (u − f) (1 − e^(−h/τ)) towards its command u. One that gives all
-that it can stands still below its command; of one that is slower, the share 1 − e^(−h/τ) is told by
-regression. A delay makes rotors late too: the fault is the one that explains their thrusts better.
+A rotor of lag τ moves within a row of h by (u − f) (1 − e^(−h/τ)) towards its command u. A rotor at its real
+maximum stays constant below its command. The factor 1 − e^(−h/τ) of a slow rotor is found by regression. A
+delay also makes rotors late: the explanation that fits the thrusts better decides.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from aerobat.studies.inspection.disturbances import CommandDelay
 from aerobat.studies.inspection.result import Fault
 from aerobat.vehicle import Vehicle
 
-_LAG_OFF = 0.4  # [-] by which rotors are slower than planned for: twice what a lab's spread makes of four
-_EXCITED = 0.005  # of a rotor's range, that thrusts lack of their commands (RMS), so that they tell a lag
-_SHORT = 0.1  # of a rotor's range, by which thrust stays below its command,
-_WHILE = 0.06  # [s] for which it has been commanded so much: longer than delays,
-_STILL = 0.2  # of what it should rise by within a row: it rises by less
-_FEWEST_STILL = 0.02  # of the rows, that show it
-_DIGITS = 3  # of a thrust [N], below which it is none
-_BETTER = 0.5  # of what a delay leaves unexplained, that another lag leaves at most
+_LAG_OFF = 0.4  # [-] excess of lag over the nominal that is a fault: twice the spread of four rotors in a lab
+_EXCITED = 0.005  # of a rotor's range, RMS of command less thrust from which a lag can be identified
+_SHORT = 0.1  # of a rotor's range, shortfall of thrust that is a fault
+_WHILE = 0.06  # [s] for which the command must have lasted: longer than delays
+_STILL = 0.2  # of the expected rise within a row, below which thrust counts as constant
+_FEWEST_STILL = 0.02  # fraction of the rows that must show the shortfall
+_DIGITS = 3  # decimals of a shown thrust [N]
+_BETTER = 0.5  # largest residual of a lag over that of a delay for which the lag is the fault
 
 
 def rotor_fault(flight: Flight, vehicle: Vehicle, delay: CommandDelay) -> Fault | None:
@@ -30,8 +30,8 @@ def rotor_fault(flight: Flight, vehicle: Vehicle, delay: CommandDelay) -> Fault 
 
     Args:
         flight: The log of one flight.
-        vehicle: The vehicle that it was flown for.
-        delay: Of its commands, which explains late rotors too.
+        vehicle: The nominal vehicle.
+        delay: Of its commands, an alternative explanation of late rotors.
     """
     weak = _weak(flight, vehicle)
     missing, change = _missing_and_change(flight)
@@ -42,7 +42,7 @@ def rotor_fault(flight: Flight, vehicle: Vehicle, delay: CommandDelay) -> Fault 
 
 
 def lag_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
-    """The fault of the rotor that follows its commands latest; None where none is late beside its file."""
+    """Return the fault of the slowest rotor; None where no rotor is slower than its nominal lag allows."""
     missing, change = _missing_and_change(flight)
     period = float(np.median(np.diff(flight.times)))
     lags = -period / np.log(np.clip(1.0 - _shares(missing, change), 1e-9, 1.0 - 1e-9))
@@ -56,7 +56,7 @@ def lag_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
 
 
 def _weak(flight: Flight, vehicle: Vehicle) -> Fault | None:
-    """Rotors stand still below what they have been commanded for a while."""
+    """Return a fault if rotors stay constant below commands that have lasted for a while."""
     period = float(np.median(np.diff(flight.times)))
     rows = round(_WHILE / period) + 1
     if rows >= len(flight.times):
@@ -76,10 +76,10 @@ def _weak(flight: Flight, vehicle: Vehicle) -> Fault | None:
 
 
 def _missing_and_change(flight: Flight) -> tuple[Array, Array]:
-    """What thrusts lack of their commands, and what they change by until the next row, (T − 1, n) each."""
+    """Return commands less thrusts, and the changes of thrusts until the next row, (T − 1, n) each."""
     return (flight.commands - flight.thrusts)[:-1], np.diff(flight.thrusts, axis=0)
 
 
 def _shares(missing: Array, change: Array) -> Array:
-    """The part of what is missing that each rotor makes good within a row, (n,)."""
+    """Return the fraction of `missing` that each rotor makes up within a row, (n,)."""
     return np.asarray(np.sum(missing * change, axis=0) / np.maximum(np.sum(missing**2, axis=0), 1e-12))

@@ -1,6 +1,7 @@
-"""Plans that pass with the probability asked: plan, fly, tighten, and prove it on fresh flights.
+"""Plans whose flights pass with a required probability: plan, fly, tighten, and prove on fresh flights.
 
-The public names stand in `__init__.pyi`; each is imported when first used: showing rounds takes no flights.
+The public names are in `__init__.pyi`; each is imported at its first use, so that showing rounds does not
+import flights.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""The cause that stands in the way of passing: each is switched off alone, for the same flights."""
+"""The main cause of failures: each cause is switched off alone, for the same flights."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from aerobat.environment import Dispersion
 from aerobat.simulation import FlightConfig
 from aerobat.studies.share import Share
 
-SWITCHED_OFF: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # causes, and conditions without each
+SWITCHED_OFF: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # conditions without each cause
     {
         "the spread of mass": {"mass": 0.0},
         "the spread of inertia": {"inertia": 0.0},
@@ -31,12 +31,12 @@ SWITCHED_OFF: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # causes, and
 def standing_in_the_way(
     conditions: Dispersion, probability: float, share: Callable[[Dispersion], Share]
 ) -> str:
-    """Name the cause without which most flights pass, in a sentence; empty where nothing varies.
+    """Return a sentence on the cause without which most flights pass; empty where nothing varies.
 
     Args:
-        conditions: What varies.
-        probability: With which a flight shall pass.
-        share: Flies the same flights under other conditions.
+        conditions: The conditions of the flights.
+        probability: With which a flight must pass.
+        share: Flies the same flights under other conditions, and returns the share that passes.
     """
     shares: dict[str, Share] = {}
     for cause, off in SWITCHED_OFF.items():

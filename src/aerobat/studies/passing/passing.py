@@ -1,4 +1,4 @@
-"""plan_to_pass(): plan, fly, tighten, until flights pass with the probability asked."""
+"""plan_to_pass(): plan, fly and tighten until flights pass with a required probability."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from aerobat.studies.share import CONFIDENCE
 from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
-# fresh flights that are expected to fail at the probability asked: two thirds as many failures are a proof
+# expected failures among the fresh flights at the required probability: two thirds as many are a proof
 PROVING_FAILURES = 50
 
 
@@ -44,30 +44,30 @@ def plan_to_pass(
 ) -> Passing:
     """Plan a problem so that flights under conditions pass with a probability, proven on fresh flights.
 
-    The plain plan is flown many times. Where too few flights pass, their spread says by how much to narrow
-    the gates for planning, and how much thrust to ask for in them; plans go on from the plain one with more
-    reserve and less body rate, and the smallest reserve of a ladder is sought with which enough of the same
-    flights pass. The plan found is then flown on flights that nothing was learned from: it is returned if the
-    lower end of Clopper and Pearson's interval reaches the probability. A flight passes where nothing goes
-    wrong, as its `Outcome` says.
+    The plain plan is flown many times. If too few flights pass, their spread determines how much to narrow
+    the gates for planning, and how much thrust to require in them. Further plans are warm-started from the
+    plain one with larger reserves and lower body rates. The search finds the smallest reserve, in fixed
+    steps, with which enough of the same flights pass. The resulting plan is flown on fresh flights, which the
+    search has not used: it is returned if the lower end of the Clopper–Pearson interval reaches the
+    probability. A flight passes if its `Outcome` is a success.
 
     Args:
-        problem: What is planned, or its name.
-        planner: How, one with a `reserve`, or its registered name.
-        vehicle: What flies it, or its name.
-        probability: With which a flight shall pass [-].
-        conditions: What varies from flight to flight, or the name of a preset or a file.
+        problem: The problem or its name.
+        planner: A planner with a `reserve`, or its registered name.
+        vehicle: The vehicle or its name.
+        probability: With which a flight must pass [-].
+        conditions: The distributions that flights draw from, or the name of a preset or a file.
         seed: Of the flights.
-        controller: The name of what flies: full, or a control law.
-        flights: How many tell how to tighten, numbered from 0.
-        fresh: How many prove it, numbered behind those; by default 50 over the probability of failing.
+        controller: The name of the controller: full, or a control law.
+        flights: Number of training flights, numbered from 0.
+        fresh: Number of flights of the proof, with the next numbers; by default 50 / (1 − probability).
         workers: Processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
         executor: Any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
         progress: Called with every attempt at a plan as it ends.
         tried: Called with every round as it ends.
 
     Raises:
-        Infeasible: there is no plan, or none that passes so often; the message names the cause in the way.
+        Infeasible: there is no plan, or no plan that passes so often; the message names the main cause.
         SpecError: the planner keeps no reserve, or so few flights cannot prove such a probability.
     """
     method, conditions = as_planner(planner), as_dispersion(conditions)
@@ -96,12 +96,12 @@ def plan_to_pass(
 
 
 def _least_flights(probability: float) -> int:
-    """The number of flights that prove a probability if all of them pass."""
+    """Return the number of flights that prove a probability if all of them pass."""
     return ceil(log(0.5 * (1.0 - CONFIDENCE)) / log(probability))
 
 
 def _require_enough(name: str, flights: int, probability: float) -> None:
-    """Refuse a number of flights that proves nothing even where all of them pass."""
+    """Raise SpecError for a number of flights that proves nothing even if all of them pass."""
     least = _least_flights(probability)
     if flights < least:
         raise SpecError(

@@ -1,4 +1,4 @@
-"""The result of tightening a plan: its rounds, its proof and its price."""
+"""The result of tightening a plan: its rounds, its proof and its cost in duration."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from aerobat.studies.share import Share
 
 @by_value
 class Round:
-    """One round: a plan with a reserve, and how many of the training flights pass."""
+    """One round: a plan with a reserve, and the share of training flights that pass."""
 
     reserve: float  # [-] of every limit's range
     plan: Plan
     share: Share
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with reserve, duration and share."""
         return f"reserve {self.reserve:.2f}: {self.plan.duration:.3f} s, {self.share} pass"
 
 
 @in_notebooks
 @by_value
 class Passing:
-    """A plan whose flights pass with the probability asked, and the proof.
+    """A plan whose flights pass with the required probability, and the proof.
 
-    The flights of `before` and `after` are the same fresh ones, of which none told how to tighten.
+    `before` and `after` are of the same fresh flights, which the search has not used.
     """
 
     plan: Plan  # carries its tube
     plain: Plan  # as planned without tightening
-    before: Share  # of the fresh flights, those of the plain plan that pass
-    after: Share  # likewise of the plan
-    probability: float  # [-] asked
+    before: Share  # of the fresh flights with the plain plan
+    after: Share  # of the fresh flights with the plan
+    probability: float  # [-] required
     fresh: range  # numbers of the flights of the proof
     rounds: tuple[Round, ...]  # in the order in which they were tried, the plain plan first
 
@@ -45,11 +45,11 @@ class Passing:
 
     @property
     def price(self) -> float:
-        """By how much longer the plan is than the plain one [s]."""
+        """The increase of duration over the plain plan [s]."""
         return self.plan.duration - self.plain.duration
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with shares and durations."""
         return (
             f"{self.plan.problem.name}: {self.after} of {self.after.of} fresh flights pass in "
             f"{self.plan.duration:.3f} s, {self.before} in {self.plain.duration:.3f} s without tightening"

@@ -1,4 +1,4 @@
-"""The spread of flights, and what it asks of the next plan: narrower gates, and more thrust in them."""
+"""The spread of flights, and the resulting changes of the next plan: narrower gates and more thrust."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from aerobat.simulation import fly
 from aerobat.studies.passing.task import PassingTask
 from aerobat.vehicle import Vehicle
 
-LEVEL = 0.95  # of the flights, that keep within a tube
-ROWS_RATE = 100.0  # [1/s] of a tube's rows, at most
-SAMPLED = 200  # flights whose every row is looked at: 50 MB
-MIN_TOLERANCE = 0.1  # of a gate's tolerance, that is left to the plan however far flights stray
-MIN_OPENING = 0.8  # likewise of a gate's opening
-AIM = 0.8  # of a tolerance of attitude, that flights shall keep to after their thrust there is raised
-MAX_THRUST = 0.75  # of the greatest specific thrust, to which it may be: turning takes the rest
+LEVEL = 0.95  # fraction of flights within a tube
+ROWS_RATE = 100.0  # [1/s] largest rate of a tube's rows
+SAMPLED = 200  # flights of which every row is used: 50 MB
+MIN_TOLERANCE = 0.1  # least fraction of a gate's attitude tolerance that is left to the plan
+MIN_OPENING = 0.8  # least fraction of a gate's opening that is left to the plan
+AIM = 0.8  # fraction of an attitude tolerance that flights should keep to after thrust is raised
+MAX_THRUST = 0.75  # fraction of the maximum specific thrust that thrust is raised to: turning needs the rest
 
 
 def tube_series(task: PassingTask, plan: Plan, flights: range) -> dict[str, tuple[float, ...]]:
-    """The times, errors and margins of a plan's `Tube`, by the first ones of some flights of it."""
+    """Return times, errors and margins of a plan's `Tube`, from the first flights of a range."""
     batch = fly(
         plan,
         task.vehicle,
@@ -51,13 +51,13 @@ def tube_series(task: PassingTask, plan: Plan, flights: range) -> dict[str, tupl
 
 
 def with_narrower_gates(problem: Problem, vehicle: Vehicle, scores: Score) -> Problem:
-    """The problem with openings and tolerances less by what flights stray in the gates.
+    """Return the problem with openings and attitude tolerances reduced by the spread of flights at the gates.
 
-    An opening stays as it is where the vehicle would not fit into a smaller one.
+    Openings stay as they are where the vehicle would not fit through the smaller ones.
 
     Args:
-        problem: What is planned.
-        vehicle: What flies it.
+        problem: The problem.
+        vehicle: The vehicle.
         scores: Of the flights of its plan.
     """
     pointed = replace(problem, gates=tuple(_pointed(gate, scores) for gate in problem.gates))
@@ -72,17 +72,18 @@ def with_narrower_gates(problem: Problem, vehicle: Vehicle, scores: Score) -> Pr
 def with_more_thrust(
     problem: Problem, vehicle: Vehicle, plan: Plan, scores: Score, fraction: float
 ) -> Problem:
-    """The problem with more thrust in its stages than its plan has, where flights stray off their attitude.
+    """Return the problem with more thrust in its stages than its plan has, where flights miss their attitude.
 
-    Against a push across the thrust the vehicle leans by their ratio: the more thrust, the less. The problem
-    itself where its maneuver asks for no thrust in them, or this is as much as is useful.
+    A push across the thrust tilts the vehicle by the ratio of push to thrust, so that more thrust reduces the
+    tilt. The problem is returned unchanged where its maneuver has no thrust conditions, or the plan's thrust
+    already suffices or is at its useful maximum.
 
     Args:
-        problem: What is planned.
-        vehicle: What flies it.
-        plan: What was planned of it.
+        problem: The problem.
+        vehicle: The vehicle.
+        plan: The plan of the problem.
         scores: Of that plan's flights.
-        fraction: Of the flights, that shall keep to the attitude.
+        fraction: Of the flights that should keep to the attitude.
     """
     strays = [(p.attitude_error_deg / p.attitude_tolerance_deg, p.planned) for p in scores.passages]
     strays += [(stage.angle_deg / stage.tolerance_deg, stage.planned) for stage in scores.attitudes]
@@ -97,13 +98,13 @@ def with_more_thrust(
 
 
 def _excess(strays: Array, fraction: float) -> float:
-    """The attitude error, over its tolerance, that a fraction of flights stays within; 0 for no flight."""
+    """Return the attitude error over tolerance that a fraction of flights stays within; 0 for no flight."""
     known = strays[np.isfinite(strays)]
     return float(np.quantile(known, fraction)) if len(known) else 0.0
 
 
 def _planned_thrust(plan: Plan, times: Array) -> float:
-    """The specific thrust [m/s²] of a plan as it is to pass a stage, at times [s] of flights."""
+    """Return the specific thrust [m/s²] of a plan at a stage, from the times [s] of flights there."""
     if np.isnan(times).all():  # no flight came near
         return 0.0
     time = min(float(np.nanmedian(times)), plan.duration)
@@ -112,14 +113,14 @@ def _planned_thrust(plan: Plan, times: Array) -> float:
 
 
 def _pointed(gate: Gate, scores: Score) -> Gate:
-    """The gate with its tolerance of attitude less the attitude error of flights."""
+    """Return the gate with its attitude tolerance reduced by the attitude error of flights."""
     strays = radians(_quantile(gate, scores, "attitude_error_deg"))
     left = max(gate.attitude_tolerance - strays, MIN_TOLERANCE * gate.attitude_tolerance)
     return replace(gate, attitude_tolerance=left)
 
 
 def _smaller(gate: Gate, scores: Score) -> Gate:
-    """The gate with its opening less the offsets of flights, on both sides."""
+    """Return the gate with its opening reduced by the offsets of flights on both sides."""
     across, up = (
         max(1.0 - 2.0 * _quantile(gate, scores, offset) / side, MIN_OPENING)
         for side, offset in zip(gate.opening.size.tolist(), ("lateral", "up"), strict=True)
@@ -128,7 +129,7 @@ def _smaller(gate: Gate, scores: Score) -> Gate:
 
 
 def _quantile(gate: Gate, scores: Score, field: str) -> float:
-    """The largest size of a field over the passages of a gate, in LEVEL of the flights that crossed it."""
+    """Return the LEVEL quantile of a field's absolute value over the flights that crossed a gate."""
     sizes = [np.abs(getattr(each, field)) for each in scores.passages if each.gate == gate.name]
     known = [each[np.isfinite(each)] for each in sizes]
     return max((float(np.quantile(each, LEVEL)) for each in known if len(each)), default=0.0)

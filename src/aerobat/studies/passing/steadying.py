@@ -1,7 +1,7 @@
-"""A plan as fast as the one that was found first, of which more flights succeed: what commands look for.
+"""A plan about as fast as the first one, but with more successful flights: used by commands.
 
-Rotors that lag otherwise than known are late, by the more degrees the faster a vehicle turns. Paths that turn
-much slower often take hardly longer.
+Rotors with an unknown lag are late by an angle proportional to the body rate. Paths with much lower body
+rates often take hardly longer.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from aerobat.studies.passing.task import PassingTask, Variant, going_on
 from aerobat.studies.share import Trials
 from aerobat.studies.workers import pool
 
-LATE = radians(15.0)  # that a vehicle turns while its rotors lag: from there on some flights come too late
+LATE = radians(15.0)  # [rad] turned within the rotors' lag: above this, some flights are too late
 CALMS = (0.65, 0.5, 0.8)  # of the largest body rate (benchmarks/steadying.py)
-LONGEST = 1.01  # times the duration of the plan that was found first
-CHOOSING = range(10**6, 10**6 + 200)  # the flights that choose: others judge
-ENOUGH = 0.975  # of these flights: most plans of which so many succeed are proven for 95 %
-WORTH = 0.4  # of these flights: where fewer succeed, turning slower has not helped
-TRYING_TIME = 10.0  # [s] of the processor for one of these plans, which takes 0.3 to 3: no clock decides
+LONGEST = 1.01  # longest duration, over that of the first plan
+CHOOSING = range(10**6, 10**6 + 200)  # flights that select the plan; other flights judge it
+ENOUGH = 0.975  # fraction of these flights: most plans with as many successes are proven for 95 %
+WORTH = 0.4  # fraction of these flights: with fewer successes, turning slower has not helped
+TRYING_TIME = 10.0  # [s] processor time limit of each plan, which takes 0.3 to 3: the limit decides nothing
 
 
 @validated
@@ -39,16 +39,16 @@ def steadied(
     controller: str = "full",
     progress: Callable[[Attempt], None] | None = None,
 ) -> Plan:
-    """Return the plan, or one at most a hundredth longer that turns slower and of which more flights succeed.
+    """Return the plan, or one at most 1 % longer with lower body rates and more successful flights.
 
-    It is looked for where gates are passed, the rotors' lag tells, and too few of some flights succeed.
+    Others are searched only if there are gates, the rotors' lag matters, and too few of some flights succeed.
 
     Args:
-        plan: What was found first, for a vehicle.
-        planner: What found it, or its name.
-        conditions: Under which flights are flown, or their name.
+        plan: The first plan, for a vehicle.
+        planner: The planner that found it, or its name.
+        conditions: Of the flights, or their name.
         seed: Of the flights.
-        controller: The name of what flies them.
+        controller: The name of the controller.
         progress: Called with every attempt.
     """
     planner = as_planner(planner)
@@ -74,7 +74,7 @@ def steadied(
 
 
 def _calmest(task: PassingTask, plan: Plan, reserve: float) -> Plan:
-    """The plan, or of those hardly longer that turn slower the one of which most flights succeed."""
+    """Return the plan, or a slower-turning one, hardly longer, if more flights succeed."""
     scores = task.scores(plan, CHOOSING)
     first = best = passed(scores)
     found = plan

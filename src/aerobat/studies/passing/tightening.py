@@ -1,4 +1,4 @@
-"""The search for the smallest reserve with which enough flights pass, and its proof on fresh flights."""
+"""The search for the smallest tightening (reserve) with which enough flights pass, and its validation."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from aerobat.studies.passing.spread import LEVEL, tube_series, with_more_thrust,
 from aerobat.studies.passing.task import VARIANTS, PassingTask, Variant
 from aerobat.studies.share import Share, percent
 
-STEP = 0.02  # of every limit's range, between reserves that are tried
-STRIDE = 3  # steps from one round to the next until flights pass
-MAX_STEPS = 20  # a reserve of two fifths at either end leaves a fifth of the range to fly with
-# proofs are attempted on flights of their own: each errs with 2.5 % at most, both together with 5 %
+STEP = 0.02  # of every limit's range, step of the reserves that are tried
+STRIDE = 3  # steps from one round to the next until enough flights pass
+MAX_STEPS = 20  # a reserve of 0.4 at either end leaves a fifth of the range for flying
+# proofs are attempted on separate flights: each errs with probability 2.5 % at most, both together 5 %
 PROOFS = 2
-KEPT_VARIANTS = 3  # that go on from a round in which too few flights pass
-DEAR = 1.15  # times a round's shortest plan: longer ones lost their way, and a larger reserve costs less
-# [s] of the processor for one tightened plan, or what the plain one took: those that are found take 0.3 to 3
+KEPT_VARIANTS = 3  # variants that remain after a round in which too few flights pass
+DEAR = 1.15  # times a round's shortest plan: longer ones are poor optima, and a larger reserve costs less
+# [s] least processor time limit of a tightened plan (else the plain plan's time): plans found take 0.3 to 3
 TIGHTENING_TIME = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Flown:
-    """A round with the scores of its flights and its variant, from which the search goes on."""
+    """A round of the search, with the scores of its flights and its variant."""
 
     round: Round
     scores: Score
@@ -40,7 +40,7 @@ class _Flown:
 
 @dataclass
 class Tightening:
-    """The search for the smallest reserve that is enough."""
+    """The search for the smallest sufficient reserve."""
 
     task: PassingTask
     training: range
@@ -50,7 +50,7 @@ class Tightening:
     _variants: tuple[Variant, ...] = VARIANTS
 
     def passing(self) -> Passing:
-        """The plan that passes, proven. Raises Infeasible where there is none."""
+        """Return the plan that passes, with its proof. Raises Infeasible where there is none."""
         plain, scores = self._plain()
         self._problem = self.task.problem
         steps, done = 0, plain
@@ -75,13 +75,13 @@ class Tightening:
         took = 0.0 if found.rescue else processor() - began
         self._limit = max(took, TIGHTENING_TIME)
         asked = self.task.planner.reserve
-        self._least = asked if found.keeps(asked) else 0.0  # which a rescued plan gives up
+        self._least = asked if found.keeps(asked) else 0.0  # a rescued plan gives the reserve up
         scores = self.task.training(found, self.training)
         return self._noted(Round(self._least, found, passed(scores))), scores
 
     def _smallest(self) -> tuple[int, Round]:
-        """The fewest steps of reserve with which enough training flights pass, or nearly, and that round."""
-        low, high, steps = -1, MAX_STEPS + 1, 0  # high: without a plan
+        """Return the fewest steps of reserve with nearly enough passing training flights, and the round."""
+        low, high, steps = -1, MAX_STEPS + 1, 0  # the fewest steps known without a plan
         while steps > low:
             done = self._round(steps)
             if done is None:
@@ -97,7 +97,7 @@ class Tightening:
         return round((best.reserve - self._least) / STEP), best
 
     def _refined(self, low: int, high: int, best: Round) -> tuple[int, Round]:
-        """The fewest steps between too few and enough, by bisection."""
+        """Return the fewest sufficient steps between too few and enough, by bisection."""
         while high - low > 1:
             middle = (low + high) // 2
             done = self._round(middle)
@@ -108,11 +108,12 @@ class Tightening:
         return high, best
 
     def _round(self, steps: int) -> Round | None:
-        """The best round with so many steps of reserve; None where there is no such plan.
+        """Return the best round with this many steps of reserve; None where there is no such plan.
 
-        Variants are tried until enough of one's flights pass; later rounds try that variant alone. Where none
-        is enough, the best ones go on to the next round. The best is also planned again with more thrust in
-        gates that flights pass off their attitude, and the added thrust stays if more flights pass.
+        Variants are tried until one has enough passing flights; later rounds try that variant alone.
+        Otherwise the best variants remain for the next round, and the best plan is also planned with more
+        thrust in gates that flights pass off their attitude. The added thrust stays if more flights pass with
+        it.
         """
         tried: list[_Flown] = []
         for variant in self._variants:
@@ -130,8 +131,8 @@ class Tightening:
         return self._with_more_thrust(steps, tried[0])
 
     def _with_more_thrust(self, steps: int, best: _Flown) -> Round:
-        """The round planned again with more thrust in gates, if more of its flights pass; else the round."""
-        kept = 0.5 * (1.0 + self.task.probability)  # half of those that may fail
+        """Return the round planned again with more thrust in gates if more flights pass, else the round."""
+        kept = 0.5 * (1.0 + self.task.probability)  # half of the flights that may fail
         firm = with_more_thrust(self._problem, self.task.vehicle, best.round.plan, best.scores, kept)
         again = None if firm == self._problem else self._planned(steps, best.variant, firm)
         if again is None or _fraction(again.round) <= _fraction(best.round):
@@ -140,7 +141,7 @@ class Tightening:
         return again.round
 
     def _planned(self, steps: int, variant: Variant, problem: Problem, longest: float = inf) -> _Flown | None:
-        """The round with so many steps of reserve; None where there is no plan, or none short enough."""
+        """Return the round with this many steps of reserve; None without a plan, or with a longer one."""
         reserve = round(self._least + steps * STEP, 9)
         try:
             found = self.task.tightened(self.rounds[0].plan, reserve, variant, problem, self._limit)
@@ -157,7 +158,7 @@ class Tightening:
         return done
 
     def _fresh(self, attempt: int) -> range:
-        """Numbers of flights that nothing was learned from."""
+        """Return numbers of flights that were not used in the search."""
         first = len(self.training) + attempt * self.proving
         return range(first, first + self.proving)
 
@@ -186,7 +187,7 @@ class Tightening:
         )
 
     def _unreachable(self, best: Round, flights: range) -> Infeasible:
-        """The error that says how often flights pass at most, and which cause stands in the way."""
+        """Return the error with the best share of passing flights and the main cause of failures."""
         task, share = self.task, self.task.share(best.plan, flights)
         why = standing_in_the_way(
             task.conditions, task.probability, lambda without: task.share(best.plan, flights, without)

@@ -1,4 +1,4 @@
-"""Many flights of one plan under conditions that vary: how well, and how often."""
+"""Many flights of one plan under random conditions: errors and shares of outcomes."""
 
 from aerobat.studies.share import Share
 from aerobat.studies.sweep.result import ErrorBand, Sweep

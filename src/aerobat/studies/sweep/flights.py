@@ -1,4 +1,4 @@
-"""Some flights of a sweep: what each draws, what it comes to, and the errors of the first ones over time."""
+"""Chunks of a sweep's flights: draws, scores, and errors over time of the first flights."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.passages import Passage
 from aerobat.studies.flights import CHUNK, FlightTask, cut
 
-SAMPLED = 4 * CHUNK  # flights, the first ones, whose errors are kept over time
-STRIDE = 10  # ticks from one instant of theirs to the next
-PASSED, NOT_REACHED = "passed", "not_reached"  # ends of a passage, beside the outcomes that are failures
+SAMPLED = 4 * CHUNK  # number of flights, from the first, whose errors over time are kept
+STRIDE = 10  # ticks between the instants of errors over time
+PASSED, NOT_REACHED = "passed", "not_reached"  # outcomes of a passage beside failures
 NEAREST, CLEARANCE = "nearest", "clearance_m"  # columns where there are obstacles
-AGAIN = "#"  # between a gate's name and the number of its passage, from the second on
+AGAIN = "#"  # separates a gate's name and the number of its passage, from the second on
 
 Columns = dict[str, NDArray[Any]]
 
-_OVER_TIME = ("times", "position_error", "attitude_error")  # of a chunk
+_OVER_TIME = ("times", "position_error", "attitude_error")  # names of a chunk's arrays over time
 
 _ERRORS = tuple(field.name for field in fields(Score)[:5])
-_PASSAGE = (  # numbers of a passage, each with the name of its column after the gate's
+_PASSAGE = (  # fields of a passage, each with the suffix of its column
     ("time", "time_s"),
     ("lateral", "lateral_m"),
     ("up", "up_m"),
@@ -43,23 +43,23 @@ _PASSAGE = (  # numbers of a passage, each with the name of its column after the
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """Flights that were flown: columns of the table, and errors over time of those that are sampled."""
+    """Flights of a sweep: columns of the table, and errors over time of sampled flights."""
 
     columns: Columns  # (flights,)
-    times: Array  # [s], (T,); none where no flight is sampled
+    times: Array  # [s], (T,); empty where no flight is sampled
     position_error: Array  # [m], (sampled flights, T)
     attitude_error: Array  # [rad], (sampled flights, T)
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays that files keep of it."""
+        """The arrays that files keep of the chunk."""
         columns = {f"column_{k}": column for k, column in enumerate(self.columns.values())}
         over_time = {name: getattr(self, name) for name in _OVER_TIME}
         return {"names": np.array(list(self.columns))} | over_time | columns
 
     @classmethod
     def of(cls, arrays: Mapping[str, NDArray[Any]] | None, count: int) -> Chunk | None:
-        """Read a chunk of so many flights from the arrays of a file; None where it holds no such chunk."""
+        """Return a chunk of `count` flights from the arrays of a file; None if they are no such chunk."""
         if arrays is None:
             return None
         try:
@@ -71,7 +71,7 @@ class Chunk:
 
 
 def fly_chunk(task: FlightTask, flights: range) -> Chunk:
-    """Fly flights of consecutive numbers; how they are cut into batches changes no bit."""
+    """Fly flights of consecutive numbers; the batch size does not change a bit."""
     is_sampled = flights.start < SAMPLED
     parts = [_flown(task, numbers, is_sampled) for numbers in cut(flights, task.batch)]
     columns = {name: np.concatenate([part[name] for part, _ in parts]) for name in parts[0][0]}
@@ -87,7 +87,7 @@ def fly_chunk(task: FlightTask, flights: range) -> Chunk:
 
 
 def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> tuple[Columns, ErrorsOverTime]:
-    """Columns of the table for some flights, and their errors over time if they are sampled."""
+    """Return columns of the table for some flights, and their errors over time if they are sampled."""
     draws = Draws(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
     stride = STRIDE if is_sampled else None
     scores, errors = score_over_time(task.plan, task.vehicle, None, None, task.config(numbers), stride)
@@ -95,7 +95,7 @@ def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> tuple[Columns,
 
 
 def _drawn(draws: Draws) -> Columns:
-    """Columns of what flights draw: a few numbers a flight."""
+    """Return columns with a summary of the draws of flights."""
     effectiveness = draws.columns["effectiveness"]
     return {
         "flight": np.array(draws.flights),
@@ -118,7 +118,7 @@ def _norms(vectors: Array) -> Array:
 
 
 def _scored(scores: Score) -> Columns:
-    """Columns of how flights went: outcome, errors, nearest obstacle and passages."""
+    """Return columns with the results of flights: outcome, errors, nearest obstacle and passages."""
     flights = list(scores)
     columns: Columns = {"outcome": np.array([flight.outcome.name.lower() for flight in flights])}
     columns |= {name: np.array(getattr(scores, name)) for name in _ERRORS}
@@ -133,14 +133,14 @@ def _scored(scores: Score) -> Columns:
 
 
 def _passage_outcome(passage: Passage) -> str:
-    """The outcome of one passage: passed, not reached, or its failure by the name of an `Outcome`."""
+    """Return the outcome of one passage: passed, not reached, or its failure by the name of an `Outcome`."""
     if passage.failure is not None:
         return passage.failure.outcome.name.lower()
     return NOT_REACHED if np.isnan(passage.time) else PASSED
 
 
 def passage_names(passages: Sequence[Passage]) -> Iterator[str]:
-    """The gates' names in the order of passage; behind that of one that is passed again, which time it is."""
+    """Yield the gates' names in the order of passage, with the number of the passage from the second on."""
     turns: Counter[str] = Counter()
     for passage in passages:
         turns[passage.gate] += 1

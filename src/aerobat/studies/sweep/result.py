@@ -1,4 +1,4 @@
-"""The result of a sweep: a table with a row a flight, its shares and quantiles, and errors over time."""
+"""The result of a sweep: a table with a row for each flight, shares, quantiles, and errors over time."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from aerobat.vehicle import Vehicle
 Level = Annotated[float, Field(ge=0, le=1, description="number from 0 to 1")]
 
 _LATERAL = "_lateral_m"
-LEVELS = (0.5, 0.95, 1.0)  # of quantiles that tables show
+LEVELS = (0.5, 0.95, 1.0)  # levels of the quantiles that tables show
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorBand:
-    """Quantiles of an error over time, each (T,)."""
+    """Quantiles over flights of an error over time, each (T,)."""
 
     low: Array  # 5 %
     median: Array
@@ -41,21 +41,22 @@ class ErrorBand:
 
     @classmethod
     def of(cls, errors: Array) -> ErrorBand:
-        """The band of errors (flights, T)."""
+        """Return the band of errors (flights, T)."""
         return cls(*np.quantile(errors, (0.05, 0.5, 0.95, 1.0), axis=0))
 
 
 @in_notebooks
 @by_value
 class Sweep:
-    """Many flights of one plan, a row each in the table; of the first ones, errors over time too.
+    """Many flights of one plan, a row of the table for each; for the first ones, errors over time too.
 
-    Columns of the table, arrays (flights,): `flight`, its number; what it drew, factors of `mass`, `inertia`,
-    `lag_mean`, `thrust_mean` and `thrust_min` over the nominal vehicle's, `drag_1_s` over its mass,
-    `start_offset_m`, `start_speed_m_s`, `start_tilt_deg`, `mean_wind_m_s`, `charge`; `outcome`, as text; the
-    fields of a Score; and of each gate, after its name, `_time_s`, `_lateral_m`, `_up_m`, `_miss_m`,
-    `_speed_m_s`, `_attitude_error_deg`, `_clearance_m`, `_needed_width_m` and `_needed_height_m`, NaN where
-    its plane was not crossed, and `_outcome`: passed, not_reached, or what went wrong there.
+    Columns of the table, arrays (flights,): `flight`, the flight's number; its draws, which are the factors
+    of `mass`, `inertia`, `lag_mean`, `thrust_mean` and `thrust_min` over the nominal vehicle's, `drag_1_s`
+    over its mass, `start_offset_m`, `start_speed_m_s`, `start_tilt_deg`, `mean_wind_m_s`, `charge`;
+    `outcome`, as text; the fields of a Score; and for each gate, after its name, `_time_s`, `_lateral_m`,
+    `_up_m`, `_miss_m`, `_speed_m_s`, `_attitude_error_deg`, `_clearance_m`, `_needed_width_m` and
+    `_needed_height_m`, NaN where its plane was not crossed, and `_outcome`: passed, not_reached, or the
+    failure at the gate.
     """
 
     plan: Plan
@@ -68,7 +69,7 @@ class Sweep:
     attitude_error: Array  # [rad], (sampled flights, T)
 
     def __post_init__(self) -> None:
-        """Write-protect."""
+        """Write-protect the arrays."""
         columns = {name: np.asarray(column) for name, column in self.table.items()}
         for array in (*columns.values(), self.times, self.position_error, self.attitude_error):
             array.flags.writeable = False
@@ -78,7 +79,7 @@ class Sweep:
         return len(self.table["flight"])
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with the share of successes and quantiles of the position error."""
         errors = [length(self.quantile("max_position_error_m", level)) for level in LEVELS[1:]]
         return (
             f"{len(self)} flights of {self.plan.problem.name}, {self.conditions.name}: {self.success} "
@@ -87,24 +88,24 @@ class Sweep:
 
     @property
     def outcomes(self) -> Mapping[Outcome, Share]:
-        """The share of each outcome that came, the most frequent first."""
+        """The share of each outcome that occurred, the most frequent first."""
         counts = Counter(self.table["outcome"].tolist())
         return {Outcome[name.upper()]: Share(n, len(self)) for name, n in counts.most_common()}
 
     @property
     def success(self) -> Share:
-        """The share of flights in which nothing went wrong."""
+        """The share of successful flights."""
         return Share(sum(s.count for outcome, s in self.outcomes.items() if outcome.is_success), len(self))
 
     @property
     def passages(self) -> Mapping[str, Gate]:
-        """The gates in the order of passage, by the names that their columns begin with."""
+        """The gates in the order of passage, by the prefixes of their columns."""
         names = [name.removesuffix(_LATERAL) for name in self.table if name.endswith(_LATERAL)]
         return {name: self.plan.problem.gate(name.partition(AGAIN)[0]) for name in names}
 
     @validated
     def passed(self, passage: Label) -> Share:
-        """The share of flights that passed a gate as they should. Raises SpecError for an unknown name."""
+        """Return the share of flights that passed a gate as required. Raises SpecError for unknown names."""
         self._gate(passage)
         return Share.where(self.table[f"{passage}_outcome"] == PASSED)
 
@@ -112,11 +113,11 @@ class Sweep:
     def smallest_opening(
         self, passage: Label, probability: Probability = 0.99, confidence: Probability = 0.95
     ) -> Opening:
-        """The smallest opening about a gate's centre that flights pass, as `ab.smallest_opening` says it.
+        """Return the smallest opening about a gate's centre that flights pass, see `ab.smallest_opening`.
 
         Args:
-            passage: the name that the gate's columns begin with.
-            probability: with which a flight shall pass [-].
+            passage: the prefix of the gate's columns.
+            probability: with which a flight must pass [-].
             confidence: with which the opening is large enough [-].
 
         Raises SpecError for an unknown name, and where the flights are too few for such a probability.
@@ -134,10 +135,10 @@ class Sweep:
 
     @validated
     def quantile(self, column: Label, level: Level) -> float:
-        """The value that this fraction of the flights keeps to, one of theirs.
+        """Return the smallest value, of one of the flights, that this fraction of them does not exceed.
 
         Args:
-            column: of the table; a passage that there was not counts as worse than any.
+            column: of the table; a missing passage counts as infinite.
             level: the fraction of the flights [-].
         """
         values = self._errors(column)
@@ -145,11 +146,11 @@ class Sweep:
 
     @validated
     def within(self, column: Label, limit: Number) -> Share:
-        """The share of flights in which a number of the table is at most `limit`."""
+        """Return the share of flights with a value of at most `limit` in this column."""
         return Share.where(self._errors(column) <= limit)
 
     def _errors(self, column: str) -> Array:
-        """A column of numbers, infinite where there was no passage."""
+        """Return a column of numbers, infinite where there was no passage."""
         numbers = [name for name, values in self.table.items() if values.dtype.kind in "fi"]
         if column not in numbers:
             raise unknown_name("column of numbers", column, numbers)

@@ -1,4 +1,4 @@
-"""sweep(): many flights of one plan under conditions that vary, on all cores, in bounded memory."""
+"""sweep(): many flights of one plan under random conditions, on all cores, in bounded memory."""
 
 from __future__ import annotations
 
@@ -47,27 +47,27 @@ def sweep(
     keep: PathName | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Sweep:
-    """Fly a plan many times, each flight with its own draw of the conditions, and say what it comes to.
+    """Fly a plan many times, each flight with its own draw of the conditions.
 
     Flight k draws from `SeedSequence(seed, spawn_key=(k,))`: batches, workers and interruptions change no
-    bit, and a sweep of more flights begins with those of fewer. Flights are scored as they are flown; those
-    over whose time errors are shown are the first ones.
+    bit, and a sweep of more flights begins with those of a shorter one. Flights are scored while they are
+    flown; errors over time are kept for the first flights.
 
     Args:
-        plan: what is flown.
-        conditions: what varies, or the name of a preset or a file.
-        runs: how many flights.
+        plan: the plan to fly.
+        conditions: the distributions, or the name of a preset or a file.
+        runs: the number of flights.
         seed: of their draws.
-        vehicle: the nominal one, or its name, by default the plan's.
-        controller: settings, a law or the name of one; by default the vehicle's own.
+        vehicle: the nominal vehicle or its name, by default the plan's.
+        controller: settings, a control law or the name of either; by default the vehicle's own.
         engine: as for FlightConfig.
         batch: flights that are flown side by side in one process: fewer take less memory.
         workers: processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
         executor: any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
-        keep: a folder for finished flights, from which a sweep that was ended goes on; it stays.
-        progress: called with the flights done, and of them those that went well, as they are finished.
+        keep: a folder for finished flights, from which an interrupted sweep is resumed; it stays.
+        progress: called, as flights finish, with the number of finished flights and of successful ones.
 
-    Raises SpecError for arguments that make no sense, and for a folder that keeps another sweep's flights.
+    Raises SpecError for invalid arguments, and for a folder that keeps another sweep's flights.
     """
     conditions = as_dispersion(conditions)
     vehicle = vehicle_of(plan, vehicle)
@@ -111,7 +111,7 @@ def _name(flights: range) -> str:
 
 
 def _asked(task: FlightTask) -> dict[str, Any]:
-    """All that the numbers of flights depend on; batches are not among it."""
+    """Return a summary of everything that the numbers of flights depend on, without the batch size."""
     plan = {
         "problem": to_table(task.plan.problem),
         "stages": [asdict(stage) for stage in task.plan.stages],
@@ -129,7 +129,7 @@ def _asked(task: FlightTask) -> dict[str, Any]:
 
 
 def _joined(task: FlightTask, chunks: Sequence[Chunk]) -> Sweep:
-    """All flights as one."""
+    """Return all flights as one sweep."""
     sampled = [chunk for chunk in chunks if len(chunk.times)]
     return Sweep(
         plan=task.plan,

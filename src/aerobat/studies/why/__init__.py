@@ -1,4 +1,4 @@
-"""Why a problem has no plan, and the changes with which it is planned, each of them tried."""
+"""Why a problem has no plan, and tried changes with which it has one."""
 
 from aerobat.studies.why.changes import Request
 from aerobat.studies.why.remedies import Remedy, Why, explained, why

@@ -1,4 +1,4 @@
-"""Changes that may make a problem plannable: less asked of path, vehicle, stages or reserve."""
+"""Changes that may make a problem feasible: relaxed limits, vehicle, stages or reserve."""
 
 from __future__ import annotations
 
@@ -19,38 +19,38 @@ from aerobat.studies.lens import lens
 from aerobat.vehicle import Vehicle
 
 HALF = 0.5
-STRONGER = 1.5  # times the rotors' largest thrusts
+STRONGER = 1.5  # factor on the rotors' maximum thrusts
 
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """A problem, the vehicle for it if there is one, and how to plan."""
+    """A problem with its vehicle, if there is one, and its planner."""
 
     problem: Problem
     vehicle: Vehicle | None
-    planner: Planner | None  # None for the one that suits the problem
+    planner: Planner | None  # None: the planner that suits the problem
 
     @property
     def reserve(self) -> float:
-        """The fraction of the rotors' ranges that the planner is asked to keep; zero where it keeps none."""
+        """The fraction of the rotors' ranges that the planner keeps in reserve; zero where it keeps none."""
         return float(getattr(self.planner, "reserve", 0.0))
 
     @property
     def max_specific_thrust(self) -> float:
-        """The vehicle's, by which stages ask, or what is assumed without one [m/s²]."""
+        """The vehicle's maximum specific thrust, or the one assumed without a vehicle [m/s²]."""
         return max_specific_thrust(self.problem, self.vehicle)
 
 
 @dataclass(frozen=True)
 class Change:
-    """A change that may help, in words, each of which is a value to be changed in a file or a call."""
+    """A change that may help; its words name a value to be changed in a file or a call."""
 
     words: str
     apply: Callable[[Request], Request]
 
 
 def changes(task: Request) -> list[Change]:
-    """The changes that a task leaves room for."""
+    """Return the changes that are possible for a task."""
     return [*_of_limits(task), *_of_reserve(task), *_of_vehicle(task), *_of_stages(task)]
 
 
@@ -66,7 +66,7 @@ def _of_limits(task: Request) -> Iterator[Change]:
 
 
 def _with(name: str, value: float | None, task: Request) -> Request:
-    """The request with a field at a value."""
+    """Return the request with a field at a value."""
     return lens(name, task).set(task, value)
 
 
@@ -107,7 +107,7 @@ def _of_stages(task: Request) -> Iterator[Change]:
 
 
 def _with_stages(ease: Callable[[Stage], Stage], task: Request) -> Request:
-    """The request with every stage of its maneuver eased, and the maneuver spelled out as stages."""
+    """Return the request with every stage of its maneuver relaxed, and the maneuver as a list of stages."""
     problem = task.problem
     sequence = problem.maneuver.stage_sequence(problem.gates, task.max_specific_thrust)
     stages = tuple(map(ease, sequence.stages))
@@ -116,12 +116,12 @@ def _with_stages(ease: Callable[[Stage], Stage], task: Request) -> Request:
 
 
 def _at_any_time(stage: Stage) -> Stage:
-    """The stage without a window or an instant."""
+    """Return the stage without a time window or a fixed instant."""
     return replace(stage, at="free", interval_offset=0)
 
 
 def _with_half_the_thrust(stage: Stage) -> Stage:
-    """The stage with half of each thrust that it asks at least."""
+    """Return the stage with half of each minimum thrust."""
     attitude = stage.attitude
     return replace(
         stage,

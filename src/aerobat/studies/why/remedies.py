@@ -1,6 +1,6 @@
-"""why(): which bound keeps a problem from being planned, and what was changed when it was planned.
+"""why(): which bound makes a problem infeasible, and which changes give it a plan.
 
-Nothing is advised that was not tried: each remedy comes with its plan.
+Every remedy was tried and comes with its plan.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from aerobat.studies.feasibility.probe import TIME_LIMIT
 from aerobat.studies.why.changes import Change, Request, changes
 from aerobat.vehicle import Vehicle, as_vehicle
 
-# [s] of the processor for the plan of each change: twice what a refusal takes
+# [s] processor time limit for the plan of each change: twice the time of a refusal
 CHANGE_TIME = 10.0
 Tried = Callable[[str, bool], None]
 
@@ -26,30 +26,30 @@ Tried = Callable[[str, bool], None]
 @short
 @by_value
 class Remedy:
-    """Changes with which a problem is planned, and the plan."""
+    """Changes with which a problem has a plan, and the plan."""
 
-    changes: tuple[str, ...]  # in words, all of them together; none where another planner is enough
+    changes: tuple[str, ...]  # in words, to be made together; empty where another planner suffices
     plan: Plan
 
     def __str__(self) -> str:
-        """What is changed, and who plans it."""
+        """Return the changes, and the planner that succeeds."""
         return f"{_in_words(self.changes)} (by {self.plan.planner} in {self.plan.duration:.3f} s)"
 
 
 @short
 @by_value
 class Why:
-    """Why a problem has no plan, and what helps."""
+    """Why a problem has no plan, and the remedies."""
 
     problem: str  # its name
-    refusal: str  # a sentence that names the bound that binds; empty where there is a plan
-    limits: tuple[str, ...]  # that it names, by their fields
-    remedies: tuple[Remedy, ...]  # each by itself enough
-    tried: tuple[str, ...]  # changes, each alone
+    refusal: str  # a sentence that names the binding bound; empty where there is a plan
+    limits: tuple[str, ...]  # names of the fields of the bounds in `refusal`
+    remedies: tuple[Remedy, ...]  # each sufficient by itself
+    tried: tuple[str, ...]  # the changes that were tried, each alone
 
     @property
     def advice(self) -> str:
-        """The changes that help, in a sentence without its full stop."""
+        """The changes that help, as a sentence without a full stop."""
         if self.remedies:
             return f"'{self.problem}' is planned {', or '.join(map(str, self.remedies))}"
         if not self.tried:
@@ -57,7 +57,7 @@ class Why:
         return f"'{self.problem}' is not planned {', '.join(self.tried)}, nor with all of that together"
 
     def __str__(self) -> str:
-        """Which bound binds, and what helps."""
+        """Return the refusal and the advice."""
         return "; ".join(filter(None, (self.refusal, self.advice)))
 
 
@@ -68,22 +68,22 @@ def why(
     vehicle: Vehicle | str | None = None,
     progress: Tried | None = None,
 ) -> Why:
-    """Find out why a problem has no plan, and with which changes it has one.
+    """Find out why a problem has no plan, and which changes give it one.
 
     Changes are tried one at a time: without each limit, with stronger rotors, with stages at any time, and so
-    on. Where none is enough alone, the fewest of all of them together are sought. Each change is planned by
-    `planner`, by the planner that suits the problem, and by all other registered ones. The planners stop once
-    one has a plan that is certified and flies, or 10 s of the processor are over. The whole search takes
-    up to minutes.
+    on. If no change suffices alone, a smallest sufficient set of them is searched. Each change is planned by
+    `planner`, by the planner that suits the problem, and by all other registered ones, until a planner finds
+    a plan that is certified and flies, or 10 s of processor time are over. The whole search takes up to
+    minutes.
 
     Args:
-        problem: What is to be planned, or its name.
-        planner: How to plan, or a registered name; left out, the planner that suits the problem.
-        vehicle: What shall fly it, or its name.
+        problem: The problem or its name.
+        planner: The planner or its registered name; left out, the planner that suits the problem.
+        vehicle: The vehicle or its name.
         progress: Called with each change, and whether it helps, as they are tried.
 
     Raises:
-        SpecError: The input makes no sense, as where a vehicle does not fit through its gate.
+        SpecError: The input is invalid, such as a vehicle that does not fit through its gate.
     """
     chosen = None if planner is None else as_planner(planner)
     flown_by = None if vehicle is None else as_vehicle(vehicle)
@@ -96,11 +96,11 @@ def why(
 
 
 def explained(refusal: Infeasible, task: Request, progress: Tried | None = None) -> Why:
-    """The explanation of a refusal that was met.
+    """Return the explanation of a refusal.
 
     Args:
-        refusal: Of the task by its planner.
-        task: What was refused.
+        refusal: The refusal of the task by its planner.
+        task: The refused task.
         progress: Called with each change, and whether it helps, as they are tried.
     """
     search = _RemedySearch(task, progress or (lambda words, helps: None))
@@ -110,19 +110,19 @@ def explained(refusal: Infeasible, task: Request, progress: Tried | None = None)
 
 
 class _RemedySearch:
-    """The search for changes with which a task is planned."""
+    """The search for changes with which a task has a plan."""
 
     def __init__(self, task: Request, progress: Tried) -> None:
         self.task, self.progress = task, progress
         self.tried: list[str] = []
 
     def by_others(self) -> list[Remedy]:
-        """The plan of another planner, with nothing changed, if there is one."""
+        """Return the plan of another planner without any change, if there is one."""
         found = self._remedy([])
         return [] if found is None else [found]
 
     def by_changes(self) -> list[Remedy]:
-        """Each change that is enough alone; where there is none, the fewest together."""
+        """Return the changes that suffice alone; if there are none, a smallest sufficient set."""
         found = changes(self.task)
         alone = []
         for change in found:
@@ -134,7 +134,7 @@ class _RemedySearch:
         return helpful or (self._fewest(found) if len(found) > 1 else [])
 
     def _fewest(self, found: list[Change]) -> list[Remedy]:
-        """The fewest changes that are enough together, none of which can be left out."""
+        """Return a set of sufficient changes of which none can be left out (greedy elimination)."""
         best = self._remedy(found)
         kept = found if best is not None else []
         for change in list(kept):
@@ -145,7 +145,7 @@ class _RemedySearch:
         return [] if best is None else [best]
 
     def _remedy(self, several: list[Change]) -> Remedy | None:
-        """The plan with several changes; None where there is none."""
+        """Return the plan with several changes; None where there is none."""
         changed = reduce(lambda task, change: change.apply(task), several, self.task)
         planners = _planners(changed, refused=not several)
         with within_time(CHANGE_TIME if several else TIME_LIMIT, processor):
@@ -156,11 +156,11 @@ class _RemedySearch:
 
 
 def _planners(task: Request, refused: bool) -> Iterator[Planner]:
-    """The planners to ask: the task's, the one that suits it, all others, each to keep the task's reserve.
+    """Yield the planners to try: the task's, the one that suits it, all others, with the task's reserve.
 
     Args:
-        task: What is planned; without a vehicle only miqp holds the problem's limits.
-        refused: Whether the task's own planner refused it already.
+        task: The task; without a vehicle no others are tried, since only miqp holds the problem's limits.
+        refused: Whether the task's own planner has already refused it.
     """
     suits = suited_planner(task.problem, task.vehicle)
     suited = planner_with_reserve(suits, task.reserve)
@@ -175,9 +175,9 @@ def _planners(task: Request, refused: bool) -> Iterator[Planner]:
 
 
 def _planned(task: Request, planner: Planner) -> Plan | None:
-    """The planner's plan; None where there is none.
+    """Return the planner's plan; None where there is none.
 
-    For a vehicle, it is certified, keeps the task's reserve and flies as it should.
+    For a vehicle, the plan must be certified, keep the task's reserve and fly as it should.
     """
     if out_of_time():
         return None
