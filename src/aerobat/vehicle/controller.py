@@ -12,22 +12,21 @@ from aerobat.kernels.control import FeatureFlags
 from aerobat.kernels.control_loops import Gains
 from aerobat.kernels.ops import Scalar
 
-_SMALLEST = 1e-9  # [s], [rad/s]: stands for zero where one divides
+_SMALLEST = 1e-9  # [s], [rad/s] replaces zero in divisions
 
 
 @declared
 class Controller:
     """Gains, filters and switches of the tracking controller (paper, Section III).
 
-    Gains are per unit of mass and of inertia, so that one set suits all vehicles; one whose rotors are too
-    weak for the attitude loop gets both loops slowed down alike (`gains`). The three switches add to the
-    paper's law what its tracking error depends on; with all off it is the paper's law (`paper`).
+    Gains are per unit of mass and of inertia, so that one set suits all vehicles. If a vehicle's rotors are
+    too weak for the attitude loop, both loops are slowed down by one factor (`gains`). The three switches add
+    features that reduce the tracking error; with all off, the law is the paper's (`paper`).
 
-    The disturbance observer answers forces and moments that the model does not know: drag, gusts, rotors that
-    give more or less than they should. The observer answers as fast as its filter and the rotors' lag let
-    these be seen, where the conditions of a flight have an IMU that feels them. Without an IMU, or with
-    rotors that lag by more than 50 ms, only the integrals of the errors answer. Moments are answered with
-    `moment_feedforward`.
+    The disturbance observer estimates forces and moments that the model does not contain: drag, gusts, rotors
+    with more or less thrust than nominal. Its speed is limited by its filter and the rotors' lag. It needs an
+    IMU in the conditions of a flight. Without an IMU, or with rotor lags above 50 ms, only the integrals of
+    the errors compensate disturbances. Disturbing moments are compensated with `moment_feedforward` only.
     """
 
     position_gain: NonNegative = 25.0  # [1/s²]
@@ -48,7 +47,7 @@ class Controller:
 
     @classmethod
     def paper(cls) -> Controller:
-        """The paper's own law at the same gains, with body-frame rates but nothing beyond it."""
+        """Return the paper's own law with the same gains, body-frame rates, and no added features."""
         return cls(
             disturbance_filter=0.0,
             moment_feedforward=False,
@@ -58,14 +57,14 @@ class Controller:
 
     @property
     def feature_flags(self) -> FeatureFlags:
-        """The switches: all that makes the control law another one, its gains being numbers."""
+        """The switches, which select the control law; its gains are numbers."""
         return FeatureFlags(self.moment_feedforward, self.motor_lag_compensation, self.prioritize_tilt)
 
     def gains(self, max_bandwidth: Scalar, ops: Any = np, **instead: Scalar) -> Gains:
-        """The gains for a vehicle whose attitude loop must not be faster than `max_bandwidth` [rad/s].
+        """Return the gains for a vehicle whose attitude bandwidth must not exceed `max_bandwidth` [rad/s].
 
-        `instead` are numbers of another arithmetic, that of `ops`, in place of settings: dual ones have dual
-        gains.
+        `instead` replaces settings by numbers of the arithmetic `ops`, such as dual numbers, which then give
+        dual gains.
         """
         setting = SimpleNamespace(**(vars(self) | instead))
         frequency = ops.minimum(setting.attitude_frequency, max_bandwidth)

@@ -1,4 +1,4 @@
-"""Vehicles from TOML files and back; the presets are such files too."""
+"""Vehicles from TOML files and back; the presets are TOML files, too."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ def vehicle_names() -> tuple[str, ...]:
 
 @validated
 def load_vehicle(name_or_path: PathName) -> Vehicle:
-    """Return a vehicle that comes with Aerobat, by its name, or the one in a TOML file, by its path.
+    """Return a vehicle that comes with Aerobat, by its name, or the vehicle in a TOML file, by its path.
 
     Raises SpecError, in one sentence that names the file and the field, when there is no such vehicle, the
-    file is malformed, or what it describes cannot fly.
+    file is malformed, or the described vehicle cannot fly.
     """
     return VEHICLES.load(name_or_path)
 
 
 def as_vehicle(vehicle: Vehicle | str) -> Vehicle:
-    """The vehicle, of itself or of what `load_vehicle` takes. Raises SpecError as that does."""
+    """Return the vehicle, given itself or an argument of `load_vehicle`. Raises SpecError as that does."""
     return load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
 
 
 @validated
 def vehicle_text(name_or_path: PathName) -> str:
-    """The text of a vehicle's file: a preset's own, with its sources, or one's own as it was understood.
+    """Return the text of a vehicle's file: a preset's own, with its sources, or another file as understood.
 
     Raises SpecError as `load_vehicle` does.
     """

@@ -13,7 +13,7 @@ from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle.hover import mixing_matrix, relieved
 from aerobat.vehicle.vehicle import Vehicle
 
-_SLACK = 1e-12  # a rotor with a smaller fraction of the collective thrust bears none of it
+_SLACK = 1e-12  # [-] a rotor with a smaller fraction of the collective thrust counts as unloaded
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,18 +30,18 @@ class Fleet:
     max_thrusts: Array  # [N], (vehicles, n)
     torque_coefficients: Array  # [m], (vehicles, n)
     lags: Array  # [s], (vehicles, n)
-    body_centres: Array  # [m] of what encloses the vehicle, (vehicles, 3)
-    semi_axes: Array  # [m] likewise, (vehicles, 3)
+    body_centres: Array  # [m] of the enclosing ellipsoids, (vehicles, 3)
+    semi_axes: Array  # [m] of the enclosing ellipsoids, (vehicles, 3)
 
     def __post_init__(self) -> None:
-        """Write-protect."""
+        """Write-protect the arrays."""
         for value in vars(self).values():
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
 
     @classmethod
     def of(cls, vehicles: Sequence[Vehicle]) -> Fleet:
-        """The fleet of some vehicles with as many rotors each."""
+        """Return the fleet of some vehicles with equal numbers of rotors."""
         rotors = [rotor for vehicle in vehicles for rotor in vehicle.rotors]
         shape = (len(vehicles), -1)
         numbers = np.array(
@@ -68,17 +68,17 @@ class Fleet:
 
     @cached_property
     def allocation(self) -> Array:
-        """The maps from rotor thrusts to thrust and moments, as `Vehicle.allocation`, (vehicles, 4, n)."""
+        """The allocations from rotor thrusts to thrust and moments, see `Vehicle`, (vehicles, 4, n)."""
         x, y, _ = np.moveaxis(self.rotor_positions, -1, 0)
         return np.stack([np.ones_like(x), y, -x, -self.spins * self.torque_coefficients], axis=1)
 
     @cached_property
     def mixer(self) -> Array:
-        """The vehicles' mixers, (vehicles, n, 4)."""
+        """The vehicles' mixing matrices, (vehicles, n, 4)."""
         rows = np.concatenate(
             [self.allocation.reshape(len(self), -1), self.max_thrusts > 0.0, self.min_thrusts >= 0.0], axis=1
         )
-        same = (rows == rows[0]).all()  # the inverse is dear, and most fleets differ in other things
+        same = (rows == rows[0]).all()  # the inverse is expensive, and most fleets share it
         first, place = np.zeros(1, np.intp), np.zeros(len(self), np.intp)
         if not same:
             _, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
@@ -88,7 +88,7 @@ class Fleet:
 
     @cached_property
     def collective_range(self) -> Array:
-        """Least and most collective thrust [N] that can be held without any moment, (vehicles, 2)."""
+        """The range of collective thrust [N] that can be held without any moment, (vehicles, 2)."""
         fractions = self.mixer[..., 0]
         bears = np.abs(fractions) > _SLACK
         divisor = np.where(bears, fractions, 1.0)

@@ -1,7 +1,7 @@
-"""The rotors that bear a vehicle, and what is left of its control where they do not suffice.
+"""The distribution of a vehicle's weight among its rotors, and the control that remains after failures.
 
 With the allocation A, a level hover divides the weight in fractions g with A g = (1, 0, 0, 0). To steer from
-it in every direction, every rotor that only pushes must bear some of it: g > 0.
+hover in every direction, every rotor that can only push must bear a part of the weight: g > 0.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 
-ROUNDING = 1e-9  # [-] a fraction of the weight that is none
-MIN_ROOM = 0.2  # [-] of a rotor's range, above what a hover takes of it: with less, it hardly steers
-MIN_FRACTION = 1e-3  # [-] of the weight; a rotor that can bear no more has no room to steer
+ROUNDING = 1e-9  # [-] smaller fractions of the weight count as zero
+MIN_ROOM = 0.2  # [-] least reserve of a rotor's range above its hover thrust: with less, it hardly steers
+MIN_FRACTION = 1e-3  # [-] least fraction of the weight: a rotor that can bear no more has no room to steer
 
 
 def mixing_matrix(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> Array:
-    """Inverses of allocations by which loads are shared among rotors, (..., n, 4).
+    """Return inverses of allocations, from loads to rotor thrusts, (..., n, 4).
 
-    The least-norm ones over the rotors that give thrust. Where that would have a rotor pull that can only
-    push, and another way of sharing the weight does not, the first column is the one whose smallest fraction
-    is the largest.
+    They are the least-norm inverses over the rotors that give thrust. Where the least-norm hover needs a
+    rotor to pull that can only push, and another distribution of the weight does not, the first column is the
+    distribution with the largest minimum fraction.
 
     Args:
         allocation: from rotor thrusts to thrust and moments, (..., 4, n).
@@ -32,7 +32,7 @@ def mixing_matrix(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> 
     """
     lives = np.where(max_thrusts > 0.0, 1.0, 0.0)
     inverses = np.asarray(np.linalg.pinv(allocation * lives[..., None, :]), dtype=np.float64)
-    inverses *= lives[..., None]  # zeros without rounding
+    inverses *= lives[..., None]  # exact zeros
     unbalanced = overloaded(inverses[..., 0], min_thrusts, max_thrusts).any(axis=-1)
     for at in map(tuple, np.argwhere(unbalanced)):
         balanced, smallest = balanced_fractions(allocation[at], min_thrusts[at], max_thrusts[at])
@@ -44,13 +44,13 @@ def mixing_matrix(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> 
 def relieved(
     inverses: Array, allocation: Array, min_thrusts: Array, max_thrusts: Array, weights: Array
 ) -> Array:
-    """Mixing matrices by which a hover leaves all rotors `MIN_ROOM`, where those that are given do not.
+    """Return mixing matrices that leave all rotors `MIN_ROOM` in hover, where the given ones do not.
 
-    Loads are then shared by strength, so that Σ f² / f_max is the least: a rotor that is much weaker than
-    the others gives what it can. Vehicles that this does not help keep their own.
+    Loads are then shared by strength, which minimizes Σ f² / f_max: a rotor that is much weaker than the
+    others gives what it can. Vehicles that this does not help keep their mixing matrices.
 
     Args:
-        inverses: by which loads are shared, (..., n, 4).
+        inverses: the mixing matrices, (..., n, 4).
         allocation: from rotor thrusts to thrust and moments, (..., 4, n).
         min_thrusts: [N], (..., n).
         max_thrusts: [N], (..., n).
@@ -68,20 +68,20 @@ def relieved(
 
 
 def outside(thrusts: Array, min_thrusts: Array, max_thrusts: Array) -> NDArray[np.bool_]:
-    """True for the rotors whose thrusts are beyond their limits."""
+    """Return True for rotors whose thrusts are outside their limits."""
     return np.asarray((thrusts < min_thrusts) | (thrusts > max_thrusts))
 
 
 def overloaded(fractions: Array, min_thrusts: Array, max_thrusts: Array) -> Array:
-    """True for the rotors that would have to pull in a hover, or to stand still, and can only push."""
+    """Return True for rotors that can only push but would have to pull, or to stop, in a hover."""
     return np.asarray((fractions <= ROUNDING) & (min_thrusts >= 0.0) & (max_thrusts > 0.0))
 
 
 def balanced_fractions(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> tuple[Array, float]:
-    """The fractions of the weight in a hover whose smallest is the largest, (n,), and that smallest one.
+    """Return the hover fractions of the weight with the largest minimum, (n,), and the minimum.
 
-    A linear program: max t with A g = e1 and g ≥ t, for rotors that only push; minus infinity where there is
-    no hover at all. `allocation` may lack rows of moments that are left to themselves.
+    This is a linear program: max t with A g = e1 and g ≥ t for rotors that can only push. The minimum is
+    minus infinity where there is no hover. `allocation` may lack rows of moments that are not controlled.
     """
     pushes = (max_thrusts > 0.0) & (min_thrusts >= 0.0)
     above = np.c_[-np.eye(len(pushes))[pushes], np.ones(int(pushes.sum()))]
@@ -91,7 +91,7 @@ def balanced_fractions(allocation: Array, min_thrusts: Array, max_thrusts: Array
 
 
 def why_no_hover(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> str:
-    """The complaint about rotors that cannot hover and steer in every direction, and what they can do yet."""
+    """Return the message for rotors that cannot hover and steer, with the control that remains."""
     dead = np.flatnonzero(max_thrusts == 0.0)
     without = f" without {_named(dead.tolist())} (max_thrust = 0)" if len(dead) else ""
     _, without_yaw = balanced_fractions(allocation[:3], min_thrusts, max_thrusts)
@@ -118,7 +118,7 @@ def why_no_hover(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> s
 
 
 def _largest_fraction(i: int, allocation: Array, min_thrusts: Array, max_thrusts: Array) -> float:
-    """The largest part of the weight that rotor `i` can bear in a hover; infinity where there is no hover."""
+    """Return the largest fraction of weight that rotor `i` can bear in a hover; infinity without a hover."""
     found = _maximized(np.eye(len(max_thrusts) + 1)[i], allocation, min_thrusts, max_thrusts)
     return np.inf if found is None else float(found[i])
 
@@ -126,16 +126,16 @@ def _largest_fraction(i: int, allocation: Array, min_thrusts: Array, max_thrusts
 def _maximized(
     rewards: Array, allocation: Array, min_thrusts: Array, max_thrusts: Array, above: Array | None = None
 ) -> Array | None:
-    """The fractions g ≥ 0 of a hover, and t from 0 to 1, that maximize a linear reward; None without a hover.
+    """Return hover fractions g ≥ 0, and t from 0 to 1, that maximize a linear reward; None without a hover.
 
     Args:
         rewards: of g and t, (n + 1,).
         allocation: with A g = e1, (4, n), or fewer rows.
-        min_thrusts: [N], (n,); rotors that can pull may bear anything up to the whole weight, either way.
+        min_thrusts: [N], (n,); rotors that can pull may bear up to the whole weight in either direction.
         max_thrusts: [N], (n,); dead rotors bear nothing.
-        above: rows that g and t shall make no more than zero, (rows, n + 1).
+        above: rows whose products with g and t must not exceed zero, (rows, n + 1).
     """
-    from scipy.optimize import linprog  # only once something is out of the ordinary
+    from scipy.optimize import linprog  # slow import, needed in unusual cases only
 
     sizes = np.abs(allocation).max(axis=1, keepdims=True)
     rows = allocation / np.where(sizes > 0.0, sizes, 1.0)
@@ -146,13 +146,13 @@ def _maximized(
         A_ub=above,
         b_ub=None if above is None else np.zeros(len(above)),
         A_eq=np.c_[rows, np.zeros(len(rows))],
-        b_eq=np.eye(len(rows))[0],  # the first row's size is one
+        b_eq=np.eye(len(rows))[0],  # the first row is already scaled
         bounds=np.r_[bounds, [[0.0, 1.0]]],
     )
     return np.asarray(found.x) if found.status == 0 else None
 
 
 def _named(rotors: Iterable[int]) -> str:
-    """Rotors as a file counts them: "rotors[1] and rotors[4]"."""
+    """Return rotors by their keys in files: "rotors[1] and rotors[4]"."""
     names = [f"rotors[{i}]" for i in rotors]
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,6 +1,6 @@
-"""Values that a vehicle may have and hardly has: most often a unit that was meant to be another one.
+"""Warnings about values that a vehicle could have but hardly has, most often because of a wrong unit.
 
-Nothing is refused here. Each threshold is beyond what is built, and its reason stands beside it.
+Nothing is rejected here. Each threshold is beyond what is built, for the reason in its comment.
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from aerobat.vehicle.files import as_vehicle
 from aerobat.vehicle.rotor import Rotor
 from aerobat.vehicle.vehicle import Vehicle
 
-MAX_ARM = 10.0  # [m] the widest passenger multirotors have rotors 5 m from their centre
-MAX_LAG = 1.0  # [s] propellers of a metre and more take 0.3 s; with more nothing hovers stably
-MAX_TORQUE_PER_RADIUS = 10.0  # [-] c/R is the ratio C_Q/C_T, 0.05 to 0.3; Section V of the paper has 8
-MAX_RADIUS_PER_ARM = 2.0  # [-] neighbours on a cross touch from 0.7 of the arm; at twice it all share a disc
-MAX_GYRATION = 1.0  # [-] radius of gyration over the reach of arm and propeller: all of the mass at the tips
-MIN_GYRATION = 0.03  # [-] over the arm: motors alone, a fifth of the mass at the arms' ends, make it 0.3
-MAX_THRUST_TO_WEIGHT = 40.0  # [-] record racers come to 25
-MIN_THRUST_TO_WEIGHT = 0.1  # [-] on Earth: too little for the Moon too
-# what is most often built, to choose between units that would all do
+MAX_ARM = 10.0  # [m] the largest passenger multirotors have rotors 5 m from their centre
+MAX_LAG = 1.0  # [s] propellers of a metre and more take 0.3 s; with more lag no vehicle hovers stably
+MAX_TORQUE_PER_RADIUS = 10.0  # [-] c/R is the ratio C_Q/C_T, often 0.05 to 0.3; Section V of the paper has 8
+MAX_RADIUS_PER_ARM = 2.0  # [-] neighbours on a cross touch at 0.7 of the arm; at 2 all propellers overlap
+MAX_GYRATION = 1.0  # [-] radius of gyration over the reach of arm and propeller: 1 if all mass is at the tips
+MIN_GYRATION = 0.03  # [-] over the arm: motors alone, a fifth of the mass at the arms' ends, give 0.3
+MAX_THRUST_TO_WEIGHT = 40.0  # [-] record racers reach 25
+MIN_THRUST_TO_WEIGHT = 0.1  # [-] on Earth: too little even for the Moon
+# typical values, to choose between units that are all plausible
 TYPICAL_ARM = 0.2  # [m]
 TYPICAL_LAG = 0.03  # [s]
 TYPICAL_TORQUE_PER_RADIUS = 0.1
 TYPICAL_RADIUS_PER_ARM = 0.6
-TYPICAL_GYRATION = 0.35  # over the reach
+TYPICAL_GYRATION = 0.35  # [-] over the reach
 
 LENGTHS = (("mm", 1e-3), ("cm", 1e-2), ("inches", 0.0254))
 TIMES = (("ms", 1e-3), ("µs", 1e-6))
 INERTIAS = (("g·m²", 1e-3), ("kg·cm²", 1e-4), ("kg·mm²", 1e-6), ("g·cm²", 1e-7), ("g·mm²", 1e-9))
-Units = Sequence[tuple[str, float]]  # names, each with its size in the SI unit
+Units = Sequence[tuple[str, float]]  # names of units, each with its size in the SI unit
 
 
 @dataclass(frozen=True)
 class _Check:
-    """A length or a time of a rotor, how large it is at most, and what it is most often."""
+    """A length or a time of a rotor, its largest plausible value, and its typical value."""
 
     field: str
     value: float
@@ -52,14 +52,14 @@ class _Check:
 
 @validated
 def implausibilities(vehicle: Vehicle | str) -> tuple[str, ...]:
-    """Return a sentence for each kind of value that hardly any vehicle has, with the unit probably meant."""
+    """Return a sentence for each kind of implausible value, with the unit that was probably meant."""
     vehicle = as_vehicle(vehicle)
     found = (*_of_dead_rotors(vehicle), *_of_rotors(vehicle.rotors), *_of_inertia(vehicle))
     return (*found, *_of_thrust(vehicle))
 
 
 def _of_dead_rotors(vehicle: Vehicle) -> Iterator[str]:
-    """Which rotors are dead, and what remains flyable."""
+    """Yield a sentence on the dead rotors and the control that remains."""
     if not vehicle.dead_rotors:
         return
     try:
@@ -75,7 +75,7 @@ def _of_dead_rotors(vehicle: Vehicle) -> Iterator[str]:
 
 
 def _of_rotors(rotors: Sequence[Rotor]) -> Iterator[str]:
-    """Findings of the first rotor that has any, of each kind: the others most often share it."""
+    """Yield one sentence for each kind of implausible value, about the first rotor that has one."""
     for checks in zip(*map(_checks, rotors), strict=True):
         for i, check in enumerate(checks):
             if check.value > check.most:
@@ -88,7 +88,7 @@ def _of_rotors(rotors: Sequence[Rotor]) -> Iterator[str]:
 
 
 def _checks(rotor: Rotor) -> tuple[_Check, ...]:
-    """All that is looked at of one rotor."""
+    """Return all checks of one rotor."""
     arm, radius = _arm(rotor), rotor.radius
     torque, most_torque = rotor.torque_coefficient, MAX_TORQUE_PER_RADIUS * radius
     return (
@@ -126,7 +126,7 @@ def _of_thrust(vehicle: Vehicle) -> Iterator[str]:
 
 
 def _remedy(value: float, limits: tuple[float, float], typical: float, units: Units) -> str:
-    """A question after the unit in which the value would be plausible, and most like what is built."""
+    """Return a question whether the value was typed in another unit, the one nearest to typical values."""
     low, high = limits
     plausible = {name: value * size for name, size in units if low < value * size <= high}
     if not plausible:

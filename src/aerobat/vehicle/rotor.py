@@ -1,4 +1,4 @@
-"""A motor with its propeller, and the data sheets that it may be given by."""
+"""A motor with its propeller, and the data sheet values by which it may be specified."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from aerobat.declaration.declared import declared
 from aerobat.declaration.field_types import Finite, NonNegative, Positive, Vector3, finite, number
 from aerobat.declaration.sentences import FieldError, shown, within_field
 
-RAD_PER_S = 2 * pi / 60  # one revolution a minute
-WITH_TORQUE = 3  # columns of a thrust curve that has them
+RAD_PER_S = 2 * pi / 60  # [rad/s] per revolution per minute
+WITH_TORQUE = 3  # number of columns of a thrust curve with torques
 
 
 def _no_truth(value: Any) -> Any:
-    """The value; Python takes True for 1."""
+    """Return the value. Raises FieldError for True and False, which Python would take for 1 and 0."""
     if isinstance(value, bool):
         raise FieldError("", f"must be 1 or -1, got {value}")
     return value
@@ -29,8 +29,8 @@ def _no_truth(value: Any) -> Any:
 class Rotor:
     """A motor with its propeller, thrust along the body's +z, first-order in its command.
 
-    One with `max_thrust` 0 is dead: it is carried and gives nothing. Raises SpecError, naming the field, for
-    values that no rotor has.
+    A rotor with `max_thrust` 0 is dead: it has mass but gives no thrust. Raises SpecError, naming the field,
+    for values that no rotor can have.
     """
 
     position_body: Vector3  # [m] from the centre of mass; in a file, from where `centre_of_mass` is counted
@@ -73,19 +73,19 @@ class Rotor:
 
 
 class _KeyedValue(NamedTuple):
-    """A value that a table gives for a field, and the key behind it."""
+    """A value that a table gives for a field, and the key that gives it."""
 
     field: str
     key: str
     value: Any
-    is_own: bool  # of the rotor, not of the defaults
+    is_own: bool  # true: from the rotor's own table; false: from the defaults
 
 
 def rotor_table(own: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of a rotor, from its own keys and, where they say nothing, from those of all rotors.
+    """Return the fields of a rotor, from its own keys and, where it has none, from those of the defaults.
 
-    A rotor whose own `max_thrust` is 0 is dead, whatever else is said of its thrust. Raises FieldError for
-    shorthands that lack one another, and where two keys of one table give one field.
+    A rotor whose own `max_thrust` is 0 is dead, whatever its other keys say about thrust. Raises FieldError
+    for shorthands that lack one another, and where two keys of one table give the same field.
     """
     if own.get("max_thrust") == 0:
         own, defaults = _of_dead_rotor(own, defaults)
@@ -109,7 +109,7 @@ def rotor_table(own: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str
 def _of_dead_rotor(
     own: Mapping[str, Any], defaults: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The tables without what they say of thrusts; a curve is asked for torques if nothing else is."""
+    """Return the tables without keys for thrusts; a thrust curve is kept if only it gives torques."""
     speeds = ("min_rpm", "max_rpm")
     own = {key: value for key, value in own.items() if key not in speeds} | {"min_thrust": 0.0}
     defaults = {key: value for key, value in defaults.items() if key not in speeds}
@@ -120,14 +120,14 @@ def _of_dead_rotor(
 
 
 def _plain(table: Mapping[str, Any], is_own: bool) -> Iterator[_KeyedValue]:
-    """The keys that are fields, or nothing that is known."""
+    """Yield the keys that are fields, and unknown keys."""
     for key, value in table.items():
         if key not in Rotor.SHORTHANDS:
             yield _KeyedValue(key, key, value, is_own)
 
 
 def _of_speeds(table: Mapping[str, Any], own: Mapping[str, Any]) -> Iterator[_KeyedValue]:
-    """Thrusts f = k_f ω² at the ends of the range of speeds, and c = k_m / k_f."""
+    """Yield thrusts f = k_f ω² at the limits of speed, and the torque coefficient c = k_m / k_f."""
     needing = [key for key in ("max_rpm", "min_rpm", "k_m") if key in table]
     if not needing:
         return
@@ -146,7 +146,7 @@ def _of_speeds(table: Mapping[str, Any], own: Mapping[str, Any]) -> Iterator[_Ke
 
 
 def _of_curve(table: Mapping[str, Any], own: Mapping[str, Any]) -> Iterator[_KeyedValue]:
-    """The ends of a thrust curve, and the torque per thrust that fits its rows best."""
+    """Yield the end points of a thrust curve, and the least-squares torque per thrust of its rows."""
     key = "thrust_curve"
     if key not in table:
         return
@@ -160,7 +160,7 @@ def _of_curve(table: Mapping[str, Any], own: Mapping[str, Any]) -> Iterator[_Key
 
 
 def _curve(value: Any) -> Array:
-    """The rows of a thrust curve, (rows, 2 or 3)."""
+    """Return the rows of a thrust curve, (rows, 2 or 3)."""
     if not isinstance(value, list | tuple) or len(value) < 2:
         raise FieldError("", f"must be two rows or more, got {shown(value)}")
     columns = WITH_TORQUE if isinstance(value[0], list | tuple) and len(value[0]) == WITH_TORQUE else 2

@@ -32,11 +32,11 @@ from aerobat.vehicle.ellipsoid import ENCLOSING, Ellipsoid, about_rotors
 from aerobat.vehicle.hover import mixing_matrix, outside, overloaded, relieved, why_no_hover
 from aerobat.vehicle.rotor import Rotor, rotor_table
 
-_ROUNDING = 1e-9  # [-] relative: inertias are written with a few digits
+_ROUNDING = 1e-9  # [-] relative tolerance: files write inertias with a few digits
 
 
 def _inertia(value: Any) -> Array:
-    """The matrix, of itself or of three principal moments."""
+    """Return the inertia matrix, from itself or from three principal moments."""
     vector = np.ndim(value) == 1 if hasattr(value, "__array__") else not _is_matrix(value)
     return finite(np.diag(finite(value, 3)) if vector else value, 3, 3)
 
@@ -45,8 +45,8 @@ def _inertia(value: Any) -> Array:
 class Vehicle:
     """A multirotor: one rigid body, n >= 4 rotors, linear drag.
 
-    Raises SpecError, naming the field, for what cannot be a vehicle; whether it can hover depends on where,
-    see `require_hover`.
+    Raises SpecError, naming the field, for values that no vehicle can have. Whether the vehicle can hover
+    depends on gravity, see `require_hover`.
     """
 
     name: Label  # left out in a file, the file's
@@ -75,14 +75,14 @@ class Vehicle:
             raise FieldError("drag_body", f"must not be negative, got {self.drag_body.tolist()} kg/s")
         if len(self.rotors) < 4:
             raise FieldError("rotors", f"must be 4 or more, got {len(self.rotors)}")
-        if not self.dead_rotors:  # with some, see `without_dead_rotors`
+        if not self.dead_rotors:  # otherwise see `without_dead_rotors`
             self._check_control()
         if self.body is not None:
             _check_enclosed(self.body, self.rotors)
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Make every rotor, with the keys of `rotor_defaults` that it lacks, about the centre of mass."""
+        """Make every rotor about the centre of mass, with the keys of `rotor_defaults` that it lacks."""
         defaults = table.pop("rotor_defaults", {})
         if not isinstance(defaults, Mapping):
             raise FieldError("rotor_defaults", "must be a table; begin it with [rotor_defaults]")
@@ -103,7 +103,7 @@ class Vehicle:
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write a diagonal inertia as its moments, and once what all rotors share."""
+        """Write a diagonal inertia as its moments, and keys that all rotors share once."""
         if not (self.inertia - np.diag(np.diag(self.inertia))).any():
             table["inertia"] = np.diag(self.inertia).tolist()
         rotors = table.pop("rotors")
@@ -140,8 +140,8 @@ class Vehicle:
 
             T = Σ f_i    Mx = Σ y_i f_i    My = -Σ x_i f_i    Mz = -Σ s_i c_i f_i.
 
-        Mx and My follow from r × f e3 = (y f, -x f, 0), and Mz from the drag torque: a rotor that turns
-        counter-clockwise (s = +1) drives the body clockwise. Sections III and V-C of the paper use such a
+        Mx and My follow from r × f e3 = (y f, -x f, 0). Mz follows from the drag torque: a rotor that spins
+        counter-clockwise (s = +1) turns the body clockwise. Sections III and V-C of the paper use such a
         matrix.
         """
         x, y, _ = np.array([rotor.position_body for rotor in self.rotors]).T
@@ -150,14 +150,14 @@ class Vehicle:
 
     @cached_property
     def mixer(self) -> Array:
-        """The inverse of the allocation by which loads are shared among rotors, (n, 4)."""
+        """The mixing matrix, an inverse of the allocation from loads to rotor thrusts, (n, 4)."""
         rotors = self.allocation, self.min_thrusts, self.max_thrusts
         weight = np.array(self.mass * STANDARD_GRAVITY)
         return frozen(relieved(mixing_matrix(*rotors), *rotors, weight), "mixer")
 
     @cached_property
     def bounding_ellipsoid(self) -> Ellipsoid:
-        """The ellipsoid that encloses vehicle and propellers: `body`, or a flat one about the rotors."""
+        """The ellipsoid that encloses vehicle and propellers: `body`, or else a flat one about the rotors."""
         return about_rotors(self.rotors) if self.body is None else self.body
 
     @property
@@ -168,13 +168,13 @@ class Vehicle:
 
     @cached_property
     def dead_rotors(self) -> tuple[int, ...]:
-        """The numbers of the rotors that give no thrust, counted from 0."""
+        """The indices of the rotors that give no thrust, counted from 0."""
         return tuple(i for i, rotor in enumerate(self.rotors) if rotor.is_dead)
 
     def without_dead_rotors(self) -> Vehicle:
-        """Return the vehicle as it flies: itself, or with those rotors only that give thrust.
+        """Return the vehicle that can be controlled: unchanged, or with its live rotors only.
 
-        Raises SpecError, one sentence that says what can be controlled yet, where they do not suffice.
+        Raises SpecError, one sentence on what can still be controlled, where the live rotors do not suffice.
         """
         if not self.dead_rotors:
             return self
@@ -187,17 +187,17 @@ class Vehicle:
 
     @property
     def max_specific_thrust(self) -> float:
-        """All rotors at full thrust, per mass [m/s²]."""
+        """The maximum specific thrust, all rotors at full thrust over mass [m/s²]."""
         return float(self.max_thrusts.sum()) / self.mass
 
     @property
     def thrust_to_weight(self) -> float:
-        """All rotors at full thrust, in weights on Earth [-]."""
+        """The thrust-to-weight ratio of all rotors at full thrust, with gravity on Earth [-]."""
         return self.max_specific_thrust / STANDARD_GRAVITY
 
     @validated
     def with_thrust_to_weight(self, ratio: Positive) -> Vehicle:
-        """Return the vehicle whose rotors give so many weights together, each its part of them as before."""
+        """Return the vehicle with maximum thrusts scaled by one factor to this thrust-to-weight ratio [-]."""
         factor = ratio / self.thrust_to_weight
         rotors = tuple(replace(rotor, max_thrust=factor * rotor.max_thrust) for rotor in self.rotors)
         return replace(self, rotors=rotors)
@@ -208,7 +208,7 @@ class Vehicle:
             f"{self.name}: {self.mass:.4g} kg, {len(self.rotors)} rotors, thrust-to-weight "
             f"{self.thrust_to_weight:.2f}, inertia ({about_axes}) kg·m²"
         )
-        source = " ".join(self.description.split())  # one line, however it was written
+        source = " ".join(self.description.split())  # on one line, whatever its line breaks
         return f"{facts}; {source}" if source else facts
 
     @validated
@@ -235,13 +235,13 @@ class Vehicle:
             )
 
     def _rank(self) -> int:
-        """Of thrust, roll, pitch and yaw, how many can be had independently."""
+        """Return how many of thrust, roll, pitch and yaw can be controlled independently."""
         allocation = self.allocation * (self.max_thrusts > 0.0)
-        sizes = np.abs(allocation).max(axis=1, keepdims=True)  # rows differ in unit
+        sizes = np.abs(allocation).max(axis=1, keepdims=True)  # rows have different units
         return int(np.linalg.matrix_rank(allocation / np.where(sizes > 0, sizes, 1.0)))
 
     def _what_is_not_controlled(self) -> str:
-        """The complaint about rotors that do not give thrust, roll, pitch and yaw independently."""
+        """Return the message for rotors that cannot control thrust, roll, pitch and yaw independently."""
         must = "must give thrust, roll, pitch and yaw independently"
         axes = {"roll": self.allocation[1], "pitch": self.allocation[2]}
         lost = [name for name, arms in axes.items() if np.ptp(arms) == 0.0]
@@ -261,7 +261,7 @@ class Vehicle:
         )
 
     def _check_control(self) -> None:
-        """Refuse rotors that give no independent control, or no level hover under any gravity."""
+        """Raise FieldError for rotors without independent control, or without any level hover."""
         limits = self.min_thrusts, self.max_thrusts
         rank = self._rank()
         if rank < 4 and not self.dead_rotors:
@@ -275,7 +275,7 @@ def _is_matrix(value: Any) -> bool:
 
 
 def _rotor(table: Any, defaults: Mapping[str, Any], place: str) -> Any:
-    """The rotor of a table and what it lacks. Raises FieldError, naming where the value at fault stands."""
+    """Return the rotor of a table and the defaults. Raises FieldError, naming the place of a wrong value."""
     if not isinstance(table, Mapping):
         return table
     try:
@@ -290,12 +290,12 @@ def _rotor(table: Any, defaults: Mapping[str, Any], place: str) -> Any:
 
 
 def _about(centre: Array, rotor: Any) -> Any:
-    """A rotor placed about the centre of mass."""
+    """Return a rotor with its position relative to the centre of mass."""
     return replace(rotor, position_body=rotor.position_body - centre) if isinstance(rotor, Rotor) else rotor
 
 
 def _check_enclosed(body: Ellipsoid, rotors: Sequence[Rotor]) -> None:
-    """Refuse a body that a propeller sticks out of."""
+    """Raise FieldError for a body that a propeller extends beyond."""
     for i, rotor in enumerate(rotors):
         scale = body.sticking_out(rotor)
         if scale > 1.0 + ENCLOSING:
