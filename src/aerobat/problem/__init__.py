@@ -1,7 +1,7 @@
 """The input of planning: gates, maneuvers as lists of stages, problems. No optimization happens here.
 
-The public names stand in `__init__.pyi`; each is imported when first used: no maneuver waits
-for others.
+The public names are in `__init__.pyi`; each is imported at its first use, so that no maneuver
+loads another.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Conditions on the state at one instant: linear ones, and the attitude, which is where the thrust points."""
+"""Conditions on the state at one instant: linear conditions, and attitudes as directions of thrust."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ConeAngle = Annotated[float, Field(ge=0, lt=1.5, description="number from 0 to 1
 
 
 class Quantity(StrEnum):
-    """The quantity that a condition is about, all in the world frame."""
+    """The quantity that a condition bounds, in the world frame."""
 
     POSITION = "position"  # [m]
     VELOCITY = "velocity"  # [m/s]
@@ -39,13 +39,13 @@ class Quantity(StrEnum):
 
     @property
     def derivative(self) -> int:
-        """The highest derivative of position that the quantity is made of."""
+        """The highest derivative of position on which the quantity depends."""
         return {Quantity.POSITION: 0, Quantity.VELOCITY: 1}.get(self, 2)
 
 
 @dataclass(frozen=True, eq=False)
 class ForceBalance:
-    """The force balance of the thrust, per mass: f = a + g e₃ + d (v − wind), with the drag d across it."""
+    """The force balance over mass: f = a + g e₃ + d (v − wind), with the drag d across the thrust axis."""
 
     gravity: float = STANDARD_GRAVITY  # [m/s²]
     drag: float = 0.0  # [1/s] across the thrust axis, over the mass
@@ -53,11 +53,11 @@ class ForceBalance:
 
     @property
     def constant(self) -> Array:
-        """The part of f [m/s²] that no motion changes, (3,)."""
+        """The part of f [m/s²] that does not depend on the motion, (3,)."""
         return np.asarray(self.gravity * UP - self.drag * self.wind)
 
     def specific_thrust(self, velocity: Array, acceleration: Array) -> Array:
-        """f [m/s²], world, (..., 3), at a velocity relative to the ground and an acceleration."""
+        """Return f [m/s²], world, (..., 3), from the velocity relative to the ground and the acceleration."""
         return np.asarray(acceleration + self.drag * velocity + self.constant)
 
 
@@ -72,27 +72,27 @@ class LinearBound:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """The bounds less the constant: those of the weighted derivatives alone."""
+        """The bounds less the constant: bounds on the weighted derivatives alone."""
         return self.lower - self.constant, self.upper - self.constant
 
     @property
     def derivatives(self) -> tuple[int, ...]:
-        """The derivatives of position that count."""
+        """The derivatives of position with nonzero weights."""
         return tuple(np.flatnonzero(self.weights.any(axis=1)).tolist())
 
     @property
     def scale(self) -> float:
-        """The size of what is bounded, for comparing with others."""
+        """The scale of the bounded value, for comparisons between bounds."""
         if -inf < self.lower < self.upper < inf:
             return self.upper - self.lower
         return max((abs(x) for x in self.limits if abs(x) < inf), default=0.0) or 1.0
 
     def value(self, derivatives: Array) -> Array:
-        """The value bounded, (...), of position, velocity and acceleration (..., 3, 3)."""
+        """Return the bounded value, (...), from position, velocity and acceleration, (..., 3, 3)."""
         return np.asarray(np.sum(self.weights * derivatives, axis=(-2, -1)) + self.constant)
 
     def excess(self, derivatives: Array) -> Array:
-        """By how much the bounds are exceeded, at least zero, (...), of derivatives (..., 3, 3)."""
+        """Return the constraint violation, at least zero, (...), from derivatives (..., 3, 3)."""
         value = self.value(derivatives)
         return np.maximum(np.maximum(self.lower - value, value - self.upper), 0.0)
 
@@ -113,7 +113,7 @@ class Condition:
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"equals": "both bounds at once"}
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check the bounds."""
         if self.lower == -inf and self.upper == inf:
             raise SpecError("needs lower, upper or equals; give one")
         if self.lower > self.upper:
@@ -136,7 +136,7 @@ class Condition:
         return table
 
     def bound(self, balance: ForceBalance) -> LinearBound:
-        """The bound that it puts on position, velocity and acceleration."""
+        """Return the bound on position, velocity and acceleration that the condition implies."""
         weights = np.zeros((3, 3))
         weights[self.quantity.derivative] = self.direction
         constant = 0.0
@@ -147,13 +147,13 @@ class Condition:
 
     @property
     def name(self) -> str:
-        """The quantity that it bounds, in words."""
+        """The bounded quantity, in words."""
         direction = ", ".join(f"{x:.4g}" for x in self.direction)
         return f"{self.quantity.replace('_', ' ')} along ({direction})"
 
     @property
     def range(self) -> str:
-        """The values that it allows, in words."""
+        """The allowed values, in words."""
         if self.lower == self.upper:
             return f"of {self.lower:.4g}"
         if self.upper == inf:
@@ -164,22 +164,22 @@ class Condition:
 
     @property
     def min_thrust(self) -> float:
-        """The least specific thrust [m/s²] that satisfies the condition; zero when it asks none."""
+        """The least specific thrust [m/s²] that satisfies the condition; zero when it requires none."""
         if self.quantity is not Quantity.SPECIFIC_THRUST:
             return 0.0
         return max(self.lower, -self.upper, 0.0) / float(np.linalg.norm(self.direction))
 
 
-THRUST_FRACTION = 0.2  # of the greatest specific thrust: the least along an attitude that names no thrust
-# [m/s²] specific thrust that keeps attitudes at speed: what nobody modelled and the feedback against it come
-# to 4 m/s² across in 95 % of flights under lab, and lean so much thrust by 10°, the usual tolerance
+THRUST_FRACTION = 0.2  # of the maximum specific thrust: the default minimum along an attitude
+# [m/s²] specific thrust that keeps attitudes at speed. Disturbances and feedback against them reach 4 m/s²
+# across in 95 % of flights under `lab`, and tilt this thrust by 10°, the usual tolerance.
 FIRM_THRUST = 22.5
 
 
 def firm_thrust(max_specific_thrust: float) -> float:
     """Return the least specific thrust [m/s²] along an attitude that is kept at speed.
 
-    It is FIRM_THRUST of a vehicle that has so much beside its weight, else a fraction of what it has.
+    This is FIRM_THRUST for a vehicle with that much thrust beyond its weight, else a fraction of its maximum.
     """
     is_strong = max_specific_thrust - STANDARD_GRAVITY >= FIRM_THRUST
     return FIRM_THRUST if is_strong else THRUST_FRACTION * max_specific_thrust
@@ -187,9 +187,9 @@ def firm_thrust(max_specific_thrust: float) -> float:
 
 @declared
 class Attitude:
-    """Thrust along a direction: its axis within a cone about `up`, and so much of it at least.
+    """Thrust along a direction: the thrust axis within a cone about `up`, and a minimum specific thrust.
 
-    Linear conditions hold it in the square pyramid inside the cone, exactly along `up` with no tolerance.
+    The linear conditions describe the square pyramid inside the cone; without tolerance, exactly `up`.
     """
 
     up: UnitVector  # where the thrust points, world
@@ -200,7 +200,7 @@ class Attitude:
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
-        """The linear conditions that hold it."""
+        """The linear conditions of the attitude."""
         along = Condition(Quantity.SPECIFIC_THRUST, self.up, lower=self.min_thrust)
         if self.tolerance == 0.0:
             none = (Condition(Quantity.SPECIFIC_THRUST, axis, 0.0, 0.0) for axis in across(self.up))
@@ -211,18 +211,18 @@ class Attitude:
 
 
 def free() -> Array:
-    """Three components, all of them free: NaN."""
+    """Return three free components: NaN."""
     return np.full(3, np.nan)
 
 
 def fixed(quantity: Quantity, value: Array) -> tuple[Condition, ...]:
-    """Conditions that fix a quantity's components, world, SI units, (3,), but those that are NaN."""
+    """Return conditions that fix a quantity's components, world, SI units, (3,), except NaN components."""
     given = zip(np.eye(3), value.tolist(), strict=True)
     return tuple(Condition(quantity, axis, x, x) for axis, x in given if x == x)
 
 
 def within(directions: Array, middles: Array, margin: float) -> tuple[Condition, ...]:
-    """Position along each of some directions (n, 3) within a margin [m], either way, of a middle [m] (n,)."""
+    """Return conditions: position along directions (n, 3) within a margin [m] of middles [m] (n,)."""
     return tuple(
         Condition(Quantity.POSITION, direction, middle - margin, middle + margin)
         for direction, middle in zip(directions, middles.tolist(), strict=True)
@@ -230,12 +230,12 @@ def within(directions: Array, middles: Array, margin: float) -> tuple[Condition,
 
 
 def thrust_in_plane(direction: Array, axis: Array, minimum: float) -> tuple[Condition, ...]:
-    """Specific thrust along `direction` in the plane normal to `axis`: none across, a minimum along.
+    """Return conditions for thrust in the plane normal to `axis`: zero across `direction`, a minimum along.
 
     Args:
-        direction: where the thrust points, world frame, (3,).
-        axis: normal to the plane that the condition is about, (3,).
-        minimum: least thrust along `direction` [m/s²]; -inf leaves its size and sign free.
+        direction: of the thrust, world frame, (3,).
+        axis: normal of the plane, (3,).
+        minimum: least thrust along `direction` [m/s²]; -inf leaves magnitude and sign free.
     """
     across_it = Condition(Quantity.SPECIFIC_THRUST, unit(np.cross(axis, direction)), 0.0, 0.0)
     if minimum == -inf:
@@ -244,18 +244,18 @@ def thrust_in_plane(direction: Array, axis: Array, minimum: float) -> tuple[Cond
 
 
 def leaning_at_most(direction: Array, axis: Array, angle: float) -> tuple[Condition, ...]:
-    """Specific thrust that leans from `direction` toward `axis`, or away from it, by an angle at most.
+    """Return conditions that limit the angle of the thrust from `direction` toward `axis`, on either side.
 
     Args:
         direction: unit vector, world frame, (3,).
         axis: unit vector normal to it, (3,).
-        angle: less than a right one [rad].
+        angle: largest angle, less than a right one [rad].
     """
     normals = (sign * np.cos(angle) * axis - np.sin(angle) * direction for sign in (1.0, -1.0))
     return tuple(Condition(Quantity.SPECIFIC_THRUST, normal, upper=0.0) for normal in normals)
 
 
 def across(direction: Array) -> tuple[Array, Array]:
-    """Two unit vectors normal to a unit vector and to each other."""
+    """Return two unit vectors normal to a unit vector and to each other."""
     first = unit(np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))]))
     return first, unit(np.cross(direction, first))

@@ -1,4 +1,4 @@
-"""States in which a motion begins and ends."""
+"""The states at the start and the end of a motion."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from aerobat.arrays import Array
 from aerobat.declaration import FieldError, PartialVector, Vector3, VectorLike, declared, validated
 from aerobat.problem.condition import free
 
-VELOCITY = 1  # the derivative of position
+VELOCITY = 1  # order of the derivative of position
 
 
 @declared
 class EndState:
     """The world-frame state in which a trajectory begins or ends; derivatives above acceleration are zero.
 
-    A goal of `free_attitude` may be reached in any attitude, at whatever body rate and thrust, as races end;
-    planners that cannot leave it free take the acceleration. One of `free_velocity` is passed however fast,
-    whatever its direction, and so in any attitude too. A closed course has no ends: both are left out.
+    A goal with `free_attitude` may be reached in any attitude, with any body rate and thrust, as the finish
+    of a race; planners that cannot leave the attitude free use the acceleration. A goal with `free_velocity`
+    may be passed at any velocity, and so in any attitude too. A closed course leaves both ends out.
     """
 
     position: PartialVector = field(default_factory=free)  # [m] world, all of it, but of a closed course
@@ -31,7 +31,7 @@ class EndState:
     free_velocity: bool = False  # of a goal: any velocity will do, and any attitude
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check the position and the velocity."""
         if np.isnan(self.position).any() and not self.is_left_out:
             raise FieldError(
                 "position", "must be a number in all components; give those that are missing or NaN"
@@ -41,31 +41,31 @@ class EndState:
 
     @property
     def is_left_out(self) -> bool:
-        """True of an end that no problem gives, a closed course's."""
+        """True for an end without a position, as of a closed course."""
         return bool(np.isnan(self.position).all())
 
     @property
     def leaves_attitude_free(self) -> bool:
-        """True where any attitude will do."""
+        """True where any attitude is allowed."""
         return self.free_attitude or self.free_velocity
 
     def fixed(self, order: int) -> Array:
-        """The derivatives below `order` that it fixes, of position among them, whole numbers from 0."""
+        """Return the orders of the derivatives below `order` that the end fixes, from 0 (position)."""
         return np.array([k for k in range(order) if k != VELOCITY or not self.free_velocity])
 
     @property
     def asked(self) -> Array:
-        """The derivatives of position, up to acceleration, that a motion must have there: whole numbers."""
+        """The orders of the derivatives of position, up to acceleration, that a motion must match."""
         return self.fixed(2 if self.leaves_attitude_free else 3)
 
     @validated
     def derivatives(self, order: Annotated[int, Field(ge=1, le=100)]) -> Array:
-        """Position and its derivatives below `order`, (order, 3)."""
+        """Return position and its derivatives below `order`, (order, 3)."""
         known = [self.position, self.velocity, self.acceleration]
         return np.array([known[k] if k < len(known) else np.zeros(3) for k in range(order)])
 
 
 @validated
 def at_rest(position: VectorLike) -> EndState:
-    """At rest at `position` [m], (3,)."""
+    """Return the state at rest at `position` [m], (3,)."""
     return EndState(cast(Array, position))

@@ -1,4 +1,4 @@
-"""Problems from TOML and back; the built-in ones are such files too."""
+"""Problems from TOML files and back; the built-in problems are TOML files, too."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def load_problem(name: PathName) -> Problem:
 
 
 def as_problem(problem: Problem | str) -> Problem:
-    """The problem, of itself or of what `load_problem` takes. Raises SpecError as that does."""
+    """Return the problem, given itself or an argument of `load_problem`. Raises SpecError as that does."""
     return load_problem(problem) if isinstance(problem, str) else problem
 
 
 @validated
 def problem_text(name: PathName) -> str:
-    """Return the text of a problem's file: a preset's own, or one's own as it was understood.
+    """Return the text of a problem's file: a preset's own, or another file as understood.
 
     Raises SpecError as `load_problem` does.
     """

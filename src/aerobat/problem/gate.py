@@ -1,4 +1,4 @@
-"""A gate: an opening somewhere in the world, with a direction of passage and an upright."""
+"""A gate: an opening in the world with a direction of passage and an upright direction."""
 
 from __future__ import annotations
 
@@ -37,20 +37,18 @@ from aerobat.problem.opening import Circle, Corners, OpeningShape, Polygon, Rect
 from aerobat.problem.wall import Wall
 
 DEFAULT_SIZE = (1.0, 0.6)  # [m] width and height of a rectangular opening
-MAX_ROWS = 64  # of a path: each is looked at in every tick of a flight
-TOUCHING = 1e-6  # [m] within which frames touch, and neither stands in the other's opening
+MAX_ROWS = 64  # of a path: a flight checks all of them at every tick
+TOUCHING = 1e-6  # [m] tolerance within which frames touch, so that neither intersects the other's opening
 
 
 @declared
 class Gate:
     """An opening that a vehicle passes with its thrust axis along `up`: rectangle, circle or convex polygon.
 
-    An upright gate has up = +z; one that is passed upside down has up = −z; the paper's half-flip
-    gate, tilted by 90°, has up in the horizontal plane (Section II-D). Files give its attitude by angles.
-
-    A polygon's corners are given as who passes upright sees them, in either order around it.
-
-    Raises SpecError when `up` is not normal to `normal`, and for an opening of two kinds.
+    An upright gate has up = +z; a gate that is passed upside down has up = −z; the paper's half-flip
+    gate, tilted by 90°, has up in the horizontal plane (Section II-D). Files give the attitude by angles.
+    A polygon's corners are given as seen in the direction of passage with `up` upward, in either order around
+    it. Raises SpecError when `up` is not normal to `normal`, and for an opening of two kinds.
     """
 
     position: Vector3  # [m] centre of the opening, a place inside of a polygon
@@ -78,7 +76,7 @@ class Gate:
     ANGLES: ClassVar[tuple[str, ...]] = ("heading_deg", "elevation_deg", "tilt_deg")
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check the directions and the opening, and set the default size."""
         if abs(self.normal @ self.up) > 1e-6:
             raise FieldError("up", "must be normal to normal, the direction of passage")
         if len(self.path) > MAX_ROWS:
@@ -97,7 +95,7 @@ class Gate:
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace the angles by `normal` and `up`, which are given instead of them or not at all."""
+        """Replace angles by `normal` and `up`; angles may not be given beside these."""
         if isinstance(table.get("wall"), bool):
             table["wall"] = Wall() if table["wall"] else None
         if "diameter" in table:
@@ -113,7 +111,7 @@ class Gate:
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write `normal` and `up` as angles where those say exactly the same."""
+        """Write `normal` and `up` as angles where the angles reproduce them exactly."""
         for key, size in zip(("width", "height"), DEFAULT_SIZE, strict=True):
             if table.get(key) == size:
                 del table[key]
@@ -130,16 +128,16 @@ class Gate:
 
     @cached_property
     def motion(self) -> ObstacleMotion | None:
-        """The motion from where it is at first; None for what stands still."""
+        """The gate's motion, relative to its initial place; None for a gate that does not move."""
         return ObstacleMotion.of(self.velocity, self.path)
 
     def places(self, times: Array) -> Array:
-        """Return where the opening's centre is [m] at times (...), (..., 3)."""
+        """Return the position of the opening's centre [m] at times (...), (..., 3)."""
         moved = 0.0 if self.motion is None else self.motion.moved(times)
         return np.asarray(np.broadcast_to(self.position + moved, (*times.shape, 3)))
 
     def at(self, time: float) -> Gate:
-        """Return the gate where it is at a time [s], standing still."""
+        """Return the gate at its place at a time [s], without motion."""
         if self.motion is None:
             return self
         place = self.places(np.array(time))
@@ -147,12 +145,12 @@ class Gate:
 
     @cached_property
     def lateral(self) -> Array:
-        """The unit vector across the opening, to the left of who passes upright, (3,)."""
+        """The unit vector across the opening, to the left in the direction of passage, (3,)."""
         return unit(np.cross(self.up, self.normal))
 
     @cached_property
     def opening(self) -> OpeningShape:
-        """The opening's shape in its plane, by points (left, up)."""
+        """The shape of the opening in its plane, in coordinates (left, up)."""
         if self.polygon is not None:
             return Polygon(self.polygon)
         if self.radius is not None:
@@ -161,33 +159,33 @@ class Gate:
 
     @property
     def plane_axes(self) -> Array:
-        """Left and up of the opening in the world, (2, 3)."""
+        """The unit vectors left and up of the opening in the world, (2, 3)."""
         return np.array([self.lateral, self.up])
 
     @property
     def outline(self) -> Array:
-        """Points around the opening in the world [m], in order, a rectangle's corners, (K, 3)."""
+        """Points around the opening in the world [m], in order; the corners of a rectangle; (K, 3)."""
         return self.position + self.opening.outline @ self.plane_axes
 
     def frame(self, thickness: float) -> Array:
-        """The outer corners in the world [m] of a frame so thick, one beside each of `outline`, (K, 3)."""
+        """Return a frame's outer corners [m] for a thickness [m], one for each point of `outline`, (K, 3)."""
         return self.position + self.opening.frame(thickness) @ self.plane_axes
 
     def plane_around(self, border: float) -> tuple[ConvexPiece, ...]:
-        """The gate's plane around the opening as far as a border [m], where a body touches the frame."""
+        """Return the gate's plane around the opening up to a border [m], where a body hits the frame."""
         return _around(self, Wall(border), f"the frame of {self.name}", np.zeros(1))
 
     @cached_property
     def solid(self) -> Obstacle | None:
-        """The wall around the opening, as an obstacle; None where there is none."""
+        """The wall around the opening as an obstacle; None where there is no wall."""
         return None if self.wall is None else GateWall(self, velocity=self.velocity, path=self.path)
 
     def resized(self, across: float, up: float) -> Gate:
-        """Return the gate, its opening scaled by `across` and `up`; any but a rectangle by the smaller."""
+        """Return the gate with its opening scaled by `across` and `up`; by the smaller unless a rectangle."""
         return replace(self, **self.opening.fields(across, up))
 
     def stands_in(self, other: Gate) -> bool:
-        """True if a side of its opening, where its frame is, passes through the other's opening."""
+        """Return True if an edge of this opening, where the frame is, intersects the other gate's opening."""
         points = (self.outline - other.position) @ np.array([other.lateral, other.up, other.normal]).T
         last = np.roll(points, 1, axis=0)
         height, last_height = points[:, 2:], last[:, 2:]
@@ -215,16 +213,16 @@ class Gate:
 
 @by_value
 class GateWall(Obstacle):
-    """The wall of a gate: a piece beside each side of the polygon that planners take for its opening.
+    """The wall of a gate: a convex piece beside each side of the polygon that approximates the opening.
 
-    The pieces lie over one another, and leave the opening free.
+    The pieces overlap one another, and leave the opening free.
     """
 
     gate: Gate
 
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
-        """The parts of the wall that lie beyond each side."""
+        """The parts of the wall beside each side of the opening."""
         wall = self.gate.wall or Wall()
         sides = wall.thickness / 2.0 * np.array([-1.0, 1.0])
         return _around(self.gate, wall, f"the wall of {self.gate.name}", sides)
@@ -249,8 +247,9 @@ def tilted_gate(
         position: centre of the opening [m], world, (3,).
         heading: of the direction of passage [rad], from x toward y.
         elevation: climb of the direction of passage [rad].
-        tilt: roll about the direction of passage [rad], right-handed: 0 upright, π/2 with its upright to the
-            right of who passes, π upside down. The paper's α (Section II-D) is measured toward +y when
+        tilt: roll about the direction of passage [rad], right-handed: 0 upright, π/2 with `up` to the right
+        in
+            the direction of passage, π upside down. The paper's α (Section II-D) is measured toward +y when
             passing toward +x: α = −tilt.
         width: of a rectangular opening [m], by default 1.
         height: of a rectangular opening [m], by default 0.6.
@@ -266,14 +265,14 @@ def tilted_gate(
 
 
 def at_centre(gate: Gate) -> tuple[Condition, ...]:
-    """Meeting the centre of a gate's opening."""
+    """Return conditions that fix the position at the centre of a gate's opening."""
     return fixed(Quantity.POSITION, gate.position)
 
 
 def in_opening(gate: Gate, clearance: float) -> tuple[Condition, ...]:
-    """Meeting a gate's opening anywhere at a clearance [m] from its edges.
+    """Return conditions for a position anywhere in a gate's opening, at a clearance [m] from its edges.
 
-    Where the opening is too narrow for that, in the middle between the edges that are too near.
+    Where the opening is too narrow for that, the position is fixed in the middle between the edges.
     """
     in_plane = float(gate.normal @ gate.position)
     bounds = gate.opening.at_clearance(clearance)
@@ -291,7 +290,7 @@ def in_opening(gate: Gate, clearance: float) -> tuple[Condition, ...]:
 
 
 def passed_gate(gates: Sequence[Gate], name: str | None, maneuver: str) -> Gate:
-    """Return the gate of that name or, without one, the only gate. Raises SpecError where it is not there."""
+    """Return the gate of that name or, without a name, the only gate. Raises SpecError if there is none."""
     if name is not None:
         return named_gate(gates, name)
     if len(gates) != 1:
@@ -303,7 +302,7 @@ def passed_gate(gates: Sequence[Gate], name: str | None, maneuver: str) -> Gate:
 
 
 def named_gate(gates: Sequence[Gate], name: str) -> Gate:
-    """The gate of that name. Raises SpecError when there is none."""
+    """Return the gate of that name. Raises SpecError when there is none."""
     for gate in gates:
         if gate.name == name:
             return gate
@@ -311,7 +310,7 @@ def named_gate(gates: Sequence[Gate], name: str) -> Gate:
 
 
 def _around(gate: Gate, wall: Wall, name: str, heights: Array) -> tuple[ConvexPiece, ...]:
-    """The parts of a wall that lie beyond each side of a gate's opening, at heights [m] above its plane."""
+    """Return the parts of a wall beside each side of a gate's opening, at heights [m] above its plane."""
     levels = gate.position + np.multiply.outer(heights, gate.normal)[:, None]
     parts = wall.parts(gate.opening)
     return tuple(
@@ -321,7 +320,7 @@ def _around(gate: Gate, wall: Wall, name: str, heights: Array) -> tuple[ConvexPi
 
 
 def _half(diameter: Any) -> float:
-    """The radius of a diameter [m]. Raises FieldError for one that is none."""
+    """Return the radius for a diameter [m]. Raises FieldError for an invalid diameter."""
     whole = number(diameter, "diameter")
     if whole <= 0.0:
         raise FieldError("diameter", f"must be a positive number, got {whole:g}")
@@ -329,6 +328,6 @@ def _half(diameter: Any) -> float:
 
 
 def _directions(heading: float, elevation: float, tilt: float) -> tuple[Array, Array]:
-    """The direction of passage and the upright, unit vectors, (3,) each, for angles [rad]."""
+    """Return the direction of passage and the upright, unit vectors, (3,) each, for angles [rad]."""
     frame = axes_of(heading, elevation, tilt)
     return frame[:, 0], frame[:, 2]

@@ -30,15 +30,15 @@ from aerobat.so3 import UP
 from aerobat.states import FlatState
 from aerobat.trajectory import minimum_effort
 
-AT_POINT = 0.1  # [m] within which a point has no direction to speak of
-SLOW = 0.5  # [m/s] below which a velocity has none
+AT_POINT = 0.1  # [m] distance from the point below which its direction is unreliable
+SLOW = 0.5  # [m/s] speed below which the direction of velocity is unreliable
 
 
 class HeadingMode(StrEnum):
-    """Modes of a heading, by what it follows."""
+    """Modes of a heading, by the reference that it follows."""
 
-    FREE = "free"  # nothing: it is carried along without spin
-    FIXED = "fixed"  # the start's
+    FREE = "free"  # no reference: the heading is carried along without spin
+    FIXED = "fixed"  # the heading at the start
     TOWARDS = "towards"  # a point
     VELOCITY = "along-velocity"
     SPLINE = "spline"  # angles at fractions of the duration
@@ -65,9 +65,9 @@ Knots = Annotated[
 class Heading:
     """The direction of the body's x axis along the path, as a turn about the thrust axis.
 
-    A heading is an angle about the thrust axis from where the smallest rotation from upright would leave the
-    body's x axis. A plan follows it as closely as the rotors allow, and turns smoothly where there is no
-    direction to follow: upside down, beside the point, or without a velocity.
+    A heading is an angle about the thrust axis, measured from the x axis that results from the smallest
+    rotation from upright. A plan follows the reference as closely as the rotors allow. It turns smoothly
+    where the reference has no direction: upside down, near the point, or at low speed.
     """
 
     start: Angle = 0.0  # [rad] about the thrust axis at the start
@@ -78,7 +78,7 @@ class Heading:
     tolerance_deg: Limit = inf  # [deg] that the heading of a plan may be off where it is asked
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check that point and knots belong to the mode."""
         for name, mode, given in (
             ("point", HeadingMode.TOWARDS, not np.isnan(self.point).any()),
             ("knots_deg", HeadingMode.SPLINE, len(self.knots_deg) > 0),
@@ -92,16 +92,16 @@ class Heading:
             raise FieldError("knots_deg", f"{begin}; give both alike, or leave that row out")
 
     def __float__(self) -> float:
-        """The start [rad]."""
+        """Return the heading at the start [rad]."""
         return self.start
 
     def reference_axes(self, fractions: Array, flat: FlatState, b3: Array) -> Array:
-        """Reference directions of the body's x axis, world, (T, 3); their lengths, 0 to 1, are weights.
+        """Return reference directions of the body's x axis, world, (T, 3), with lengths 0 to 1 as weights.
 
         Args:
             fractions: Of the duration that have passed, (T,).
-            flat: The motion then.
-            b3: The thrust axis then, (T, 3).
+            flat: The motion at these instants.
+            b3: The thrust axes at these instants, (T, 3).
         """
         upright = (1.0 + b3[:, 2:]) / 2.0
         if self.mode is HeadingMode.TOWARDS:
@@ -113,7 +113,7 @@ class Heading:
         return upright * so3.rotate(so3.smallest_rotation(UP, b3), level)
 
     def _angles(self, fractions: Array) -> Array:
-        """The headings [rad] of a spline through the knots, which begins and ends at rest."""
+        """Return the headings [rad] of a minimum-effort spline through the knots, at rest at both ends."""
         rows = self.knots_deg[self.knots_deg[:, 0] > 0.0]
         if not len(rows):
             return np.full(len(fractions), self.start)
@@ -126,7 +126,7 @@ class Heading:
 
 
 def as_heading(value: object) -> Heading:
-    """A heading, of itself, of a table, or of the angle [rad] that it begins with."""
+    """Return a heading, from itself, a table, or the initial angle [rad]."""
     if isinstance(value, Heading):
         return value
     if isinstance(value, Mapping):
@@ -138,5 +138,5 @@ def as_heading(value: object) -> Heading:
 
 
 def _softened(vectors: Array, small: float) -> Array:
-    """Vectors (T, 3) of length one, less where they are not much longer than `small`."""
+    """Return unit vectors along vectors (T, 3), shortened where these are not much longer than `small`."""
     return np.asarray(vectors / np.sqrt(np.sum(vectors**2, axis=-1, keepdims=True) + small**2))

@@ -1,4 +1,4 @@
-"""Bounds that a problem asks of a path, and the names and units of position's derivatives."""
+"""Limits of a problem on its path, and the names and units of position's derivatives."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ class Limits:
     SHORTHANDS: ClassVar[Mapping[str, str]] = {"max_tilt_deg": "[deg] `max_tilt` in degrees"}
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check the corners."""
         if not (self.lower < self.upper).all():
             raise FieldError("lower", "must be below upper on every axis")
 
     @validated
     def of(self, derivative: Derivative) -> tuple[Array, Array]:
-        """The lower and upper bounds of a derivative of position, each (3,)."""
+        """Return the lower and upper bounds of a derivative of position, each (3,)."""
         if derivative == 0:
             return self.lower, self.upper
         bound = np.asarray(getattr(self, DERIVATIVES[derivative]))
@@ -53,16 +53,16 @@ class Limits:
 
     @validated
     def without(self, derivative: Derivative) -> Limits:
-        """Return the limits without those on one derivative."""
+        """Return the limits without the bounds on one derivative."""
         if derivative == 0:
             return replace(self, lower=np.full(3, -np.inf), upper=np.full(3, np.inf))
         bounds: dict[str, Any] = {DERIVATIVES[derivative]: np.inf}
         return replace(self, **bounds)
 
     def tightened(self, derivative: int, below: Array, above: Array) -> Limits:
-        """Return the limits, one derivative's tighter: lower ends by `below`, upper ones by `above`.
+        """Return the limits with one derivative tightened: `below` at its lower, `above` at its upper bound.
 
-        Raises SpecError when nothing is left between them.
+        Raises SpecError when no room is left between them.
         """
         if derivative == 0:
             return replace(self, lower=self.lower + below, upper=self.upper - above)

@@ -1,4 +1,4 @@
-"""Gates and waypoints at their instants: what a certificate and a flight are held to."""
+"""Gates and waypoints at planned instants, by which certificate and flights are judged."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.gate import Gate
 from aerobat.problem.stage import PARALLEL, Stage
 
-CROSSING_SPEED = 1e-3  # [m/s] a path that is slower in the gate's plane does not cross it
-PASSAGE_DEPTH = 0.05  # [m] beyond the plane, where who crosses it has not merely stopped in it
+CROSSING_SPEED = 1e-3  # [m/s] a slower path moves in the gate's plane and does not cross it
+PASSAGE_DEPTH = 0.05  # [m] beyond the plane, from which a vehicle has crossed and not merely stopped in it
 
 
 @declared
@@ -28,7 +28,7 @@ class PlannedPassage:
 
     @classmethod
     def of(cls, stage: Stage, gate: Gate, time: float) -> PlannedPassage:
-        """The passage that a stage of `Problem.stages` asks for, placed at a time [s]."""
+        """Return the passage that a stage of `Problem.stages` requires, placed at a time [s]."""
         min_speed = 0.0 if any(_keeps_from(gate, each) for each in stage.conditions) else CROSSING_SPEED
         up, tolerance = gate.up, np.inf
         if stage.attitude is not None:
@@ -47,7 +47,7 @@ class PlannedWaypoint:
 
 
 def _keeps_from(gate: Gate, condition: Condition) -> bool:
-    """True if a condition forbids to move in the gate's direction."""
+    """Return True if a condition forbids motion in the gate's direction."""
     along = float(condition.direction @ gate.normal)
     forward = condition.upper if along > 0 else -condition.lower
     return condition.quantity is Quantity.VELOCITY and abs(along) > PARALLEL and forward <= 0

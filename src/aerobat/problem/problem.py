@@ -41,8 +41,8 @@ from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver
 from aerobat.problem.stage import StageSequence
 from aerobat.problem.tolerance import Tolerance
 
-ROUNDING = 1e-9  # of a bound's size
-MIN_PLACES = 2  # of a closed course: between fewer there is no way
+ROUNDING = 1e-9  # [-] tolerance relative to the scale of a bound
+MIN_PLACES = 2  # fewest places of a closed course
 
 
 def _file_name(name: str) -> str:
@@ -55,8 +55,8 @@ def _file_name(name: str) -> str:
 class Problem:
     """A maneuver between two states, or a closed course, free of any vehicle.
 
-    Raises SpecError when an end lies outside the limits or contradicts what the maneuver asks throughout, is
-    missing or given to a closed course, or the maneuver lacks its gate.
+    Raises SpecError when an end lies outside the limits or contradicts a path constraint of the maneuver, is
+    missing, or is given for a closed course, and when the maneuver lacks its gate.
     """
 
     name: Annotated[Label, AfterValidator(_file_name)]  # left out in a file, the file's
@@ -77,7 +77,7 @@ class Problem:
     }
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check gates, ends, limits, obstacles and stages for contradictions."""
         names = [gate.name for gate in self.gates]
         for i, name in enumerate(names):
             if name in names[:i]:
@@ -103,7 +103,7 @@ class Problem:
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Replace the shorthands. Raises FieldError for a file that ends before its maneuver."""
+        """Replace the shorthands. Raises FieldError for a file without a maneuver."""
         if "maneuver" not in table:
             raise FieldError("maneuver", "is missing; add it")
         if "gate" in table:
@@ -119,7 +119,7 @@ class Problem:
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the heading in degrees where those say exactly the same; what is short comes first."""
+        """Write the heading in degrees where that reproduces it exactly; short entries come first."""
         table.setdefault("maneuver", to_table(self.maneuver))
         heading = table.get("heading", {})
         angle = in_degrees({"heading": heading["start"]}, "heading") if "start" in heading else {}
@@ -129,7 +129,7 @@ class Problem:
         return table
 
     def _check_given_ends(self, sequence: StageSequence) -> None:
-        """Refuse an end that is missing, and of a closed course what gives it one."""
+        """Raise FieldError for a missing end, and for closed courses with ends, times, holds or motion."""
         for end, state in (("start", self.start), ("goal", self.goal)):
             if not sequence.closed and state.is_left_out:
                 raise FieldError(f"{end}.position", "is missing; add it")
@@ -166,7 +166,7 @@ class Problem:
             self._check_point(f"gates[{i}].position", gate.position, 0)
 
     def _check_clear_of_obstacles(self) -> None:
-        """Refuse ends and gates whose middle lies in an obstacle."""
+        """Raise FieldError for ends and gate centres inside an obstacle."""
         pieces = self.surroundings.pieces.still
         places = {f"{end}.position": state.position for end, state in self.ends.items()}
         places |= {f"gates[{i}].position": gate.position for i, gate in enumerate(self.gates)}
@@ -176,7 +176,7 @@ class Problem:
                 raise FieldError(field_name, f": it lies in {found.name}, an obstacle; move one of them")
 
     def _check_place(self, stage: str, condition: Condition) -> None:
-        """Refuse a condition on one axis's position that the limits, or the ground, leave no room for."""
+        """Raise FieldError for a condition on one axis's position outside the limits or below the ground."""
         lower, upper = self.path_limits.of(0)
         for axis, along, low, high in zip("xyz", condition.direction.tolist(), lower, upper, strict=True):
             if abs(along) == np.linalg.norm(condition.direction):
@@ -189,7 +189,7 @@ class Problem:
                     )
 
     def _check_ends(self, number: int, condition: Condition) -> None:
-        """Refuse ends that contradict what holds throughout; drag, of a vehicle unknown here, is left out."""
+        """Raise FieldError for ends that violate a path constraint; drag is unknown here and left out."""
         balance = ForceBalance(self.environment.gravity)
         for end, state in self.ends.items():
             bound = condition.bound(balance)
@@ -209,7 +209,7 @@ class Problem:
                 )
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line with the course and its ends."""
         course = self.maneuver.in_words(self.gates)
         if self.ends:
             start, goal = (
@@ -236,12 +236,12 @@ class Problem:
 
     @property
     def ends(self) -> Mapping[str, EndState]:
-        """The start and the goal by these names; empty for a closed course, which ends as it begins."""
+        """The start and the goal by these names; empty for a closed course, which has no ends."""
         return {} if self.start.is_left_out else {"start": self.start, "goal": self.goal}
 
     @property
     def path_limits(self) -> Limits:
-        """The limits, and the ground below."""
+        """The limits, with the ground as a lower limit of height."""
         ground = self.environment.ground
         if ground is None:
             return self.limits
@@ -256,15 +256,15 @@ class Problem:
 
     @validated
     def stages(self, max_specific_thrust: Positive, body_radius: NonNegative = 0.0) -> StageSequence:
-        """The maneuver's stages through the problem's gates, for a vehicle of such thrust and size.
+        """Return the maneuver's stages through the problem's gates, for a vehicle of this thrust and size.
 
-        All that a stage asks is among its conditions, where it is and its attitude too, but for its ball:
-        `StageSequence.linear` has a polytope in that among them.
+        Each stage's requirements, its place and attitude included, are among its conditions. Only its ball is
+        not; `StageSequence.linear` adds a polytope inside the ball.
 
         Args:
-            max_specific_thrust: That the vehicle has [m/s²].
-            body_radius: Of the vehicle's body about its centre of mass [m], which is kept from the edges of
-                openings that are crossed anywhere.
+            max_specific_thrust: Of the vehicle [m/s²].
+            body_radius: Of the vehicle's body about its centre of mass [m], the clearance from the edges of
+                openings with a free crossing point.
 
         Raises:
             SpecError: Gates do not suit the maneuver.
@@ -273,11 +273,11 @@ class Problem:
 
     @validated
     def gate(self, name: str) -> Gate:
-        """The gate of that name. Raises SpecError when there is none."""
+        """Return the gate of that name. Raises SpecError when there is none."""
         return named_gate(self.gates, name)
 
     def as_in_paper(self) -> Problem:
-        """The same problem as the paper formulates it, with the reference code's limits and ε."""
+        """Return the problem as the paper formulates it, with the reference code's limits and ε."""
         return replace(self, maneuver=self.maneuver.as_in_paper(), limits=PAPER_LIMITS)
 
 
@@ -288,7 +288,7 @@ def _explicit_stages(
     max_specific_thrust: float,
     body_radius: float,
 ) -> StageSequence:
-    """As `Problem.stages`, kept: planner, certificate and score each ask for the same."""
+    """Return what `Problem.stages` returns, cached: planner, certificate and score need the same stages."""
     try:
         return _explicit(maneuver, maneuver.stage_sequence(gates, max_specific_thrust), gates, body_radius)
     except SpecError as error:
@@ -300,7 +300,7 @@ def _explicit_stages(
 def _explicit(
     maneuver: Maneuver, sequence: Any, gates: tuple[Gate, ...], body_radius: float
 ) -> StageSequence:
-    """Return a maneuver's sequence with all that its stages ask spelled out."""
+    """Return a maneuver's sequence with explicit conditions in all stages."""
     if not isinstance(sequence, StageSequence):
         complaint = f"returned {shown(sequence)} from stage_sequence(), not a StageSequence"
         raise SpecError(f"maneuver '{maneuver.kind}' {complaint}")

@@ -1,4 +1,4 @@
-"""Stages: conditions that hold together at one instant; a maneuver is a sequence of them."""
+"""Stages: sets of conditions that hold together at one instant; a maneuver is a sequence of stages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from aerobat.problem.gate import Gate, at_centre, in_opening, named_gate
 
 
 def _crossing_time(value: Any) -> Any:
-    """The value, a window as a tuple. Raises FieldError for what is no time."""
+    """Return the value, a window as a tuple. Raises FieldError for an invalid time."""
     window = value if isinstance(value, list | tuple) else (value,)
     numbers = all(isinstance(x, int | float) and not isinstance(x, bool) for x in window)
     if value == "free" or (numbers and len(window) == 1 and 0.0 < window[0] < 1.0):
@@ -30,31 +30,31 @@ def _crossing_time(value: Any) -> Any:
     return float(window[0]), float(window[1])
 
 
-# [-] when a stage holds, as a part of the duration: anywhere, between two fractions of it, or at one
+# [-] fraction of the duration at which a stage holds: free, within a window, or fixed
 CrossingTime = Annotated[
     Literal["free"] | float | tuple[float, float],
     PlainValidator(_crossing_time),
     Field(description='`"free"`, a fraction of the duration between 0 and 1, or two that rise, a window'),
 ]
-# where in a gate's opening it is crossed: at its centre, or anywhere
+# where a gate's opening is crossed: at its centre, or anywhere
 CrossingPoint = Literal["centre", "free"]
-MIN_CROSSING_SPEED = 1.0  # [m/s] through a gate, where nothing else is asked: who stands still may turn back
-PARALLEL = 1e-6  # [-] a direction with less of a gate's normal lies in the gate's plane
-PLANNED_SHARE = 0.5  # of a gate's tolerance of attitude: the plan's
+MIN_CROSSING_SPEED = 1.0  # [m/s] default least speed through a gate: a vehicle at rest could turn back
+PARALLEL = 1e-6  # [-] a direction with a smaller component along a gate's normal is in the gate's plane
+PLANNED_SHARE = 0.5  # [-] fraction of a gate's attitude tolerance for the plan; the rest is for tracking
 ROUNDING = 1e-9  # [-] of an interval
-MOST_INTERVALS = 100  # one of them ends in every window of a hundredth of the duration
+MOST_INTERVALS = 100  # every window of a hundredth of the duration contains the end of an interval
 
 
 @declared
 class Stage:
-    """Conditions that hold together at one instant, which the search chooses where `at` leaves it a choice.
+    """Conditions that hold together at one instant, which the planner chooses within the freedom of `at`.
 
-    A fraction fixes it to the last interval that ends by then, or `interval_offset` intervals after that
-    one. `gate` names the gate that it passes, whose centre it meets in its direction of passage, at
-    `min_speed` or faster, with the thrust axis along its upright where `min_upright_thrust` is given, or as
-    `attitude` says: within half the gate's tolerance, at most, the rest is left to the flight. With a free
-    `crossing_point` it meets the opening anywhere, the vehicle's body and a `margin` away from its edges. A
-    `ball` is a place beside any gate that it meets within a radius.
+    A fraction fixes the stage to the last interval that ends by then, or to `interval_offset` intervals
+    later. `gate` names the gate that the stage passes: at its centre, in its direction of passage, at
+    `min_speed` or faster. The thrust axis is along the gate's upright if `min_upright_thrust` is given, or as
+    `attitude` says, within at most half the gate's tolerance; the rest is left for tracking errors. With a
+    free `crossing_point` the opening is crossed anywhere, at a distance of the vehicle's body and a `margin`
+    from its edges. A `ball` is a place, not at a gate, that is met within a radius.
     """
 
     name: Label  # shown in reports and pictures
@@ -74,7 +74,7 @@ class Stage:
     hold: NonNegative = 0.0  # [s] at rest at the position that `conditions` fix
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check that the fields fit together."""
         check_crossing(self.gate, self.crossing_point, self.margin, self.min_speed)
         if self.ball is not None and self.gate is not None:
             raise FieldError("ball", "stands beside gate, which says where; give one of them")
@@ -88,7 +88,7 @@ class Stage:
 
     @property
     def place(self) -> Array:
-        """The components of the position that its own conditions fix [m], the others NaN, (3,)."""
+        """The components of the position that the stage's own conditions fix [m], the others NaN, (3,)."""
         place = np.full(3, np.nan)
         for c in self.conditions:
             along = c.direction != 0.0
@@ -98,37 +98,38 @@ class Stage:
 
     @property
     def where(self) -> tuple[Condition, ...]:
-        """The conditions on its position, of its ball those of the cube about that."""
+        """The conditions on the stage's position; for a ball, those of the enclosing cube."""
         enclosing = () if self.ball is None else self.ball.circumscribed
         return tuple(c for c in (*self.conditions, *enclosing) if c.quantity is Quantity.POSITION)
 
     @property
     def is_placed(self) -> bool:
-        """True if it says where it is, along all axes."""
+        """True if the stage has conditions on the position along all axes."""
         return len(self.where) >= 3
 
     def centre(self, gates: Sequence[Gate]) -> Array | None:
-        """The centre of the gate that it passes, or of its ball [m], (3,); None where it has neither."""
+        """Return the centre of the stage's gate or ball [m], (3,); None where it has neither."""
         if self.gate is not None:
             return named_gate(gates, self.gate).position
         return None if self.ball is None else self.ball.centre
 
     def position(self, gates: Sequence[Gate]) -> Array:
-        """The centre of its gate or ball, else what its conditions fix [m], NaN where nothing does, (3,)."""
+        """Return the centre of gate or ball, else the fixed position [m], NaN where it is free, (3,)."""
         centre = self.centre(gates)
         return self.place if centre is None else centre
 
     @property
     def window(self) -> tuple[float, float]:
-        """The earliest and the latest instant at which it may hold, as fractions of the duration."""
+        """The earliest and the latest instant at which the stage may hold, as fractions of the duration."""
         if isinstance(self.at, tuple):
             return self.at
         return (0.0, 1.0) if self.at == "free" else (self.at, self.at)
 
     def slots(self, intervals: int) -> range:
-        """The intervals, counted from 0, at whose ends it may hold when there are so many; never the last.
+        """Return the intervals, counted from 0, at whose ends the stage may hold; never the last interval.
 
-        Empty where a fraction fixes it outside them, or a window holds no interval's end.
+        The range is empty where a fraction fixes the stage outside them, or a window contains no interval's
+        end.
         """
         first, last = self.window
         if first == last:
@@ -139,17 +140,17 @@ class Stage:
 
     @property
     def linear(self) -> Stage:
-        """The stage with a polytope in its ball, if it has one, among its conditions."""
+        """The stage with the conditions of a polytope inside its ball, if it has a ball."""
         return (
             self if self.ball is None else replace(self, conditions=(*self.ball.inscribed, *self.conditions))
         )
 
     def explicit(self, gate: Gate | None = None, body_radius: float = 0.0) -> Stage:
-        """Return the stage at its gate: among its conditions is all that it asks, but its ball.
+        """Return the stage with explicit conditions for all that it requires at its gate, except its ball.
 
         Args:
-            gate: Its gate.
-            body_radius: Of the vehicle's body [m], kept from the edges of an opening.
+            gate: The stage's gate.
+            body_radius: Of the vehicle's body [m], the clearance from the edges of an opening.
         """
         attitude = self.attitude
         if gate is not None:
@@ -168,7 +169,7 @@ class Stage:
         return replace(self, conditions=conditions, min_upright_thrust=None, attitude=attitude)
 
     def _moving_through(self, gate: Gate) -> tuple[Condition, ...]:
-        """The speed in the gate's direction that is asked beside the stage's own conditions."""
+        """Return the condition on the speed along the gate's direction, unless the stage's own replace it."""
         along = (abs(c.direction @ gate.normal) for c in self.conditions if c.quantity is Quantity.VELOCITY)
         default = 0.0 if any(part > PARALLEL for part in along) else MIN_CROSSING_SPEED
         speed = default if self.min_speed is None else self.min_speed
@@ -178,7 +179,7 @@ class Stage:
 def check_crossing(
     gate: str | None, crossing_point: CrossingPoint, margin: float, min_speed: float | None
 ) -> None:
-    """Refuse what needs a gate where there is none, and a margin of a centre. Raises FieldError."""
+    """Raise FieldError for fields that need a gate without a gate, and for a margin at a fixed centre."""
     if crossing_point == "free" and gate is None:
         raise FieldError("crossing_point", "needs gate, whose opening is meant; name it")
     check_margin(crossing_point, margin)
@@ -187,16 +188,17 @@ def check_crossing(
 
 
 def check_margin(crossing_point: CrossingPoint, margin: float) -> None:
-    """Refuse a margin where the crossing point is not free. Raises FieldError."""
+    """Raise FieldError for a margin where the crossing point is not free."""
     if margin > 0.0 and crossing_point != "free":
         raise FieldError("margin", 'needs crossing_point = "free": a centre has no margin; give both')
 
 
 @declared
 class StageSequence:
-    """A maneuver made explicit: its stages, what holds throughout, and whether order counts.
+    """A maneuver's stages, its path constraints, and whether the stages are ordered.
 
-    One that is `closed` ends as it begins, in flight, half-way in time from its last stage to its first.
+    A `closed` sequence is periodic: its last stage is followed by its first, with half of the time between
+    them before the end and half after the start.
     """
 
     stages: tuple[Stage, ...] = ()
@@ -206,19 +208,19 @@ class StageSequence:
 
     @property
     def linear(self) -> StageSequence:
-        """The sequence with a polytope in each ball among the conditions, for planners that hold these."""
+        """The sequence with a polytope inside each ball among the conditions, for linear planners."""
         return replace(self, stages=tuple(stage.linear for stage in self.stages))
 
     @property
     def asks_thrust(self) -> bool:
-        """True if a stage asks where the thrust points, or how much there is."""
+        """True if a stage has a condition on the direction or the magnitude of the thrust."""
         conditions = (condition for stage in self.stages for condition in stage.conditions)
         return any(condition.quantity is Quantity.SPECIFIC_THRUST for condition in conditions)
 
     def intervals_from(self, least: int) -> int:
-        """Return the fewest intervals, from `least` on, of which one ends in the window of each stage.
+        """Return the fewest intervals, at least `least`, of which one ends in the window of each stage.
 
-        Where so many would be more than MOST_INTERVALS, it is `least`.
+        Where more than MOST_INTERVALS would be needed, `least` is returned.
         """
         tried = range(least, max(least, MOST_INTERVALS) + 1)
         return next((n for n in tried if all(stage.slots(n) for stage in self.stages)), least)

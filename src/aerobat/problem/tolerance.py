@@ -1,4 +1,4 @@
-"""Tolerances by which flights are judged where neither a gate nor a radius says how exact they must be."""
+"""Tolerances by which flights are judged where neither a gate nor a radius sets the tolerance."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from aerobat.problem.condition import ConeAngle
 
 @declared
 class Tolerance:
-    """Largest errors of a flight that went well, where neither a gate nor a radius says how exact it must be.
+    """Largest errors of a successful flight, where neither a gate nor a radius sets the tolerance.
 
-    The position counts at the goal, at stages that say where they are, and, where no gate or radius is asked,
-    along the whole path. The attitude is that of the thrust axis, and counts at stages that ask for one.
+    The position is checked at the goal, at stages with a place and, if the problem has no gate or radius,
+    along the whole path. The attitude is that of the thrust axis, checked at stages that require an attitude.
     """
 
     position: Positive = 0.1  # [m] from the plan

@@ -11,7 +11,7 @@ from aerobat.declaration import Positive, declared
 from aerobat.environment.obstacles.surface import beyond
 from aerobat.problem.opening import OpeningShape
 
-LEAST_AREA = 1e-9  # [m²] of a part
+LEAST_AREA = 1e-9  # [m²] smallest area of a part; smaller parts are dropped
 
 
 @declared
@@ -33,6 +33,6 @@ class Wall:
 
 
 def _area(corners: Array) -> float:
-    """The area of a polygon [m²]."""
+    """Return the area of a polygon [m²]."""
     following = np.roll(corners, -1, axis=0)
     return abs(float(np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]))) / 2.0

@@ -1,6 +1,6 @@
 """Maneuvers, one file each; a new one is a file, a line in `__init__.pyi` and one in `maneuver.MANEUVERS`.
 
-The public names stand in `__init__.pyi`; each is imported when first used: no maneuver waits for another.
+The public names are in `__init__.pyi`; each is imported at its first use, so that no maneuver loads another.
 """
 
 import lazy_loader

@@ -23,12 +23,12 @@ Element = Annotated[Maneuver, PlainValidator(MANEUVERS.read)]
 class Course(Maneuver):
     """Elements one after another, each a maneuver of any kind, flown `laps` times.
 
-    An element is given the gates that it names, itself or in elements or stages of its own, and no others; of
-    a single element names may be left out. The last lap may end early, after the first `last_lap` elements.
-    What an element asks throughout, it asks of the whole course.
+    An element receives only the gates that it names, itself or in elements or stages of its own; a course of
+    one element need not name them. The last lap may end early, after the first `last_lap` elements. An
+    element's path constraints hold along the whole course.
 
-    A `closed` course has neither start nor goal: it ends in the very state in which it begins, in flight
-    between its last element and its first, and can be flown over and over.
+    A `closed` course has neither start nor goal: it is periodic, begins and ends in flight between its last
+    element and its first, and can be flown repeatedly.
     """
 
     elements: Annotated[tuple[Element, ...], Field(min_length=1)]  # in order
@@ -37,7 +37,7 @@ class Course(Maneuver):
     closed: bool = False  # it ends as it begins, in flight; `start` and `goal` are left out
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check the last lap."""
         if self.last_lap is not None and self.last_lap > len(self.elements):
             raise FieldError(
                 "last_lap",
@@ -49,7 +49,7 @@ class Course(Maneuver):
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return the stages of all elements of all laps.
 
-        Raises SpecError, which names the element, for gates that do not suit it and for stages in no order.
+        Raises SpecError, which names the element, for gates that do not suit it and for unordered stages.
         """
         sequences = [self._sequence(i, gates, max_specific_thrust) for i in range(len(self.elements))]
         lap = tuple(_named([stage for sequence in sequences for stage in sequence.stages]))
@@ -60,7 +60,7 @@ class Course(Maneuver):
         return StageSequence(tuple(stages), tuple(throughout), closed=self.closed)
 
     def in_words(self, gates: Sequence[Gate]) -> str:
-        """Return its elements as one reads them aloud, those of a kind together."""
+        """Return the elements in words, with repeated ones counted."""
         said = in_sequence(element.in_words(self._given(element, gates)) for element in self.elements)
         if self.closed:
             return f"{'a closed lap' if self.laps == 1 else f'{self.laps} closed laps'} of {said}"
@@ -71,11 +71,11 @@ class Course(Maneuver):
 
     @property
     def through_points(self) -> bool:
-        """True where every stage of every element is a point to pass."""
+        """True where every stage of every element is a waypoint."""
         return all(element.through_points for element in self.elements)
 
     def _sequence(self, i: int, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
-        """The stages of one element."""
+        """Return the stages of one element."""
         element = self.elements[i]
         with within_field(f"maneuver.elements[{i}]"):
             sequence = element.stage_sequence(self._given(element, gates), max_specific_thrust)
@@ -86,7 +86,7 @@ class Course(Maneuver):
         return sequence
 
     def _given(self, element: Maneuver, gates: Sequence[Gate]) -> Sequence[Gate]:
-        """The gates for an element: those that it names, or none; all of them where it is the only one."""
+        """Return the gates for an element: those that it names, or all where it is the only element."""
         if len(self.elements) == 1:
             return gates
         return tuple(named_gate(gates, name) for name in dict.fromkeys(_gates_of(element)))
@@ -103,7 +103,7 @@ def _gates_of(element: Maneuver | Stage) -> Iterator[str]:
 
 
 def _named(stages: Sequence[Stage]) -> Iterator[Stage]:
-    """A lap's stages; of a name that several have they are numbered, but those of gates."""
+    """Yield a lap's stages; stages of the same name are numbered, except those of gates."""
     counts = Counter(stage.name for stage in stages)
     seen: Counter[str] = Counter()
     for stage in stages:

@@ -1,4 +1,4 @@
-"""Any maneuver, spelled out as data."""
+"""Any maneuver, given explicitly as a list of stages."""
 
 from __future__ import annotations
 

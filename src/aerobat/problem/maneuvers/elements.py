@@ -1,4 +1,4 @@
-"""Elements of courses that are no figures: a gate, a waypoint, a rest."""
+"""Elements of courses other than figures: a gate, a waypoint, a hold."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class PassGate(Maneuver):
         check_margin(self.crossing_point, self.margin)
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
-        """Return one stage, the gate. Raises SpecError where it names none of several."""
+        """Return one stage, the gate. Raises SpecError where it names none of several gates."""
         gate = passed_gate(gates, self.gate, self.kind)
         thrust = (self.min_thrust or THRUST_FRACTION * max_specific_thrust) if self.upright else None
         stage = Stage(
@@ -50,7 +50,7 @@ class PassGate(Maneuver):
 
     @property
     def through_points(self) -> bool:
-        """True where no attitude is asked."""
+        """True where no attitude is required."""
         return not self.upright
 
 
@@ -68,7 +68,7 @@ class PassWaypoint(Waypoint, Maneuver):
 
     @property
     def through_points(self) -> bool:
-        """True: it is one."""
+        """True: the maneuver is a waypoint."""
         return True
 
 
@@ -86,5 +86,5 @@ class Hold(Maneuver):
         return StageSequence((Stage(self.kind, (*there, *still), hold=self.time),))
 
     def in_words(self, gates: Sequence[Gate]) -> str:
-        """Return how long it holds."""
+        """Return the duration of the hold in words."""
         return f"hold for {self.time:g} s"

@@ -1,4 +1,4 @@
-"""A flip through a gate that is passed on the way, say upside down (paper, Sections II-A to II-C)."""
+"""A flip through a gate that is passed during the turn, e.g. upside down (paper, Sections II-A to II-C)."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ from aerobat.so3 import UP
 class Flip(Maneuver):
     """A full turn about a horizontal axis, through a gate on the way (paper, Sections II-A to II-C).
 
-    Stages of thrust at 45°, 90°, 180°, 270° and 315° of the turn, of which the gate takes the place of the
-    one next to it: upside down, tilted by 180°, as in the paper, or at any angle of the turn at which its
-    upright lies. Each asks for thrust along its direction: none across it in the plane of the turn, and at
-    least `min_lateral_thrust` or, upside down, `min_inverted_thrust` along it, in m/s²; by default fractions
-    of what the vehicle can give. Upside down the thrust leans out of that plane by 30° at most: quick flips
-    would lean farther and never turn over. As the paper prints it (`signed` and `ordered` False) it leans as
-    it likes, the stages at 45° and 315° take either sign and the solver may turn either way. The gate is
-    passed as `passage` says.
+    The stages are at 45°, 90°, 180°, 270° and 315° of the turn. A gate replaces the stage nearest to it:
+    upside down, tilted by 180°, as in the paper, or at any angle of the turn at which its upright lies. Each
+    stage requires thrust along its direction: zero across it in the plane of the turn, and at least
+    `min_lateral_thrust` or, upside down, `min_inverted_thrust` along it [m/s²]; the defaults are fractions of
+    the vehicle's maximum. Upside down the thrust tilts out of that plane by 30° at most: otherwise quick
+    flips would tilt farther and never turn over. In the paper's form (`signed` and `ordered` False) this tilt
+    is free, the stages at 45° and 315° take either sign, and the solver may turn either way. `passage` says
+    how the gate is passed.
     """
 
     # heading of the axis of the turn, right-handed: 0 turns about +x, 90 about +y, -90 nose up
@@ -62,17 +62,17 @@ class Flip(Maneuver):
     count: Repeats = 1  # full turns
     mirrored: bool = False  # turns the other way
 
-    ANGLES_DEG: ClassVar[tuple[float, ...]] = (45.0, 90.0, 180.0, 270.0, 315.0)  # of the turn
-    APART_DEG: ClassVar[float] = 22.5  # from the gate's: stages that are nearer ask the same
-    INVERTED_WITHIN_DEG: ClassVar[float] = 30.0  # the thrust upside down, out of the plane of the turn
-    IN_PLANE_DEG: ClassVar[float] = 0.1  # as exactly as files are written
+    ANGLES_DEG: ClassVar[tuple[float, ...]] = (45.0, 90.0, 180.0, 270.0, 315.0)  # [deg] of the turn
+    APART_DEG: ClassVar[float] = 22.5  # [deg] from the gate's: closer stages are redundant
+    INVERTED_WITHIN_DEG: ClassVar[float] = 30.0  # [deg] thrust out of plane, upside down
+    IN_PLANE_DEG: ClassVar[float] = 0.1  # [deg] of a gate's upright: the rounding of files
     SIDES: ClassVar[Mapping[int, str]] = {0: "forward", 1: "left", 2: "back", 3: "right"}
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
-        """Return the stages of the turn, the gate's among them.
+        """Return the stages of the turn, including the gate's.
 
-        Raises SpecError where there are several gates and it names none, or the turn does not come by the
-        gate's upright.
+        Raises SpecError where there are several gates and `gate` names none, or the gate's upright is not in
+        the plane of the turn.
         """
         gate = passed_gate(gates, self.gate, self.kind) if gates or self.gate is not None else None
         at_gate_deg = inf if gate is None else self._angle_deg(gate)
@@ -109,7 +109,7 @@ class Flip(Maneuver):
 
     @validated
     def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Flip:
-        """Return a copy with a least specific thrust [m/s²] in its gate; itself where it has none."""
+        """Return a copy with a minimum specific thrust [m/s²] in its gate; unchanged without a gate."""
         if not gates and self.gate is None:
             return self
         angle_deg = self._angle_deg(passed_gate(gates, self.gate, self.kind))
@@ -124,9 +124,9 @@ class Flip(Maneuver):
         return np.array([np.cos(heading), np.sin(heading), 0.0])
 
     def _angle_deg(self, gate: Gate) -> float:
-        """The angle of the turn [deg] at which the thrust lies along the gate's upright.
+        """Return the angle of the turn [deg] at which the thrust is along the gate's upright.
 
-        Raises SpecError where the turn does not come by it.
+        Raises SpecError where the gate's upright is not in the plane of the turn, or nearly upright.
         """
         out_of_plane = float(np.rad2deg(np.arcsin(np.clip(gate.up @ self.turn_axis, -1.0, 1.0))))
         if abs(out_of_plane) > self.IN_PLANE_DEG:
@@ -148,7 +148,7 @@ class Flip(Maneuver):
         return angle_deg
 
     def _stage(self, angle_deg: float, is_free: bool, max_specific_thrust: float) -> Stage:
-        """The stage at an angle of the turns; upside down at its position where no gate is passed."""
+        """Return the stage at an angle of the turns; without a gate, the one upside down has the position."""
         asked = self._in_plane(angle_deg, self._min_thrust(angle_deg, max_specific_thrust))
         if self.signed and _is_inverted(angle_deg):
             asked += leaning_at_most(-UP, self.turn_axis, np.deg2rad(self.INVERTED_WITHIN_DEG))
@@ -156,28 +156,28 @@ class Flip(Maneuver):
         return Stage(f"{angle_deg:g}°", (*there, *asked))
 
     def _in_plane(self, angle_deg: float, minimum: float) -> tuple[Condition, ...]:
-        """Thrust at an angle of the turn; its sign free where it is `signed` only by the diagonals."""
+        """Return thrust conditions at an angle of the turn; unless `signed`, of free sign on diagonals."""
         diagonal = angle_deg % 360.0 in (self.ANGLES_DEG[0], self.ANGLES_DEG[-1])
         least = -inf if diagonal and not self.signed else minimum
         direction = so3.rotate(so3.about_axis(self.turn_axis, np.deg2rad(angle_deg)), UP)
         return thrust_in_plane(direction, self.turn_axis, least)
 
     def _min_thrust(self, angle_deg: float, max_specific_thrust: float) -> float:
-        """The least specific thrust [m/s²] at an angle of the turn: upside down, or sideways."""
+        """Return the minimum specific thrust [m/s²] at an angle of the turn: upside down, or sideways."""
         asked = self.min_inverted_thrust if _is_inverted(angle_deg) else self.min_lateral_thrust
         return asked or THRUST_FRACTION * max_specific_thrust
 
 
 def _is_inverted(angle_deg: float) -> bool:
-    """True at an angle of the turns that is upside down rather than sideways."""
+    """Return True at an angle of the turns that is upside down rather than sideways."""
     return abs(angle_deg % 360.0 - 180.0) < 45.0
 
 
 def _wrapped(angle_deg: float) -> float:
-    """The angle between -180 and 180."""
+    """Return the angle between -180 and 180."""
     return round((angle_deg + 180.0) % 360.0 - 180.0, 6)
 
 
 def _times(count: int) -> str:
-    """A number of turns before their noun."""
+    """Return the number of turns as words before their noun."""
     return {1: "", 2: "double ", 3: "triple "}.get(count, f"{count} turns of a ")

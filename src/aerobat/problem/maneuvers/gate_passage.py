@@ -1,4 +1,4 @@
-"""The passage through a gate, as maneuvers ask for it."""
+"""The passage through a gate, as maneuvers require it."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from aerobat.problem.stage import (
 class GatePassage:
     """The manner in which a gate is passed, beyond meeting its opening.
 
-    A `perpendicular` passage moves along the gate's direction of passage, at `speed` or faster, and not
-    across it, so that a vehicle of some size fits through; one that stood still there could turn back. It is
-    `upright` with the thrust axis along the gate's upright, within half its tolerance, where the maneuver
-    asks for an attitude at all; otherwise only in the plane of the maneuver's turn, as in the paper.
-    `centred` means that the gate is met by the fraction `at`, and otherwise one interval later, at the end of
-    interval N/2, as in the authors' reference code; there the velocity is free. With a free `crossing_point`
-    the opening is met anywhere, the vehicle's body and a `margin` away from its edges.
+    A `perpendicular` passage moves along the gate's direction of passage at `speed` or faster, without a
+    lateral velocity, so that a vehicle with an extent fits through; at rest in the gate it could turn back.
+    An `upright` passage has the thrust axis along the gate's upright, within half its tolerance, if the
+    maneuver requires an attitude at all; otherwise only in the plane of the maneuver's turn, as in the paper.
+    A `centred` passage is at the fraction `at`; otherwise it is one interval later, at the end of interval
+    N/2, with free velocity, as in the authors' reference code. With a free `crossing_point` the opening is
+    crossed anywhere, at a distance of the vehicle's body and a `margin` from its edges.
     """
 
     perpendicular: bool = True  # move along the gate's direction of passage and not across it
@@ -38,18 +38,18 @@ class GatePassage:
     margin: NonNegative = 0.0  # [m] from the edges to the body, where the crossing point is free
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check the margin."""
         check_margin(self.crossing_point, self.margin)
 
     def stage(
         self, gate: Gate, conditions: Sequence[Condition] = (), min_thrust: float | None = None
     ) -> Stage:
-        """The stage of passing `gate`.
+        """Return the stage of passing `gate`.
 
         Args:
-            gate: the gate that is met.
-            conditions: what holds there in place of the gate's attitude, where the passage is not upright.
-            min_thrust: least specific thrust [m/s²] along the gate's upright; None: no attitude is asked.
+            gate: the gate to pass.
+            conditions: replace the gate's attitude if the passage is not upright.
+            min_thrust: least specific thrust [m/s²] along the gate's upright; None: no attitude is required.
         """
         asked: list[Condition] = []
         if self.perpendicular:
@@ -59,7 +59,7 @@ class GatePassage:
             asked += conditions
             min_thrust = None
         offset = 0 if self.centred else 1
-        # how fast is among the conditions, or left free
+        # the conditions contain the speed, or leave it free
         return Stage(
             gate.name,
             tuple(asked),

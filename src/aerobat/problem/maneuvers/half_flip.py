@@ -17,8 +17,8 @@ from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
 from aerobat.problem.stage import StageSequence
 from aerobat.so3 import UP
 
-SLOWER = 0.85  # of the thrust that keeps attitudes at the speed of figures
-_UPRIGHT = 1e-9  # [-] of a gate's upright across the vertical: rounding
+SLOWER = 0.85  # fraction of FIRM_THRUST: half-flips are slower than figures
+_UPRIGHT = 1e-9  # [-] horizontal component of a gate's upright, below which the gate is upright
 
 
 @maneuver("half-flip")
@@ -36,8 +36,9 @@ class HalfFlip(Maneuver):
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return one stage, the gate, and thrust that never points down: (a_z + g) tan α = a_y, α ≤ 90°.
 
-        Where it names its gate, as among the elements of a course, only the stage: others may point it down.
-        Raises SpecError unless there is one gate, its upright not below the horizontal.
+        If `gate` names the gate, as among the elements of a course, only the stage is returned, since other
+        elements may point the thrust down. Raises SpecError unless there is one gate, its upright not below
+        the horizontal.
         """
         gate = passed_gate(gates, self.gate, self.kind)
         minimum = self._min_thrust(gate, max_specific_thrust)
@@ -59,13 +60,13 @@ class HalfFlip(Maneuver):
 
     @validated
     def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> HalfFlip:
-        """Return a copy with a least specific thrust [m/s²] in its gate; itself where that is upright."""
+        """Return a copy with a minimum specific thrust [m/s²] in its gate; unchanged for an upright gate."""
         up = passed_gate(gates, self.gate, self.kind).up
         across = float(np.hypot(up[0], up[1]))
         return self if across < _UPRIGHT else replace(self, min_lateral_thrust=thrust * across)
 
     def _min_thrust(self, gate: Gate, max_specific_thrust: float) -> float:
-        """The least thrust along the gate's upright [m/s²]."""
+        """Return the minimum specific thrust along the gate's upright [m/s²]."""
         if gate.up[2] < -1e-9:
             raise SpecError("gate.tilt_deg must be from -90 to 90 for a half-flip; past that it is a flip")
         across = float(np.hypot(gate.up[0], gate.up[1]))

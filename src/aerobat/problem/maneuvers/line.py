@@ -1,4 +1,4 @@
-"""A path from start to goal through gates, no attitude asked."""
+"""A path from start to goal through gates, without attitudes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Line(Maneuver):
     passage: GatePassage = GatePassage()  # how the gates are passed
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
-        """Return no stages but the gates."""
+        """Return one stage for each gate, and no others."""
         return StageSequence(tuple(self.passage.stage(gate) for gate in gates))
 
     def in_words(self, gates: Sequence[Gate]) -> str:
@@ -25,5 +25,5 @@ class Line(Maneuver):
         return ", ".join(f"through {gate_in_words(gate.name)}" for gate in gates) or "along a line"
 
     def as_in_paper(self) -> Line:
-        """Return a line whose gates are passed as there."""
+        """Return a line whose gates are passed as in the paper."""
         return Line(PAPER_PASSAGE)

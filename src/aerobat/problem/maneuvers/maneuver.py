@@ -19,48 +19,48 @@ from aerobat.problem.stage import StageSequence
 
 
 class Maneuver(ABC):
-    """The course of the motion: a sequence of stages, given gates and the thrust to be had.
+    """A maneuver: a sequence of stages, which depends on gates and on the available thrust.
 
-    A maneuver of one's own inherits from this class, is registered by `@maneuver("its-name")`, and says its
-    stages; the other questions have answers that suit a maneuver of no special kind.
+    A custom maneuver inherits from this class, is registered by `@maneuver("its-name")`, and implements
+    `stage_sequence`. The other methods have defaults for maneuvers of no special kind.
     """
 
     kind: ClassVar[str] = ""  # its name in files, set when it is registered
-    TITLE: ClassVar[str] = ""  # its name in text, where that is not `kind` with spaces
+    TITLE: ClassVar[str] = ""  # its name in text, where that differs from `kind` with spaces
 
     @abstractmethod
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
-        """Return the stages through `gates` for a vehicle with so much specific thrust [m/s²].
+        """Return the stages through `gates` for a vehicle with this maximum specific thrust [m/s²].
 
         Raises SpecError for gates that do not suit the maneuver.
         """
 
     def as_in_paper(self) -> Maneuver:
-        """Return the maneuver exactly as the paper prints it; itself when the paper has no such maneuver."""
+        """Return the maneuver exactly as the paper prints it; unchanged when it is not in the paper."""
         return self
 
     @validated
     def with_gate_tilt(self, gates: Sequence[Gate], tilt: Angle) -> tuple[Gate, ...]:
-        """Return the gates at another tilt [rad]. Raises SpecError unless a half-flip passes them."""
+        """Return the gates at another tilt [rad]. Raises SpecError for maneuvers other than half-flips."""
         raise SpecError(f"only the gate of a half-flip can be tilted, this maneuver is a {self.kind}")
 
     @validated
     def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Maneuver:
-        """Return a copy with a least specific thrust [m/s²] in its gate or stages; itself if it asks none."""
+        """Return a copy with a minimum specific thrust [m/s²] in gate or stages; unchanged if it has none."""
         return self
 
     @property
     def turn_axis(self) -> Array | None:
-        """The unit vector about which the vehicle turns, right-handed, (3,); None where there is no such."""
+        """The unit vector about which the vehicle turns, right-handed, (3,); None where there is none."""
         return None
 
     @property
     def through_points(self) -> bool:
-        """True where every stage is a point to pass, for which closed-form polynomials are a good start."""
+        """True where every stage is a waypoint: closed-form polynomials are then a good initial guess."""
         return False
 
     def in_words(self, gates: Sequence[Gate]) -> str:
-        """Return the maneuver as one reads it aloud, with the gate that it names, or the only one."""
+        """Return the maneuver in words, with the gate that it names, or the only one."""
         name: str | None = getattr(self, "gate", None)
         if name is None and len(gates) == 1:
             name = gates[0].name
@@ -69,12 +69,12 @@ class Maneuver(ABC):
 
     @property
     def first_times(self) -> tuple[float, ...] | None:
-        """The times [s] of all stages and of the end where a search begins; None: the planner's choice."""
+        """The times [s] of all stages and of the end in the initial guess; None: the planner's choice."""
         return None
 
 
 def gate_in_words(name: str) -> str:
-    """A gate as one reads it aloud: the gate, the red gate, gate 3."""
+    """Return a gate in words: the gate, the red gate, gate 3."""
     if name == "gate":
         return "the gate"
     if "gate" not in name.lower():
@@ -83,7 +83,7 @@ def gate_in_words(name: str) -> str:
 
 
 def in_sequence(words: Iterable[str]) -> str:
-    """Return words in sequence as one reads them aloud, with a count of those that repeat in a row."""
+    """Return words as a sequence, with a count of words that repeat in a row."""
     runs = [(word, len(tuple(run))) for word, run in groupby(words)]
     return ", ".join(word if count == 1 else f"{word}, {count} times" for word, count in runs)
 
@@ -128,5 +128,5 @@ def maneuver(kind: Label) -> Callable[[type[M]], type[M]]:
 
 
 def registered_maneuvers() -> Mapping[str, type[Maneuver]]:
-    """The maneuvers by their names: those of this package, of plugins, of installed packages."""
+    """Return the maneuvers by name: those of this package, of plugins and of installed packages."""
     return MappingProxyType({kind: MANEUVERS[kind] for kind in MANEUVERS})

@@ -1,4 +1,4 @@
-"""A path through waypoints, each with as many components given as one likes (paper, Section V-B)."""
+"""A path through waypoints, each with any components given (paper, Section V-B)."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ FIXABLE = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 class Waypoint:
     """Components fixed at one point of the path, world frame; components that are NaN are free.
 
-    With a `radius` the position is met within so much. `up` asks that the thrust points there, with exactly
-    `thrust` per mass, or, without it, with at least a fraction of what the vehicle has. Raises SpecError when
-    nothing is given, or acceleration and attitude both are.
+    With a `radius` the position is met within that distance. `up` sets the direction of the thrust, with
+    exactly `thrust` per mass or, without it, at least a fraction of the vehicle's maximum. Raises SpecError
+    when nothing is given, or both acceleration and attitude are.
     """
 
     position: PartialVector = field(default_factory=free)  # [m] world
@@ -52,7 +52,7 @@ class Waypoint:
     radius: Positive | None = None  # [m] about the position, within which it is met
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check that the fields fit together."""
         check_crossing(self.gate, self.crossing_point, self.margin, self.min_speed)
         if self.radius is not None and np.isnan(self.position).any():
             raise FieldError("radius", "needs all components of position, the centre; give them")
@@ -67,7 +67,7 @@ class Waypoint:
             raise SpecError("nothing is given; give at least one component of the position")
 
     def stage(self, name: str, max_specific_thrust: float) -> Stage:
-        """The stage of passing it, named after its gate where it has one, its time free."""
+        """Return the stage of passing the waypoint, at a free time, named after its gate if it has one."""
         return Stage(
             name=self.gate or name,
             conditions=tuple(self.conditions()),
@@ -80,7 +80,7 @@ class Waypoint:
         )
 
     def conditions(self) -> Iterable[Condition]:
-        """The given components and a given thrust, as conditions of a stage; of a ball none."""
+        """Yield conditions on the given components and a given thrust; none on the position of a ball."""
         for quantity in FIXABLE if self.radius is None else FIXABLE[1:]:
             yield from fixed(quantity, getattr(self, quantity.value))
         if self.up is not None and self.thrust is not None:
@@ -88,16 +88,16 @@ class Waypoint:
 
     @property
     def ball(self) -> Ball | None:
-        """The ball that its radius makes of its position."""
+        """The ball about the position, if there is a radius."""
         return None if self.radius is None else Ball(self.position, self.radius)
 
     @property
     def in_passing(self) -> str:
-        """The waypoint, or its gate, as one reads it aloud."""
+        """The waypoint, or its gate, in words."""
         return "by a waypoint" if self.gate is None else f"through {gate_in_words(self.gate)}"
 
     def attitude(self, max_specific_thrust: float) -> Attitude | None:
-        """The attitude that `up` asks for with no thrust given."""
+        """Return the attitude of `up` without a given thrust; None otherwise."""
         if self.up is None or self.thrust is not None:
             return None
         return Attitude(self.up, THRUST_FRACTION * max_specific_thrust)
@@ -107,28 +107,28 @@ class Waypoint:
 class Waypoints(Maneuver):
     """From start to goal through waypoints in their order.
 
-    `duration` is that of the whole path at first, for planners that begin from times (paper, Section V-D:
-    its waypoint at 0.5 s, its end at 2 s). Raises SpecError for times that do not rise.
+    `duration` is an initial guess of the whole path's duration, for planners whose search begins with times
+    (paper, Section V-D: its waypoint at 0.5 s, its end at 2 s). Raises SpecError for times that do not rise.
     """
 
     waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=1)]  # in order
     duration: Positive | None = None  # [s] of the whole path, where a search on times begins
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check that the times rise."""
         times = [t for t in (0.0, *(w.time for w in self.waypoints), self.duration) if t is not None]
         if any(later <= earlier for earlier, later in pairwise(times)):
             raise FieldError("waypoints", ": their times must rise, and duration must come last")
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
-        """Return a stage a waypoint, in order, each at a time that the planner chooses."""
+        """Return a stage for each waypoint, in order, at a time that the planner chooses."""
         numbered = enumerate(self.waypoints, 1)
         return StageSequence(
             tuple(waypoint.stage(f"waypoint {k}", max_specific_thrust) for k, waypoint in numbered)
         )
 
     def in_words(self, gates: Sequence[Gate]) -> str:
-        """Return its waypoints and gates, in order."""
+        """Return the waypoints and gates in words, in order."""
         return in_sequence(waypoint.in_passing for waypoint in self.waypoints)
 
     @property
@@ -138,6 +138,6 @@ class Waypoints(Maneuver):
 
     @property
     def first_times(self) -> tuple[float, ...] | None:
-        """The times of all waypoints and of the end [s], if every one is given."""
+        """The times of all waypoints and of the end [s], if all are given."""
         times = [*(w.time for w in self.waypoints), self.duration]
         return None if None in times else tuple(t for t in times if t is not None)

@@ -1,7 +1,7 @@
 """Openings of gates: convex shapes in a gate's plane, by points (left, up) [m] from the gate's position.
 
-All that plans, judges or draws an opening reads it here: which points lie inside and how deep, what is left
-at a clearance from the edges, along which directions a body that passes is measured, the outline, the edges.
+Code that plans, judges or draws an opening uses this interface: depth of points inside, the part left at a
+clearance from the edges, directions along which a passing body is measured, outline and edges.
 """
 
 from aerobat.problem.opening.circle import Circle

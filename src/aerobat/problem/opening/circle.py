@@ -10,15 +10,15 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.problem.opening.shape import Edge, EdgeProbe, LinearBounds, OpeningShape
 
-CIRCLE_POINTS = 48  # of a circle's outline, and of the frame around it
-CIRCLE_SIDES = 24  # of the polygon in a circle that planners take: 0.9 % of the radius is lost
+CIRCLE_POINTS = 48  # points of a circle's outline, and edges of the frame around it
+CIRCLE_SIDES = 24  # of the inscribed polygon that planners use: 0.9 % of the radius is lost
 
 
 class Circle(OpeningShape):
     """A circle about the gate's position.
 
-    Judged as what it is, bodies by the farthest of the points that they reach in CIRCLE_SIDES directions: of
-    the radius 0.2 % are missed at most. Planners take the regular polygon in it.
+    Bodies are judged by the farthest of the points that they reach in CIRCLE_SIDES directions, which
+    underestimates their extent by at most 0.2 % of the radius. Planners use the inscribed regular polygon.
     """
 
     def __init__(self, radius: float) -> None:
@@ -26,7 +26,7 @@ class Circle(OpeningShape):
 
     @property
     def outline(self) -> Array:
-        """Points on it, the first on the left."""
+        """Points on the circle, the first on the left."""
         return self.radius * _directions(CIRCLE_POINTS)
 
     def fields(self, across: float = 1.0, up: float = 1.0) -> Mapping[str, Any]:
@@ -35,18 +35,18 @@ class Circle(OpeningShape):
 
     @property
     def kind(self) -> str:
-        """The kind of opening, as it is said before the width."""
+        """The kind of opening, as text before the width."""
         return "round, "
 
     @property
     def probes(self) -> tuple[EdgeProbe, ...]:
-        """Half of the directions around it, both ways each."""
+        """Half of the directions around the circle, both ways each."""
         half = _directions(CIRCLE_SIDES)[: CIRCLE_SIDES // 2]
         return tuple(EdgeProbe((x, y), self.radius, True, True) for x, y in half.tolist())
 
     @property
     def sides(self) -> tuple[Array, Array]:
-        """The sides of the regular polygon in the circle."""
+        """The sides of the inscribed regular polygon."""
         return _directions(CIRCLE_SIDES), np.full(CIRCLE_SIDES, _INSCRIBED * self.radius)
 
     @property
@@ -65,7 +65,7 @@ class Circle(OpeningShape):
         return np.asarray(self.radius - np.linalg.norm(points, axis=-1))
 
     def at_clearance(self, clearance: float) -> LinearBounds:
-        """See `OpeningShape`; the regular polygon in the smaller circle."""
+        """See `OpeningShape`; the regular polygon inscribed in the smaller circle."""
         if clearance >= self.radius:
             return LinearBounds(np.eye(2), np.zeros(2), np.zeros(2))
         reach = np.full(CIRCLE_SIDES // 2, _INSCRIBED * (self.radius - clearance))
@@ -80,7 +80,7 @@ class Circle(OpeningShape):
         return large <= self.radius
 
     def outward(self, probe: int, points: Array) -> Array:
-        """Away from the middle."""
+        """Return the directions away from the middle."""
         distance = np.linalg.norm(points, axis=-1, keepdims=True)
         return np.where(distance > 0.0, points / np.where(distance > 0.0, distance, 1.0), [0.0, 1.0])
 
@@ -93,10 +93,10 @@ class Circle(OpeningShape):
         return np.repeat(2.0 * reach.max(axis=-1)[..., None], 2, axis=-1)
 
 
-_INSCRIBED = float(np.cos(np.pi / CIRCLE_SIDES))  # [-] of a circle's radius: how far the polygon's sides are
+_INSCRIBED = float(np.cos(np.pi / CIRCLE_SIDES))  # [-] inradius of the polygon over the circle's radius
 
 
 def _directions(count: int) -> Array:
-    """So many unit vectors, evenly around, the first to the left, (count, 2)."""
+    """Return `count` unit vectors, evenly spaced, the first to the left, (count, 2)."""
     angles = 2.0 * np.pi * np.arange(count) / count
     return np.column_stack([np.cos(angles), np.sin(angles)])

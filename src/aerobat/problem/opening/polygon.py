@@ -1,4 +1,4 @@
-"""Convex polygons as openings, rectangles among them."""
+"""Convex polygons as openings, with rectangles as a special case."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from aerobat.declaration.field_types import finite
 from aerobat.declaration.sentences import FieldError, shown
 from aerobat.problem.opening.shape import Edge, EdgeProbe, LinearBounds, OpeningShape
 
-STRAIGHT = 1e-6  # [-] the sine of a turn that is none
-FARTHEST = 1e15  # [m] likewise of all lengths in files
-MAX_CORNERS = 24  # of a polygon: each side is followed through every tick of a flight
-ROUNDING = 1e-12  # of an opening's size
-TURNS = np.radians(np.arange(0.0, 180.0, 5.0))  # in which a section is tried in a polygon
+STRAIGHT = 1e-6  # [-] sine of a turn at a corner below which the corner is on a straight line
+FARTHEST = 1e15  # [m] largest coordinate, as of all lengths in files
+MAX_CORNERS = 24  # of a polygon: a flight checks each side at every tick
+ROUNDING = 1e-12  # [-] tolerance relative to an opening's size
+TURNS = np.radians(np.arange(0.0, 180.0, 5.0))  # [rad] turns in which a section is tried in a polygon
 
 
 class Polygon(OpeningShape):
-    """A convex polygon that holds the gate's position, its corners anticlockwise."""
+    """A convex polygon that contains the gate's position, its corners anticlockwise."""
 
     def __init__(self, corners: Array) -> None:
         self.corners = corners
@@ -39,19 +39,19 @@ class Polygon(OpeningShape):
 
     @property
     def kind(self) -> str:
-        """The kind of opening, as it is said before the width."""
+        """The kind of opening, as text before the width."""
         return f"a polygon of {len(self.corners)} corners, "
 
     @cached_property
     def sides(self) -> tuple[Array, Array]:
-        """The sides of the polygon itself, the first from the first corner to the second."""
+        """The sides of the polygon itself; the first is from the first corner to the second."""
         along = np.roll(self.corners, -1, axis=0) - self.corners
         normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
         return normals, np.sum(normals * self.corners, axis=1)
 
     @property
     def probes(self) -> tuple[EdgeProbe, ...]:
-        """The sides of the polygon, each a probe."""
+        """The sides of the polygon, each as a probe."""
         normals, distances = self.sides
         return tuple(
             EdgeProbe((x, y), d) for (x, y), d in zip(normals.tolist(), distances.tolist(), strict=True)
@@ -59,7 +59,7 @@ class Polygon(OpeningShape):
 
     @property
     def edges(self) -> tuple[Edge, ...]:
-        """The sides of the polygon, each an edge."""
+        """The sides of the polygon, each as an edge."""
         ends = np.roll(self.corners, -1, axis=0)
         halves = np.linalg.norm(ends - self.corners, axis=1) / 2.0
         return tuple(map(Edge, (self.corners + ends) / 2.0, self.sides[0], halves.tolist()))
@@ -79,7 +79,7 @@ class Polygon(OpeningShape):
         return np.asarray((reach / self.sides[1]).max(axis=-1)[..., None] * self.size)
 
     def at_clearance(self, clearance: float) -> LinearBounds:
-        """See `OpeningShape`; each side is bounded from beyond by where the opposite corner is."""
+        """See `OpeningShape`; the lower bound along each side's normal is at the opposite corner."""
         normals, distances = self.sides
         room, middle = self._largest_inset(np.zeros(len(distances)))
         if clearance >= room:
@@ -87,13 +87,13 @@ class Polygon(OpeningShape):
         return LinearBounds(normals, (self.corners @ normals.T).min(axis=0), distances - clearance)
 
     def admits(self, section: Array) -> bool:
-        """See `OpeningShape`; wherever its centre is."""
+        """See `OpeningShape`; the section's centre may be anywhere."""
         normals, distances = self.sides
         reach = np.sqrt(np.einsum("ki,ij,kj->k", normals, section, normals))
         return self._largest_inset(reach)[0] >= -ROUNDING * float(distances.max())
 
     def admits_turned(self, small: float, large: float) -> bool:
-        """See `OpeningShape`; where it reaches too far by what half a turn of TURNS changes it may fit."""
+        """See `OpeningShape`; tolerant by half a step of TURNS, so that an ellipse may not quite fit."""
         slack = (large - small) * np.sin((TURNS[1] - TURNS[0]) / 2.0)
         normals, _ = self.sides
         for turn in TURNS:
@@ -104,7 +104,7 @@ class Polygon(OpeningShape):
         return False
 
     def outward(self, probe: int, points: Array) -> Array:
-        """The side's normal."""
+        """Return the side's normal."""
         return np.broadcast_to(self.sides[0][probe], points.shape)
 
     def nearest_on_edge(self, outward: Array, points: Array) -> Array:
@@ -115,9 +115,10 @@ class Polygon(OpeningShape):
         return np.asarray(first + np.clip(part, 0.0, 1.0)[..., None] * along)
 
     def _largest_inset(self, reach: Array) -> tuple[float, Array]:
-        """The largest distance [m] that is left on all sides beside what is reached there, and the point.
+        """Return the largest clearance [m] of a body of extent `reach` from all sides, and the best point.
 
-        Three sides are as near as that: of all three the point is tried, which is few for few corners.
+        At the optimum three sides are equally near (the optimal vertex of a linear program): all triples of
+        sides are tried, which are few for few corners.
 
         Args:
             reach: of a body beyond the point along each outward normal [m], (S,).
@@ -134,7 +135,7 @@ class Polygon(OpeningShape):
 
 
 class Rectangle(Polygon):
-    """A rectangle about the gate's position, its sides along lateral and upright."""
+    """A rectangle about the gate's position, its sides parallel to lateral and upright axes."""
 
     def __init__(self, width: float, height: float) -> None:
         self.width, self.height = width, height
@@ -146,12 +147,12 @@ class Rectangle(Polygon):
 
     @property
     def kind(self) -> str:
-        """The kind of opening, as it is said before the width: empty, as a rectangle need not be said."""
+        """The kind of opening, as text before the width: empty for a rectangle."""
         return ""
 
     @property
     def probes(self) -> tuple[EdgeProbe, ...]:
-        """Across and up, both ways each."""
+        """The lateral and the upright axis, both ways each."""
         return EdgeProbe((1.0, 0.0), self.width / 2.0, True), EdgeProbe((0.0, 1.0), self.height / 2.0, True)
 
     @property
@@ -160,28 +161,28 @@ class Rectangle(Polygon):
         return min(self.width, self.height) / 2.0
 
     def needed(self, reach: Array) -> Array:
-        """See `OpeningShape`; width and height, each for itself."""
+        """See `OpeningShape`; width and height are independent."""
         return 2.0 * reach
 
     def at_clearance(self, clearance: float) -> LinearBounds:
-        """See `OpeningShape`; the middle along each axis where it is too narrow along that."""
+        """See `OpeningShape`; zero along each axis where the opening is too narrow."""
         reach = np.maximum(np.array([self.width, self.height]) / 2.0 - clearance, 0.0)
         return LinearBounds(np.eye(2), -reach, reach)
 
     def admits_turned(self, small: float, large: float) -> bool:
-        """See `OpeningShape`; exactly: the box around an ellipse has one diagonal, however it is turned."""
+        """See `OpeningShape`; exact: the box around an ellipse has the same diagonal in every orientation."""
         narrow = min(self.width, self.height) >= 2.0 * small
         return bool(narrow and np.hypot(self.width, self.height) >= 2.0 * np.hypot(small, large))
 
     def outward(self, probe: int, points: Array) -> Array:
-        """Across or up, to the side where the points are."""
+        """Return the lateral or upright direction toward the points."""
         outward = np.zeros(points.shape)
         outward[..., probe] = np.where(points[..., probe] > 0.0, 1.0, -1.0)
         return outward
 
 
 def _corners(value: Any) -> Array:
-    """The corners of a convex polygon about (0, 0), anticlockwise. Raises FieldError for what is none."""
+    """Return a convex polygon's corners about (0, 0), anticlockwise. Raises FieldError for any others."""
     if not isinstance(value, list | tuple | np.ndarray) or np.ndim(np.asarray(value, dtype=object)) < 1:
         raise FieldError("", f"must be a list of corners, two numbers each, got {shown(value)}")
     if not 3 <= len(value) <= MAX_CORNERS:
@@ -217,11 +218,11 @@ def _corners(value: Any) -> Array:
 
 
 def _text(corners: Array) -> str:
-    """The first of some corners, as a file has it."""
+    """Return the first of some corners as text, as in files."""
     return "[{:g}, {:g}]".format(*corners[0])
 
 
-# corners in a gate's plane, to the left and up of its position as who passes upright sees it [m], (K, 2)
+# corners in a gate's plane, left and up from its position, seen in the direction of passage [m], (K, 2)
 Corners = Annotated[
     Array, PlainValidator(_corners), Field(description="corners in order, two numbers each: left and up")
 ]

@@ -1,4 +1,4 @@
-"""The interface of openings for all that plans, judges and draws them."""
+"""The interface of openings for planning, judging and drawing."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 
 from aerobat.arrays import Array
 
-SHARPEST = 4.0  # by which a frame's outer corner may lie farther out than its bars are thick
+SHARPEST = 4.0  # ratio of a frame corner's distance to the bars' thickness, at most
 
 
 class EdgeProbe(NamedTuple):
-    """A direction in which a body that passes is measured against an opening."""
+    """A direction along which a body's extent is compared with an opening."""
 
     direction: tuple[float, float]  # unit vector (left, up)
     limit: float  # [m] from the gate's position to the edge
-    both_ways: bool = False  # against the direction too
-    radial: bool = False  # the distance of the farthest point, in whichever direction that is
+    both_ways: bool = False  # the opposite direction counts too
+    radial: bool = False  # the extent is the distance of the farthest point, in whichever direction
 
 
 class Edge(NamedTuple):
@@ -44,22 +44,22 @@ class OpeningShape(ABC):
     @property
     @abstractmethod
     def outline(self) -> Array:
-        """Points around it [m], anticlockwise with left as the first axis, (K, 2)."""
+        """Points around the opening [m], anticlockwise with left as the first axis, (K, 2)."""
 
     @property
     @abstractmethod
     def probes(self) -> tuple[EdgeProbe, ...]:
-        """The directions in which a body that passes is measured; all within their limits, it is inside."""
+        """The probes of the opening; a body that is within the limits of all of them is inside."""
 
     @property
     @abstractmethod
     def sides(self) -> tuple[Array, Array]:
-        """Outward normals (S, 2) and distances [m] (S,) of the sides of the polygon that planners take."""
+        """Outward normals (S, 2) and distances [m] (S,) of the sides of the polygon that planners use."""
 
     @property
     @abstractmethod
     def edges(self) -> tuple[Edge, ...]:
-        """The edges of which a frame around the opening is made."""
+        """The edges of a frame around the opening."""
 
     @abstractmethod
     def fields(self, across: float = 1.0, up: float = 1.0) -> Mapping[str, Any]:
@@ -71,35 +71,35 @@ class OpeningShape(ABC):
     @property
     @abstractmethod
     def kind(self) -> str:
-        """The kind of opening, as it is said before the width; empty for a rectangle."""
+        """The kind of opening, as text before the width; empty for a rectangle."""
 
     @abstractmethod
     def depth(self, points: Array) -> Array:
-        """Return the depth of points (..., 2) inside: distances [m] to the nearest edge (...), or below 0."""
+        """Return the depth of points (..., 2) inside the nearest edge [m], (...); negative outside."""
 
     @abstractmethod
     def at_clearance(self, clearance: float) -> LinearBounds:
-        """Return the part left at a clearance [m] from the edges: in too narrow an opening its middle."""
+        """Return bounds of the part at a clearance [m] from the edges; if it is empty, of the middle."""
 
     @abstractmethod
     def admits(self, section: Array) -> bool:
-        """True if the ellipse of all √S u fits in as it is turned, with unit vectors u and S (2, 2) [m²]."""
+        """Return True if the ellipse of all √S u, for unit vectors u and S (2, 2) [m²], fits in unturned."""
 
     @abstractmethod
     def admits_turned(self, small: float, large: float) -> bool:
-        """True if an ellipse of such semi-axes [m] fits in however it is turned, or may do."""
+        """Return True if an ellipse of these semi-axes [m] fits in, or may fit in, in some orientation."""
 
     @abstractmethod
     def outward(self, probe: int, points: Array) -> Array:
-        """The outward normals of the edges that points measured by a probe are next to, (..., 2)."""
+        """Return the outward normals of the edges nearest to points measured by a probe, (..., 2)."""
 
     @abstractmethod
     def nearest_on_edge(self, outward: Array, points: Array) -> Array:
-        """The points of the edges with those outward normals that are next to points, (..., 2)."""
+        """Return the points on the edges with those outward normals that are nearest to points, (..., 2)."""
 
     @abstractmethod
     def needed(self, reach: Array) -> Array:
-        """Width and height [m] of the least such opening about the same place, (..., 2).
+        """Return width and height [m] of the smallest similar opening about the same place, (..., 2).
 
         Args:
             reach: of bodies along the probes [m], (..., probes).
@@ -112,16 +112,16 @@ class OpeningShape(ABC):
 
     @property
     def circumradius(self) -> float:
-        """The distance [m] of its farthest point from the gate's position."""
+        """The distance [m] of the opening's farthest point from the gate's position."""
         return float(np.linalg.norm(self.outline, axis=1).max())
 
     @property
     def size(self) -> Array:
-        """Width and height [m] of the upright box around it, (2,)."""
+        """Width and height [m] of the upright box around the opening, (2,)."""
         return np.asarray(np.ptp(self.outline, axis=0))
 
     def frame(self, thickness: float) -> Array:
-        """The outer corners of a frame of such thickness [m], one for each point of the outline, (K, 2)."""
+        """Return the outer corners of a frame of this thickness [m], one for each outline point, (K, 2)."""
         points = self.outline
         along = np.roll(points, -1, axis=0) - points
         along /= np.linalg.norm(along, axis=1)[:, None]
@@ -133,7 +133,7 @@ class OpeningShape(ABC):
 
 
 def edge_name(outward: Array) -> str:
-    """The edge with an outward normal (2,), as who passes upright sees it: left, upper, upper left, …"""
+    """Return the name of the edge with an outward normal (2,), in the direction of passage: left, upper, …"""
     left, up = outward / np.linalg.norm(outward)
     diagonal = np.sin(np.pi / 8.0)
     words = (

@@ -1,6 +1,6 @@
-"""Figures of aerobatics, each of them an element of courses and a maneuver of its own.
+"""Figures of aerobatics, each an element of courses and a maneuver of its own.
 
-The public names stand in `__init__.pyi`; each is imported when first used: no figure waits for another.
+The public names are in `__init__.pyi`; each is imported at its first use, so that no figure loads another.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Figures of aerobatics: where they stand, how large they are, how exactly they are flown."""
+"""Figures of aerobatics: their place, size and tolerances."""
 
 from __future__ import annotations
 
@@ -26,39 +26,39 @@ from aerobat.problem.maneuvers.maneuver import Maneuver
 from aerobat.problem.stage import Stage
 from aerobat.so3 import UP
 
-LEVEL = 1e-3  # [-] a direction of passage with less across the vertical has no heading
+LEVEL = 1e-3  # [-] horizontal component of a direction of passage, below which it has no heading
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """The place where a figure stands, with coordinates forward, left and up."""
+    """The place of a figure, with coordinates forward, left and up."""
 
     position: Array  # [m] world, (3,)
     axes: Array  # forward, left and up as rows, unit vectors, world, (3, 3)
-    gate: str | None  # the name of the gate that is passed there
-    min_thrust: float  # [m/s²] least along the attitude of a stage
-    tolerance: float  # [rad] of the attitudes
+    gate: str | None  # the name of the gate that is passed there, if any
+    min_thrust: float  # [m/s²] least specific thrust along the attitude of a stage
+    tolerance: float  # [rad] tolerance of the attitudes
 
     def direction(self, *along: float) -> Array:
-        """A direction in the world of its coordinates."""
+        """Return the world direction of a vector in the place's coordinates."""
         return np.asarray(along) @ self.axes
 
     def heads(self, along: Sequence[float], speed: float) -> Condition:
-        """Velocity of at least `speed` [m/s] along a direction."""
+        """Return the condition of a velocity of at least `speed` [m/s] along a direction."""
         return Condition(Quantity.VELOCITY, unit(self.direction(*along)), lower=speed)
 
     def near(self, point: Sequence[float], margin: float) -> tuple[Condition, ...]:
-        """Position [m] within a box about a point, by a margin [m] either way along each axis."""
+        """Return conditions that keep the position [m] within a margin [m] of a point along each axis."""
         return within(self.axes, self.axes @ (self.position + self.direction(*point)), margin)
 
     def stage(self, name: str, up: Sequence[float], *conditions: Condition, at_gate: bool = False) -> Stage:
-        """A stage with the thrust along a direction.
+        """Return a stage with the thrust along a direction.
 
         Args:
             name: of the stage.
-            up: where the thrust points, in coordinates of the place.
-            conditions: what else holds.
-            at_gate: true where the gate, if there is one, is passed then.
+            up: direction of the thrust, in coordinates of the place.
+            conditions: further conditions.
+            at_gate: true where the stage passes the gate, if there is one.
         """
         attitude = Attitude(unit(self.direction(*up)), self.min_thrust, self.tolerance)
         gate = self.gate if at_gate else None
@@ -89,23 +89,23 @@ class Figure(Maneuver):
     }
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check that either position or gate is given."""
         if (self.position is None) == (self.gate is None):
             raise FieldError("position", "or gate says where the figure is entered; give one of them")
 
     @validated
     def with_stage_thrust(self, gates: Sequence[Gate], thrust: Positive) -> Figure:
-        """Return a copy with a least specific thrust [m/s²] in its stages."""
+        """Return a copy with a minimum specific thrust [m/s²] in its stages."""
         return replace(self, min_thrust=thrust)
 
     def in_words(self, gates: Sequence[Gate]) -> str:
-        """Return its name, its gate, and that it is mirrored."""
+        """Return the figure's name, its gate, and whether it is mirrored."""
         return super().in_words(gates) + (" mirrored" if self.mirrored else "")
 
     def place(self, gates: Sequence[Gate], max_specific_thrust: float) -> Place:
-        """Return the place where the figure stands.
+        """Return the place of the figure.
 
-        Raises SpecError for a gate that is not there, or passed straight up or down.
+        Raises SpecError for a gate that does not exist, or is passed straight up or down.
         """
         position, forward = self.position, np.array([np.cos(self.heading), np.sin(self.heading), 0.0])
         if self.gate is not None:

@@ -1,4 +1,4 @@
-"""Figures of loops: the whole one, the halves of it, and the one that is flown tail first."""
+"""Figures of loops: the whole loop, its halves, and the loop that is flown tail first."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from aerobat.problem.maneuvers.figures.figure import Figure, Place
 from aerobat.problem.maneuvers.maneuver import maneuver
 from aerobat.problem.stage import Stage, StageSequence
 
-LOOP_ACCELERATION = 13.5  # [m/s²] to the middle: 4.5 m/s around 1.5 m, the power loop of [DDA]
-MARGIN = 0.25  # of a loop's radius, by which the path may miss it
+LOOP_ACCELERATION = 13.5  # [m/s²] centripetal: 4.5 m/s around 1.5 m, the power loop of [DDA]
+MARGIN = 0.25  # of a loop's radius, tolerance of positions on the loop
 FORWARD = (1.0, 0.0, 0.0)
 BACK = (-1.0, 0.0, 0.0)
 RIGHT = (0.0, -1.0, 0.0)
@@ -24,25 +24,25 @@ UP = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop whose plane is upright; the thrust points to its middle.
+    """A loop in a vertical plane, with the thrust toward its centre.
 
     Angles are counted from the bottom, forward and up: 90° is the front, 180° the top, 270° the rear.
     """
 
-    place: Place  # on the loop
-    place_deg: int  # the angle where that is
+    place: Place  # the point of entry on the loop
+    place_deg: int  # angle of the point of entry
     direction: int  # 1 up its front, −1 down it
     radius: float  # [m]
 
     NAMES: ClassVar[Mapping[int, str]] = {0: "bottom", 90: "front", 180: "top", 270: "rear"}
 
     def stage(self, angle_deg: int, speed: float = 0.0, name: str = "") -> Stage:
-        """The stage at an angle of the loop; the entry, where the place is, passes its gate, if it has one.
+        """Return the stage at an angle of the loop; at the entry it passes the place's gate, if there is one.
 
         Args:
-            angle_deg: where [deg].
+            angle_deg: of the stage [deg].
             speed: least speed along the loop [m/s].
-            name: of the stage; left out, the angle's, and the stage may be the entry.
+            name: of the stage; left out, the angle's name, and the stage may be the entry.
         """
         sine, cosine = self._at(angle_deg)
         place_sine, place_cosine = self._at(self.place_deg)
@@ -55,29 +55,29 @@ class Loop:
 
     @staticmethod
     def _at(angle_deg: int) -> tuple[float, float]:
-        """Sine and cosine."""
+        """Return sine and cosine."""
         return sin(radians(angle_deg)), cos(radians(angle_deg))
 
 
 @declared
 class LoopFigure(Figure):
-    """A figure of a loop, or of half a one, as large as its radius or its speed say."""
+    """A figure of a loop, or of half a loop, with a size given by its radius or its speed."""
 
     # [m] of the loop; left out, the radius on which `speed` takes 13.5 m/s² to the middle, as in [DDA]
     radius: Positive | None = None
 
-    ENTRY_DEG: ClassVar[int] = 0  # where on the loop it is entered
-    DIRECTION: ClassVar[int] = 1  # 1 up the front of the loop, −1 down it
+    ENTRY_DEG: ClassVar[int] = 0  # angle of entry on the loop
+    DIRECTION: ClassVar[int] = 1  # 1: up the front of the loop; −1: down it
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
-        """Return its stages. Raises SpecError for a gate that is not there, or has no heading."""
+        """Return the figure's stages. Raises SpecError for a missing gate, or a gate without a heading."""
         radius = self.radius or self.speed**2 / LOOP_ACCELERATION
         place = self.place(gates, max_specific_thrust)
         return StageSequence(tuple(self.stages(Loop(place, self.ENTRY_DEG, self.DIRECTION, radius))))
 
     @abstractmethod
     def stages(self, loop: Loop) -> Iterator[Stage]:
-        """The stages along its loop, before and after it."""
+        """Yield the stages along the loop, before and after it."""
 
 
 @maneuver("power-loop")
@@ -85,7 +85,7 @@ class PowerLoop(LoopFigure):
     """A loop forward and up, back to where it began, nose first all the way [DDA, FPV]."""
 
     def stages(self, loop: Loop) -> Iterator[Stage]:
-        """All around, from the bottom."""
+        """Yield the stages all around, from the bottom."""
         yield loop.stage(0, self.speed)
         yield from map(loop.stage, (90, 180, 270))
         yield loop.stage(0, self.speed, "end")
@@ -100,7 +100,7 @@ class SplitS(LoopFigure):
     DIRECTION: ClassVar[int] = -1
 
     def stages(self, loop: Loop) -> Iterator[Stage]:
-        """The knife edge of the half roll, and down the front."""
+        """Yield the knife edge of the half roll, and the stages down the front."""
         yield loop.place.stage("half roll", RIGHT, loop.place.heads(FORWARD, 0.0))
         yield loop.stage(180, self.speed)
         yield loop.stage(90)
@@ -114,7 +114,7 @@ class Immelmann(LoopFigure):
     TITLE: ClassVar[str] = "Immelmann"
 
     def stages(self, loop: Loop) -> Iterator[Stage]:
-        """Up the front, the knife edge of the half roll, and level flight."""
+        """Yield the stages up the front, the knife edge of the half roll, and level flight."""
         yield loop.stage(0, self.speed)
         yield from map(loop.stage, (90, 180))
         yield loop.place.stage("half roll", RIGHT, loop.place.heads(BACK, 0.0))
@@ -130,7 +130,7 @@ class MattyFlip(LoopFigure):
     DIRECTION: ClassVar[int] = -1
 
     def stages(self, loop: Loop) -> Iterator[Stage]:
-        """The pitch back, and all around, from the top."""
+        """Yield the pitch back, and the stages all around, from the top."""
         yield loop.place.stage("pitched back", BACK, loop.place.heads(FORWARD, 0.0))
         yield from map(loop.stage, (180, 90))
         yield loop.stage(0, self.speed)

@@ -1,4 +1,4 @@
-"""Passes in an unusual attitude: on the knife's edge, and upside down."""
+"""Passes in an unusual attitude: on knife edge, and upside down."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Corkscrew(Figure):
     lead: Positive = 3.0  # [m] along the axis, of one turn
     count: Repeats = 2  # turns
 
-    MARGIN: ClassVar[float] = 0.25  # of the radius, by which the path may miss the helix
+    MARGIN: ClassVar[float] = 0.25  # of the radius, tolerance of positions on the helix
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return the entry below the axis, upright, and the quarters of every turn."""
