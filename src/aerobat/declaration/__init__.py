@@ -1,7 +1,7 @@
-"""One declaration a field: frozen values checked by pydantic, from Python and from files alike.
+"""Declarations of fields: frozen values checked by pydantic, from Python and from files alike.
 
-A class is declared once, with `@declared` and a type for each field; calling it and reading it from a table
-then run through the same checks, and whatever is wrong becomes one sentence that names the field.
+A class is declared once, with `@declared` and a type for each field. Calls from Python and tables from files
+pass the same checks, and every error is one sentence that names the field.
 """
 
 from aerobat.declaration.declared import declared, from_table, to_table

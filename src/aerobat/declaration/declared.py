@@ -1,4 +1,4 @@
-"""The decorator that makes a class a value: frozen, checked by pydantic; such values as tables, and back."""
+"""The decorator for value classes, frozen and checked by pydantic; conversion from and to tables."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from aerobat.declaration.sentences import (
 from aerobat.declaration.values import by_value, is_default
 from aerobat.errors import SpecError
 
-PAPER_THRUST = ("eps", "ε")  # begins names of least specific thrusts, as the paper has them
+PAPER_THRUST = ("eps", "ε")  # prefixes of the paper's names for minimum thrusts
 T = TypeVar("T")
 
 CONFIG = ConfigDict(
-    strict=True,  # text, true and false are not numbers
+    strict=True,  # text and bool are not numbers
     allow_inf_nan=False,
     arbitrary_types_allowed=True,
     validate_default=True,
@@ -39,9 +39,9 @@ CONFIG = ConfigDict(
 
 
 def from_table(cls: type[T], table: Mapping[str, Any]) -> T:
-    """The value of the declared class `cls` that a table describes, whose keys are its fields and shorthands.
+    """Return the value of the declared class `cls` from a table, whose keys are fields and shorthands.
 
-    Raises FieldError, one sentence that names the field from here on, when the table does not fit.
+    Raises FieldError, one sentence that names the field, when the table does not fit.
     """
     if not isinstance(table, Mapping):
         raise FieldError("", f"must be a table, got {shown(table)}")
@@ -61,14 +61,14 @@ def from_table(cls: type[T], table: Mapping[str, Any]) -> T:
 
 
 def _angles(cls: Any) -> list[str]:
-    """The fields that have a shorthand in degrees."""
+    """Return the fields that have a shorthand in degrees."""
     fields = {field.name for field in dataclasses.fields(cls)}
     names = (key.removesuffix("_deg") for key in getattr(cls, "SHORTHANDS", ()) if key.endswith("_deg"))
     return [name for name in names if name in fields]
 
 
 def _unknown(key: str, known: Sequence[str]) -> UnknownKey:
-    """The error about a key that no field has; the paper's ε is told by its names here."""
+    """Return the error about an unknown key; for the paper's ε it suggests the corresponding fields."""
     thrusts = [name for name in known if name.startswith("min_") and name.endswith("thrust")]
     if thrusts and key.lower().startswith(PAPER_THRUST):
         return UnknownKey(key, f"is not a known key; the paper's ε is {one_of(thrusts)} here")
@@ -76,9 +76,9 @@ def _unknown(key: str, known: Sequence[str]) -> UnknownKey:
 
 
 def to_table(value: Any) -> dict[str, Any]:
-    """The table from which `from_table` makes exactly this value; fields at their defaults are left out.
+    """Return the table from which `from_table` makes exactly this value, without fields at their defaults.
 
-    Raises SpecError for a value that no file can hold.
+    Raises SpecError for a value that files cannot hold.
     """
     if not hasattr(value, "__checked_init__"):
         raise SpecError(f"{type(value).__name__} has no place in a file: it is not declared")
@@ -109,7 +109,7 @@ def _plain(value: Any) -> Any:
 
 
 def _components(array: Array) -> Any:
-    """Lists of numbers; a table of the components that are given where some are left free."""
+    """Return lists of numbers; with free components, a table of the given ones."""
     if not np.isnan(array).any():
         return array.tolist()
     return {axis: x for axis, x in zip("xyz", array.tolist(), strict=True) if not np.isnan(x)}
@@ -117,21 +117,21 @@ def _components(array: Array) -> Any:
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
 def declared(cls: type[T]) -> type[T]:
-    """Make `cls` a frozen dataclass whose fields pydantic checks, whoever gives them.
+    """Make `cls` a frozen dataclass with fields that pydantic checks.
 
     Called from Python or read by `from_table`, it raises SpecError, one sentence that names the field.
-    A float is a finite number, and neither text nor bool; lists become tuples, arrays are read-only. What
-    must hold between fields is for `__post_init__` to say, by FieldError. Equality and hash go by content.
+    A float must be a finite number, and neither text nor bool; lists become tuples, arrays are read-only.
+    `__post_init__` checks relations between fields and raises FieldError. Equality and hash compare contents.
 
     In files a key may stand for fields: `SHORTHANDS` then gives each such key its meaning. The key NAME_deg
     beside a field NAME holds that angle in degrees. The class method `expand(table)` replaces other
     shorthands by fields on reading, and the method `abbreviate(table)` does the reverse on writing.
     """
-    plain_class: Any = cls  # checked by its fields even where a field of its base takes tables
+    plain_class: Any = cls  # checked as a plain class, even if a field of its base takes tables
     plain_class.__get_pydantic_core_schema__ = classmethod(lambda _, source, handler: handler(source))
     made: Any = pydantic_dataclass(frozen=True, eq=False, config=CONFIG)(cls)
     in_order = sorted(made.__dataclass_fields__.items(), key=lambda item: item[1].kw_only is True)
-    made.__dataclass_fields__ = dict(in_order)  # those of a base that are given by name come last
+    made.__dataclass_fields__ = dict(in_order)  # keyword-only fields of a base come last
     made.__get_pydantic_core_schema__ = classmethod(_field_schema)
     made.__checked_init__ = _checked(made.__init__)
     made.__init__ = _named_init(made)
@@ -139,7 +139,7 @@ def declared(cls: type[T]) -> type[T]:
 
 
 def _checked(init: Callable[..., None]) -> Callable[..., None]:
-    """The initializer that raises FieldError instead of pydantic's error."""
+    """Return an initializer that raises FieldError in place of pydantic's error."""
 
     def checked_init(self: Any, values: Mapping[str, Any]) -> None:
         try:
@@ -151,7 +151,7 @@ def _checked(init: Callable[..., None]) -> Callable[..., None]:
 
 
 def _named_init(cls: Any) -> Callable[..., None]:
-    """The initializer for Python's callers, whose errors begin with the class."""
+    """Return the initializer for Python callers, with errors that begin with the class name."""
     names = tuple(field.name for field in dataclasses.fields(cls))
 
     @wraps(cls.__init__)
@@ -172,7 +172,7 @@ def _named_init(cls: Any) -> Callable[..., None]:
 
 
 def plain(value: Any) -> Any:
-    """A list as a tuple, a NumPy scalar as Python's."""
+    """Return a list as a tuple, and a NumPy scalar as Python's."""
     if isinstance(value, list):
         return tuple(value)
     if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
@@ -181,7 +181,7 @@ def plain(value: Any) -> Any:
 
 
 def _field_schema(cls: Any, source: Any, handler: Any) -> CoreSchema:
-    """Where a field is of the class `cls`, it takes an instance, or a table to make one of."""
+    """Return the schema of fields of the class `cls`: an instance, or a table to make one from."""
 
     def read(value: Any) -> Any:
         if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""The types of fields, declared once: what each takes, and what stands in the value afterwards."""
+"""Types of fields, declared once: the accepted values, and the resulting values."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from aerobat.arrays import AXES, Array
 from aerobat.declaration.sentences import FieldError, shown, unknown_key, within_field
 from aerobat.errors import SpecError
 
-_ROUND_OFF = 1e-12  # [-] components of a unit vector that are zero but for it
-_UNIT = 1e-15  # [-] how far from one a norm may be by round-off
-_CONTROL = {*map(chr, range(32)), "\x7f"}  # letters that no path needs and no terminal shows
-_MAX_MAGNITUDE = 1e15  # in SI units, and one over it the least: powers of more overflow
-_TWO_TURNS = 2.0 * tau * (1.0 + _ROUND_OFF)  # [rad] sums of angles stay within; more is hardly in radians
+_ROUND_OFF = 1e-12  # [-] smaller components of a unit vector are round-off and become zero
+_UNIT = 1e-15  # [-] round-off of the norm of a unit vector
+_CONTROL = {*map(chr, range(32)), "\x7f"}  # control characters, which no path needs and no terminal shows
+_MAX_MAGNITUDE = 1e15  # in SI units; its inverse is the smallest magnitude; powers of larger numbers overflow
+_TWO_TURNS = 2.0 * tau * (1.0 + _ROUND_OFF)  # [rad] largest angle: more is hardly in radians
 
 
 def in_radians(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """The table with an angle's shorthand in degrees replaced. Raises SpecError where both are given."""
+    """Return the table with an angle's shorthand in degrees replaced. Raises SpecError if both are given."""
     shorthand = f"{name}_deg"
     if shorthand not in table:
         return table
@@ -37,7 +37,7 @@ def in_radians(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def in_degrees(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """The table with an angle in degrees where those say exactly the same."""
+    """Return the table with an angle in degrees, if the conversion is exact."""
     angle = table.get(name, 0.0)
     for angle_deg in (round(degrees(angle), 9), degrees(angle)):
         if name in table and radians(angle_deg) == angle:
@@ -47,10 +47,10 @@ def in_degrees(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def unit(direction: ArrayLike) -> Array:
-    """`direction` (3,) scaled to length one, read-only. Raises FieldError when it is zero.
+    """Return `direction` (3,) scaled to length one, read-only. Raises FieldError when it is zero.
 
-    A unit vector comes back as it is, bit by bit; of any other, components that are only round-off become
-    zero, since they would couple axes that have nothing to do with each other.
+    A unit vector is returned unchanged, bit by bit. For other vectors, components that are only round-off
+    become zero, since they would couple unrelated axes.
     """
     vector = _direction(direction)
     components = vector.tolist()
@@ -61,12 +61,12 @@ def unit(direction: ArrayLike) -> Array:
 
 
 def array(value: Any, *shape: int) -> Array:
-    """A read-only array of exactly this shape, of numbers that may be infinite. Raises FieldError."""
+    """Return a read-only array of exactly this shape; numbers may be infinite. Raises FieldError."""
     return _shaped(value, shape, infinite=True)
 
 
 def finite(value: Any, *shape: int) -> Array:
-    """A read-only array of exactly this shape, of finite numbers. Raises FieldError."""
+    """Return a read-only array of exactly this shape, of finite numbers. Raises FieldError."""
     return _shaped(value, shape, infinite=False)
 
 
@@ -75,7 +75,7 @@ def _shaped(value: Any, shape: tuple[int, ...], infinite: bool) -> Array:
     numbers = _numbers(value, "", infinite) if holds_numbers else []
     try:
         made = np.array(numbers, dtype=np.float64)
-    except ValueError:  # ragged
+    except ValueError:  # nested lists of unequal lengths
         made = np.empty(0)
     if made.shape != shape:
         if isinstance(numbers, list) and shape[:1] == (len(numbers),):
@@ -89,7 +89,7 @@ def _shaped(value: Any, shape: tuple[int, ...], infinite: bool) -> Array:
 
 
 def number(value: Any, name: str) -> float:
-    """A finite number within reason that a file gives under `name`. Raises FieldError for anything else."""
+    """Return a finite number within reason that a file gives under `name`. Raises FieldError for anything else."""
     with within_field(name):
         made = _numbers(value, "", infinite=False)
         if not isinstance(made, float):
@@ -98,7 +98,7 @@ def number(value: Any, name: str) -> float:
 
 
 def _numbers(value: Any, place: str, infinite: bool) -> Any:
-    """Nested lists of floats from lists or arrays. Raises FieldError for the first entry that is none."""
+    """Return nested lists of floats from lists or arrays. Raises FieldError for the first invalid entry."""
     if isinstance(value, float) and (isfinite(value) or (infinite and value == value)):
         return float(value) + 0.0  # no negative zeros: equal values have equal bytes
     if hasattr(value, "__array__"):
@@ -117,7 +117,7 @@ def _vector(value: Any) -> Array:
 
 
 def _small(vector: Array) -> Array:
-    """The vector. Raises FieldError where a finite component is beyond all reason."""
+    """Return the vector. Raises FieldError where a finite component exceeds _MAX_MAGNITUDE."""
     for i, x in enumerate(vector.tolist()):
         _bounded(x, f"[{i}]")
     return vector
@@ -137,7 +137,7 @@ def _direction(value: Any) -> Array:
 
 
 def _partial(value: Any) -> Array:
-    """Three numbers, or a table of those that are given; NaN stands for a free one."""
+    """Return three numbers, from themselves or a table of some of them; NaN stands for a free component."""
     given = value
     if isinstance(value, Mapping):
         for key in value:
@@ -213,10 +213,10 @@ def _path(value: Any) -> Any:
 
 
 class _Instance:
-    """Marks a type whose values are taken as they are, of that class, and whose own fields nobody checks."""
+    """Marks a type whose values must be instances of that class; their fields are not checked."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Instances alone: a module or a class may have all that a protocol asks for, and is none."""
+        """Return a schema for instances; modules and classes are rejected even if they fit a protocol."""
 
         def instance(value: Any) -> Any:
             if isinstance(value, type | ModuleType) or not isinstance(value, source):
@@ -246,7 +246,7 @@ Limit = Annotated[
 Count = Annotated[int, Field(ge=1, description="whole number, 1 or more")]
 Repeats = Annotated[int, Field(ge=1, le=1000, description="whole number from 1 to 1000")]  # in one problem
 Seed = Annotated[int, Field(ge=0, description="whole number, 0 or more")]
-AS_IT_IS = _Instance()  # Annotated[BodyState, AS_IT_IS]: an instance of a class that is not declared
+AS_IT_IS = _Instance()  # Annotated[BodyState, AS_IT_IS]: an instance of a class without declared fields
 Finite = Annotated[float, AfterValidator(lambda number: _bounded(number)), Field(description="number")]
 Number = Annotated[
     float,

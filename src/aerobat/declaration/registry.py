@@ -1,4 +1,4 @@
-"""Classes that files and commands call by name: of this package, of a user's file, of installed packages."""
+"""Registries of classes by name, from this package, users' files and installed packages."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ T = TypeVar("T")
 class Registry(Generic[T]):
     """The declared classes of one base, each by its name.
 
-    The package's own of `modules` come first, in that order; each module is imported when its name is asked
-    for. Installed packages add theirs through the entry points of `group`, which are imported when a name is
-    asked for that nobody has registered yet, or all names are.
+    The package's own classes of `modules` come first, in that order; each module is imported when its name is
+    first requested. Installed packages add classes through the entry points of `group`. These are imported
+    when an unregistered name is requested, or all names are.
 
     Args:
-        base: what all classes are subclasses of.
-        noun: what one of them is called in sentences.
+        base: the common base class.
+        noun: the word for one class in messages.
         group: the group of entry points, such as "aerobat.maneuvers".
         modules: by name, the modules that register it when they are imported.
     """
@@ -48,7 +48,7 @@ class Registry(Generic[T]):
         self._searched = False
 
     def add(self, name: str, cls: type[T]) -> type[T]:
-        """Declare `cls` and register it as `name`. Raises SpecError for what does not fit or is taken."""
+        """Declare `cls` and register it as `name`. Raises SpecError for an unfit class or a name in use."""
         if not isinstance(cls, type):
             raise SpecError(f"{self._one} is a class, got {shown(cls)}; write its name above a class")
         if not issubclass(cls, self._base):
@@ -72,7 +72,7 @@ class Registry(Generic[T]):
         return self._classes[name]
 
     def __getitem__(self, name: str) -> type[T]:
-        """The class of that name. Raises SpecError, with the closest name, when there is none."""
+        """Return the class of that name. Raises SpecError, with the closest name, when there is none."""
         if name not in self:
             raise unknown_name(self._noun, name, self)
         return self._classes[name]
@@ -88,7 +88,7 @@ class Registry(Generic[T]):
         return iter((*self._modules, *sorted(self._classes.keys() - self._modules)))
 
     def read(self, value: Any) -> T:
-        """The value that a field takes: one of the base class, or a table whose `kind` names its class.
+        """Return a field's value: an instance of the base class, or made from a table with its `kind`.
 
         Raises FieldError for anything else.
         """
@@ -108,7 +108,7 @@ class Registry(Generic[T]):
         return from_table(self[kind], {key: each for key, each in value.items() if key != "kind"})
 
     def instance(self, value: Any) -> T | None:
-        """Return what is one already, or one of that name with its defaults; None for None.
+        """Return an instance as it is, the class of a name with its defaults, or None for None.
 
         Raises FieldError for anything else.
         """
@@ -135,17 +135,17 @@ class Registry(Generic[T]):
             _import(entry.load, f"{self._group} of the installed package {entry.value}")
 
 
-_PLUGIN = "aerobat_plugin_"  # begins the names of the modules that users' files are
+_PLUGIN = "aerobat_plugin_"  # prefix of the names of modules made of users' files
 
 
 def imported_plugins() -> tuple[str, ...]:
-    """The paths of the files that `import_plugin` has run, for another process to do the same."""
+    """Return the paths of files that `import_plugin` has run, so that another process can run them too."""
     found = ((name, module.__file__) for name, module in sys.modules.items() if name.startswith(_PLUGIN))
     return tuple(path for _, path in found if path is not None)
 
 
 class _PluginLoader(SourceFileLoader):
-    """Loader of a user's file that keeps no byte-code beside it: a command that is refused writes nothing."""
+    """Loader of a user's file that writes no byte code beside it."""
 
     def set_data(self, path: str, data: Any, *, _mode: int = 0) -> None:
         """Write nothing."""
@@ -153,7 +153,7 @@ class _PluginLoader(SourceFileLoader):
 
 @validated
 def import_plugin(path: PathName) -> None:
-    """Run a user's Python file, which registers maneuvers and planners of its own, once.
+    """Run a user's Python file, which registers maneuvers, planners and other classes, once.
 
     Raises SpecError when there is no such file or it fails.
     """
@@ -169,10 +169,10 @@ def import_plugin(path: PathName) -> None:
     if spec is None or file.suffix != ".py" or not file.is_file():
         raise SpecError(f"plugin {path}: there is no such Python file; give the path of a .py file")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # before it runs: annotations are looked up there
+    sys.modules[name] = module  # before it runs: annotations are looked up in this module
     try:
         _import(lambda: loader.exec_module(module), f"plugin {path}")
-    except BaseException:  # an interrupt among them
+    except BaseException:  # also for interrupts
         del sys.modules[name]
         raise
 
@@ -189,7 +189,7 @@ def _import(load: Any, what: str) -> None:
 
 
 def _line(error: BaseException) -> str:
-    """Return the line of a plugin at which it failed, after a colon; nothing where it was in no plugin."""
+    """Return the line of a plugin at which an error occurred, after a colon; "" if it was in no plugin."""
     if isinstance(error, SyntaxError) and error.filename in imported_plugins():
         return f":{error.lineno}"
     found = [line for path, line in passed_lines(error) if path in imported_plugins()]
@@ -197,12 +197,12 @@ def _line(error: BaseException) -> str:
 
 
 def placed(error: SpecError, method: Any = None) -> SpecError:
-    """Return the error with the plugin's file and line before its sentence, where one has brought it about.
+    """Return the error with a plugin's file and line before its sentence, if a plugin caused it.
 
     Args:
-        error: What was raised.
-        method: Of the class that answered wrongly; its beginning is told where the error came through no line
-            of a plugin.
+        error: The error.
+        method: Of the class with a wrong answer; its first line is named if the error passed through no
+            plugin.
     """
     code = getattr(unwrap(method), "__code__", None) if callable(method) else None
     lines = [*([] if code is None else [(code.co_filename, code.co_firstlineno)]), *passed_lines(error)]
@@ -213,6 +213,6 @@ def placed(error: SpecError, method: Any = None) -> SpecError:
 
 
 def passed_lines(error: BaseException) -> list[tuple[str, int]]:
-    """Return the files and lines that an error came through, and those in whose handling it was raised."""
+    """Return the files and lines that an error and its causes passed through."""
     frames = (frame for each in chain_of(error) for frame in extract_tb(each.__traceback__))
     return [(frame.filename, frame.lineno or 0) for frame in frames]

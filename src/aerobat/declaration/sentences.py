@@ -1,4 +1,4 @@
-"""Complaints about a value, each as one sentence about its field."""
+"""Error messages about values, each one sentence about a field."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from pydantic import ValidationError
 
 from aerobat.errors import SpecError
 
-_LONGEST = 60  # letters of a name that is looked for among others
+_LONGEST = 60  # letters of an unknown name that are compared with known names
 
 
 class FieldError(SpecError):
     """A value that does not fit its declaration.
 
     Args:
-        field: its place within what is checked, such as "rotors[2].spin"; empty for the whole of it.
+        field: its place within the checked value, such as "rotors[2].spin"; empty for the whole value.
         complaint: what follows the field in the sentence, such as "must be positive, got -1".
     """
 
@@ -34,17 +34,17 @@ class FieldError(SpecError):
         return type(self), (self.field, self.complaint)
 
     def inside(self, place: str) -> FieldError:
-        """The same error seen from outside, where this value stands at `place`."""
+        """Return the error with the field's place seen from outside, where this value is at `place`."""
         dot = "" if not place or not self.field or self.field.startswith("[") else "."
         return type(self)(place + dot + self.field, self.complaint)
 
 
 class UnknownKey(FieldError):
-    """A key that no field has; told before other errors, since it is often why another key is missing."""
+    """An unknown key, reported before other errors, since it often explains why another key is missing."""
 
 
 def unknown_key(key: str, known: Iterable[str]) -> UnknownKey:
-    """The error that says no field has this key, and which known one is closest."""
+    """Return the error about an unknown key, with the closest known key."""
     known = tuple(known)
     guess = closest(key[:_LONGEST], known)
     remedy = f"did you mean {guess!r}?" if guess else f"known keys are {', '.join(known)}"
@@ -52,12 +52,12 @@ def unknown_key(key: str, known: Iterable[str]) -> UnknownKey:
 
 
 def _key(key: str) -> str:
-    """A key as an error names it: as it is, unless that is no line, or a long one."""
+    """Return a key as errors show it: quoted and shortened if it is long or not printable."""
     return key if key.isprintable() and len(key) <= _LONGEST else shown(key)
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> SpecError:
-    """The error that says no `kind` has this name, which known name is closest, and which there are."""
+    """Return the error about an unknown name of a `kind`, with the closest and all known names."""
     known = tuple(known)
     if not known:
         return SpecError(f"no {kind} named {shown(name)}: there is none at all")
@@ -67,15 +67,15 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> SpecError:
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that is most like `name`, if any is like it."""
-    import difflib  # only once something is wrong
+    """Return the known name closest to `name`, if any is similar."""
+    import difflib  # slow import, needed for errors only
 
     return next(iter(difflib.get_close_matches(name.lower(), known, n=1)), None)
 
 
 @contextmanager
 def within_field(place: str) -> Iterator[None]:
-    """Say of any SpecError raised inside that it is about the value at `place`."""
+    """Convert any SpecError raised inside into one about the value at `place`."""
     try:
         yield
     except SpecError as error:
@@ -83,11 +83,11 @@ def within_field(place: str) -> Iterator[None]:
 
 
 def as_field_error(error: SpecError) -> FieldError:
-    """The error with a field; a sentence about the whole value follows its place after a colon."""
+    """Return the error as a FieldError; a sentence about the whole value follows its place after a colon."""
     return error if isinstance(error, FieldError) else FieldError("", f": {error}")
 
 
-# Complaints by pydantic's types of error; {} is filled from the error's context.
+# Messages by pydantic's types of errors; {} is filled from the error's context.
 _COMPLAINTS = {
     "missing": "is missing; add it",
     "float_type": "must be a number",
@@ -109,13 +109,13 @@ _COMPLAINTS = {
     "less_than": "must be less than {lt:g}",
     "less_than_equal": "must be {le:g} or less",
 }
-_COMPLETE = {"missing", "too_short", "too_long"}  # their sentence needs no "got ..."
+_COMPLETE = {"missing", "too_short", "too_long"}  # messages without "got ..."
 
 
 def first_complaint(error: ValidationError) -> FieldError:
-    """The first of pydantic's errors as one about its field; an unknown key comes before others.
+    """Return the first of pydantic's errors as a FieldError; an unknown key comes before others.
 
-    Where the first is a missing field, all are named that are missing.
+    If the first is a missing field, the message names all missing fields.
     """
     found = [_complaint(detail) for detail in error.errors(include_url=False)]
     unknown = next((each for each in found if isinstance(each, UnknownKey)), None)
@@ -125,7 +125,7 @@ def first_complaint(error: ValidationError) -> FieldError:
 
 
 def missing_fields(names: Sequence[str], where: str = "") -> FieldError:
-    """The error that says which fields are missing, and where to add them."""
+    """Return the error that names the missing fields, and where to add them."""
     if len(names) == 1:
         return FieldError(names[0], f"is missing; add it{where}")
     others = "".join(f", {name}" for name in names[1:-1]) + f" and {names[-1]}"
@@ -156,17 +156,17 @@ def _dotted(location: Sequence[str | int]) -> str:
 
 
 def with_article(noun: str) -> str:
-    """The noun with its indefinite article."""
+    """Return the noun with its indefinite article."""
     return f"{'an' if noun[0] in 'AEIOaeio' else 'a'} {noun}"
 
 
 def one_of(names: Sequence[str]) -> str:
-    """Alternatives in words: "a, b or c"."""
+    """Return alternatives as text: "a, b or c"."""
     return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def shown(value: Any) -> str:
-    """The value as an error shows it, short."""
+    """Return the value as short text for errors."""
     if dataclasses.is_dataclass(value):
         return (
             f"the class {value.__name__}" if isinstance(value, type) else with_article(type(value).__name__)

@@ -1,8 +1,8 @@
-"""The decorator for what users call: arguments are checked by their annotations before anything happens.
+"""The decorator of public functions: arguments are checked by their annotations before the function runs.
 
-A number is finite and neither text nor bool, an array holds numbers, a class takes its instances, a path can
-be one; what does not fit is one sentence that names the argument and, where it fits another, that one. The
-annotations are read when a function is first called, so that importing stays quick.
+A number must be finite and neither text nor bool; an array must hold numbers; a class takes its instances; a
+path must be a possible one. Wrong arguments raise SpecError, one sentence that names the argument and, if the
+value fits another argument, that one. Annotations are read at the first call, so that imports stay fast.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from aerobat.declaration.sentences import FieldError, closest, first_complaint, 
 from aerobat.errors import SpecError
 
 F = TypeVar("F", bound=Callable[..., Any])
-Suggest = Callable[[str], str]  # of an argument that a function has not, what was meant; "" where unknown
-Check = Callable[[Any], Any]  # the value to go on with; raises FieldError
+Suggest = Callable[[str], str]  # from the name of an unknown argument to a suggestion; "" where there is none
+Check = Callable[[Any], Any]  # returns the checked value; raises FieldError
 
-_NUMBERS = (bool, int, float, complex)  # of which Python takes one for another
+_NUMBERS = (bool, int, float, complex)  # types that Python converts into one another
 _ARRAYS = frozenset(get_args(ArrayLike))
 
 
 def validated(function: F) -> F:
-    """Make a function, or the making of a class's values, raise SpecError for arguments that do not fit.
+    """Make a function or a class raise SpecError for arguments that do not fit its annotations.
 
-    Neither the function nor its type changes otherwise.
+    The function and its type stay otherwise unchanged.
     """
     if isinstance(function, type):
         made: Any = function
@@ -47,11 +47,11 @@ _SUGGESTIONS: dict[Any, Suggest] = {}
 
 
 def suggest_for(function: Callable[..., Any], suggest: Suggest) -> None:
-    """Let a validated function's error about an argument that it has not say what was meant.
+    """Add suggestions to a validated function's error about unknown arguments.
 
     Args:
         function: The validated function.
-        suggest: Of the argument's name, the suggestion; empty where there is none.
+        suggest: Returns the suggestion for an argument's name; empty where there is none.
     """
     _SUGGESTIONS[inspect.unwrap(function)] = suggest
 
@@ -71,7 +71,7 @@ def _checked(function: Callable[..., Any], name: str, annotated: Any) -> Callabl
 
 
 class _Arguments:
-    """The arguments of one function, each with its check."""
+    """The arguments of one function, with the check of each."""
 
     def __init__(self, function: Callable[..., Any], name: str, annotated: Any) -> None:
         self._name = name
@@ -85,7 +85,7 @@ class _Arguments:
         self._checks = {name: check_of(hint) for name, hint in hints.items()}
 
     def fitting(self, args: Sequence[Any], kwargs: Mapping[str, Any]) -> inspect.BoundArguments:
-        """The arguments to go on with. Raises SpecError."""
+        """Return the checked arguments. Raises SpecError."""
         try:
             bound = self._signature.bind(*args, **kwargs)
         except TypeError as error:
@@ -104,7 +104,7 @@ class _Arguments:
         return bound
 
     def _takes(self, kwargs: Mapping[str, Any]) -> str:
-        """What was meant by an argument that there is not, or else what there is."""
+        """Return a suggestion for an unknown argument, or else the names of all arguments."""
         strange = next((name for name in kwargs if name not in self._names), "")
         suggest = _SUGGESTIONS.get(self._function)
         suggestion = suggest(strange) if strange and suggest else ""
@@ -114,7 +114,7 @@ class _Arguments:
         return suggestion or f"it takes {', '.join(self._names) or 'nothing'}"
 
     def _meant(self, value: Any, wrong: str) -> str:
-        """The argument that would take the value; of a plan that is but named, how to make it."""
+        """Return the argument that the value fits; for the name of a plan, how to make the plan."""
         if isinstance(value, str) and wrong == "plan":
             return f"; plan it first, as ab.plan({shown(value)})"
         if isinstance(value, str | NoneType):
@@ -125,7 +125,7 @@ class _Arguments:
 
 
 def _hints(annotated: Any, names: set[str]) -> dict[str, Any]:
-    """The annotations of the arguments alone: what is returned may be known to type checkers only."""
+    """Return the annotations of the arguments; the result's may be known to type checkers only."""
     if isinstance(annotated, type):
         return {
             name: hint
@@ -136,12 +136,12 @@ def _hints(annotated: Any, names: set[str]) -> dict[str, Any]:
     holder: Any = type(annotated.__name__, (), {"__annotations__": own})
     try:
         return get_type_hints(holder, annotated.__globals__, include_extras=True)
-    except NameError:  # a user's own annotations, of names that only type checkers know
+    except NameError:  # a user's annotations with names that only type checkers know
         return {}
 
 
 def _alternatives(hint: Any) -> Iterator[Any]:
-    """The members of a union; of all that NumPy makes arrays of, ArrayLike alone."""
+    """Yield the members of a union; the members of ArrayLike are combined into ArrayLike."""
     members = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     if _ARRAYS and set(members) >= _ARRAYS:
         yield ArrayLike
@@ -150,13 +150,13 @@ def _alternatives(hint: Any) -> Iterator[Any]:
 
 
 def _classes(hint: Any) -> tuple[type, ...]:
-    """The classes whose instances an argument takes as they are."""
+    """Return the classes whose instances an argument accepts without a check."""
     found = (each for each in _alternatives(hint) if isinstance(each, type))
     return tuple(each for each in found if each is not Any and each not in _NUMBERS)
 
 
 def check_of(hint: Any) -> Check:
-    """The check of values by an annotation."""
+    """Return the check of values by an annotation."""
     alternatives = list(_alternatives(hint))
     checks = [_check_of_one(each) for each in alternatives]
 
@@ -195,7 +195,7 @@ def _check_of_one(hint: Any) -> Check:
 
 
 def _declared_as(hint: Any) -> Check:
-    """The check by a type of fields, as those of declared classes."""
+    """Return the check by a type of fields, as in declared classes."""
     adapter: Any = None
 
     def check(value: Any) -> Any:
@@ -219,7 +219,7 @@ def _instance_of(cls: type) -> Check:
 
 
 def _sequence_of(*members: Any) -> Check:
-    """The check of a sequence: of one kind, or of a fixed number of entries."""
+    """Return the check of a sequence: of one kind of entries, or of a fixed number of entries."""
     is_fixed = len(members) > 1 and members[-1] is not ...
     checks = [check_of(member) for member in members if member is not ...]
 
@@ -239,7 +239,7 @@ def _sequence_of(*members: Any) -> Check:
 
 
 def _array(value: Any) -> Any:
-    """The value, numbers of which NumPy makes one array."""
+    """Return the value if NumPy can make one array of its numbers. Raises FieldError otherwise."""
     try:
         numbers(value, "")
     except SpecError:
@@ -254,7 +254,7 @@ def _callable(value: Any) -> Any:
 
 
 def _described(hint: Any) -> str:
-    """The words for a type."""
+    """Return words for a type."""
     if hint is str:
         return "a name"
     if hint is ArrayLike or get_origin(hint) is np.ndarray:

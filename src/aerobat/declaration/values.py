@@ -1,4 +1,4 @@
-"""Values: compared, hashed, copied and pickled by their content, and told in a line."""
+"""Decorators for value classes: comparison, hash, copy and pickle by content, and one line of text."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import numpy as np
 _REPORTER = "aerobat.reporting.notebooks"
 T = TypeVar("T")
 
-_NAN = "nan"  # in place of what is not equal to itself
-_FEW = 9  # entries: a longer list is told by its length
-_known_names: dict[type[Any], tuple[str, ...]] = {}  # of fields, by class
+_NAN = "nan"  # stands for NaN, which is not equal to itself
+_FEW = 9  # entries; a longer list is shown by its length
+_known_names: dict[type[Any], tuple[str, ...]] = {}  # names of fields, by class
 
 
 def in_notebooks(cls: type[T]) -> type[T]:
@@ -27,23 +27,23 @@ def in_notebooks(cls: type[T]) -> type[T]:
 
 
 def _repr_html_(self: Any) -> str:
-    """HTML of the value: a table, and its picture."""
+    """Return the value as HTML: a table and its picture."""
     html: str = import_module(_REPORTER).html(self)
     return html
 
 
 def _repr_png_(self: Any) -> bytes | None:
-    """The picture as PNG; None where there is none."""
+    """Return the picture as PNG; None where there is none."""
     png: bytes | None = import_module(_REPORTER).png(self)
     return png
 
 
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(dataclasses.field,))
 def by_value(cls: type[T]) -> type[T]:
-    """Make a class a frozen dataclass that is its content: equality, hash, pickling, and a line as its text.
+    """Make a class a frozen dataclass with equality, hash, pickling and a line of text by its content.
 
-    Arrays count by shape and numbers, NaN equals NaN. A class that has a text or a representation of its own
-    keeps it. A class that `declared` made a dataclass remains that.
+    Arrays are compared by shape and numbers; NaN equals NaN. A class with a text or a representation of its
+    own keeps it. A class that is a dataclass already, by `declared`, stays as it is.
     """
     if "__dataclass_fields__" not in vars(cls):
         cls = dataclasses.dataclass(frozen=True, eq=False)(cls)
@@ -57,7 +57,7 @@ def by_value(cls: type[T]) -> type[T]:
 
 
 def short(cls: type[T]) -> type[T]:
-    """Let a class be represented by its text, where its content fills pages."""
+    """Let a class be represented by its text, where a full representation would fill pages."""
     made: Any = cls
     made.__repr__ = _representation
     return cls
@@ -96,7 +96,7 @@ def _equal(self: Any, other: object) -> Any:
 
 
 def _hash(self: Any) -> int:
-    """The content's hash, kept where nothing can change it: vehicles and trajectories are keys of caches."""
+    """Return the content's hash, cached if all arrays are read-only: vehicles and paths are cache keys."""
     known: int | None = self.__dict__.get("_hash")
     if known is None:
         parts = [getattr(self, name) for name in _names(type(self))]
@@ -107,13 +107,13 @@ def _hash(self: Any) -> int:
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:
-    """Pickled by its fields and checked anew: what comes back is read-only too."""
+    """Return the pickle of the fields, which are checked again on loading, so that arrays stay read-only."""
     values = (getattr(self, name) for name in _names(type(self)))
     return type(self), tuple(dict(value) if isinstance(value, Mapping) else value for value in values)
 
 
 def _text(self: Any) -> str:
-    """The class with the fields that are not at their defaults."""
+    """Return the class name with the fields that are not at their defaults."""
     shown = (
         f"{field.name}={_short(getattr(self, field.name))}"
         for field in dataclasses.fields(self)
@@ -141,7 +141,7 @@ def _short(value: Any) -> str:
 
 
 def is_default(value: Any, field: dataclasses.Field[Any]) -> bool:
-    """True where a field of a value has what it has when nothing is said."""
+    """Return True where a field of a value has its default."""
     if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
         return False
     default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
