@@ -1,6 +1,6 @@
-"""Live links to vehicles, each with a clock of its own: what they share, a simulated vehicle, and MAVLink.
+"""Live links to vehicles, each with its own clock: shared parts, a simulated vehicle, and MAVLink.
 
-The public names stand in `__init__.pyi`; each is imported when first used.
+The public names are in `__init__.pyi`; each is imported at its first use.
 """
 
 import lazy_loader

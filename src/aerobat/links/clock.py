@@ -1,4 +1,4 @@
-"""Clocks of live links, which need not show the time of the wall."""
+"""Clocks of live links, which may differ from wall time."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """A clock to read and to wait by."""
+    """A clock to read and to wait for."""
 
     def now(self) -> float:
-        """The time [s] since the clock began."""
+        """Return the time [s] since the clock began."""
 
     def sleep_until(self, instant: float) -> None:
-        """Wait until this time [s], not at all where it has passed."""
+        """Wait until this time [s]; return at once where it has passed."""
 
 
 class WallClock:
-    """The wall's time, `speed` times as fast; one below 1 gives a slow machine more time for each tick."""
+    """Wall time, `speed` times as fast; a speed below 1 gives a slow machine more time for each tick."""
 
     def __init__(self, speed: float = 1.0) -> None:
         self._speed = speed

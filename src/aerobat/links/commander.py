@@ -1,6 +1,6 @@
-"""A vehicle's course through a session of maneuvers: up, from hover to hover by missions, and down.
+"""The sequence of a vehicle's session: take-off, missions from hover to hover, and landing.
 
-It is the same for every link whose vehicle tracks points of a path: it knows times, states and goals only.
+It is the same for every link whose vehicle tracks points of a path: it uses times, states and goals only.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-_STANDING = 1.0  # [s] for which goals stay on the ground once it is reached
-_BEHIND = 0.25  # [m] off its goal, from which on a vehicle does not climb or land as ordered
-_PATIENCE = 10.0  # [s] longer than either takes, after which the vehicle is left to itself
-_SPINNING_UP = 1.5  # [s] for which goals stay on the ground before they climb: the vehicle gets ready
-_ASTRAY = 1.5  # [m] from its goal, from which on a vehicle does not follow it
-_STILL = 0.15  # [m/s] of a hover
-_ALOFT = 0.3  # [m] above the ground, from which on a still vehicle hovers
-_RECENT = 0.5  # [s] for which an observed state counts as the present one
+_STANDING = 1.0  # [s] for which goals stay on the ground after a landing
+_BEHIND = 0.25  # [m] distance from its goal above which a vehicle does not climb or land as ordered
+_PATIENCE = 10.0  # [s] beyond the duration of a climb or landing, after which the vehicle is left to itself
+_SPINNING_UP = 1.5  # [s] for which goals stay on the ground before a climb, while the rotors spin up
+_ASTRAY = 1.5  # [m] distance from its goal above which a vehicle does not follow its goals
+_STILL = 0.15  # [m/s] largest speed of a hover
+_ALOFT = 0.3  # [m] above the ground, from which a vehicle at rest counts as hovering
+_RECENT = 0.5  # [s] for which an observed state counts as present
 _LONG = 1.0  # [s] without a state, after which the vehicle is left to itself
 
 
 class Doing(StrEnum):
-    """Activity of a vehicle."""
+    """The activity of a vehicle."""
 
     NOTHING = "left to itself"
     CLIMBING = "climbing"
@@ -44,7 +44,7 @@ class Doing(StrEnum):
 
 
 class Commander:
-    """The goal of each tick, from orders and from observed states of the vehicle.
+    """Computes the goal of each tick from orders and observed states of the vehicle.
 
     Goals are given one period ahead, so that each is known when its time comes.
     """
@@ -55,23 +55,23 @@ class Commander:
         """Prepare, with the vehicle left to itself.
 
         Args:
-            vehicle: whose thrust counts when braking.
+            vehicle: of which the maximum thrust is used for braking.
             gravity: [m/s²].
             period: from one tick to the next [s].
-            say: what takes sentences about the course of things.
+            say: receives sentences about the progress.
         """
         self.doing = Doing.NOTHING
         self.observed: Observed | None = None  # the last state
-        self.route: Route | None = None  # that is followed, or hovered at the end of
-        self.ground = 0.0  # [m] the height at which it took off
+        self.route: Route | None = None  # the route that is followed, or at whose end the vehicle hovers
+        self.ground = 0.0  # [m] the height of take-off
         self.log: list[Observed] = []  # of the last plan that was flown, times since its start
         self.mission: Mission[PathGoal] | None = None  # the last one
         self._vehicle, self._gravity, self._period, self._say = vehicle, gravity, period, say
-        self._there_by = 0.0  # [s] until when a vehicle has to be up, or down
-        self._leapt = False  # between two states, since that began
+        self._there_by = 0.0  # [s] time limit for reaching the top of a climb, or the ground
+        self._leapt = False  # the observed position has jumped since a climb or landing began
 
     def observe(self, observed: Observed) -> None:
-        """Take note of a state."""
+        """Process an observed state."""
         if self.observed is not None:
             if observed.time <= self.observed.time:
                 return
@@ -82,7 +82,7 @@ class Commander:
             self.log.append(observed._replace(time=observed.time - self.mission.maneuver_began))
 
     def take_off(self, now: float, height: float) -> None:
-        """Climb by so much [m] from the ground. Raises SpecError for a vehicle that is not on it."""
+        """Climb by `height` [m] from the ground. Raises SpecError for a vehicle that is not on the ground."""
         observed = self._recent(now)
         if self.doing is not Doing.NOTHING:
             raise SpecError(f"the vehicle is {self.doing} already")
@@ -93,7 +93,7 @@ class Commander:
         self._go(Doing.CLIMBING, now + _SPINNING_UP, up, yaw_of(observed.body.q_world_body))
 
     def hover(self, now: float) -> None:
-        """Come to a hover from whatever it does. Raises SpecError where it does nothing."""
+        """Come to a hover from any activity. Raises SpecError for a vehicle that is left to itself."""
         if self.doing is Doing.NOTHING:
             raise SpecError("the vehicle is left to itself; have it take off first")
         if self.doing is Doing.MANEUVERING and self.mission is not None:
@@ -101,7 +101,7 @@ class Commander:
         self._brake(now, self._recent(now))
 
     def land(self, now: float) -> None:
-        """Go down to the ground from a hover. Raises SpecError where it does not hover."""
+        """Land from a hover. Raises SpecError where the vehicle does not hover."""
         observed = self.require_hover(now)
         here, yaw = np.array(observed.body.position), yaw_of(observed.body.q_world_body)
         if self.route is not None:  # from its end, where it hovers
@@ -111,7 +111,7 @@ class Commander:
         self._go(Doing.LANDING, now, down, yaw)
 
     def require_hover(self, now: float) -> Observed:
-        """Return the state of a vehicle that hovers, ours or left to itself. Raises SpecError for another."""
+        """Return the state of a vehicle that hovers, also one left to itself. Raises SpecError otherwise."""
         observed = self._recent(now)
         speed, height = hypot(*observed.body.velocity), observed.body.position[2] - self.ground
         if self.doing is Doing.HOVERING and speed <= _STILL:
@@ -124,15 +124,15 @@ class Commander:
         raise SpecError(f"the vehicle is {doing}; wait until it hovers")
 
     def begin(self, now: float, mission: Mission[PathGoal]) -> None:
-        """Fly a mission from a hover. Raises SpecError where it does not hover."""
+        """Fly a mission from a hover. Raises SpecError where the vehicle does not hover."""
         mission.join(now, self.require_hover(now))
         self.mission, self.log, self.route = mission, [], None
         self.doing = Doing.MANEUVERING
 
     def step(self, now: float, late: float = 0.0) -> PathGoal | None:
-        """The goal for a period after this time [s]; None where the vehicle is left to itself.
+        """Return the goal one period after this time [s]; None where the vehicle is left to itself.
 
-        `late`: by how much the goal misses its time [s].
+        `late`: by how much the goal is late [s].
         """
         if self.doing is Doing.MANEUVERING:
             goal = self._of_mission(now, late)
@@ -153,20 +153,20 @@ class Commander:
         return PathGoal.upright(self._goal_on_route(now), self._gravity)
 
     def _of_mission(self, now: float, late: float) -> PathGoal | PositionGoal | None:
-        """The goal of the mission, or of what follows it."""
+        """Return the goal of the mission, or of the hover or braking that follows it."""
         assert self.mission is not None, "maneuvers are missions"
         phase, goal = self.mission.phase, self.mission.step(now, self._last_state, self._period, late)
         if self.mission.phase not in (phase, Phase.LAND):
             reason = f": {self.mission.reason}" if self.mission.reason else ""
             self._say(f"{self.mission.phase}{reason}")
-        if self.mission.phase is Phase.LAND:  # where it ends it stays
+        if self.mission.phase is Phase.LAND:  # the vehicle hovers at the mission's end
             end = self.mission.end
             at_end = rest_to_rest(end.position, end.position)
             self._go(Doing.HOVERING, now, at_end, end.yaw)
             return self._goal_on_route(now)
         if self.mission.phase is Phase.ABORTED:
             off = self.mission.error(self._last_state) if phase is Phase.MANEUVER else 0.0
-            if off > self.mission.settings.max_error + _ASTRAY:  # it is seen to jump, and goals would too
+            if off > self.mission.settings.max_error + _ASTRAY:  # its position jumps, and goals would too
                 self._leave(f"the vehicle is {length(off)} off its goal")
                 return None
             self._brake(now, self._last_state)
@@ -181,7 +181,7 @@ class Commander:
         self._go(Doing.BRAKING, now, path, float(nearest_heading(np.array(body.q_world_body))))
 
     def _leave_silent(self, now: float, allowed: float = _LONG) -> bool:
-        """True where no state came for longer than allowed [s]: the vehicle is left to itself then."""
+        """Return True, with the vehicle left to itself, if no state was received for `allowed` [s]."""
         silence = now - self._last_state.time
         if silence <= allowed:
             return False
@@ -190,19 +190,20 @@ class Commander:
 
     @property
     def _is_behind(self) -> bool:
-        """True of a vehicle that does not climb or land as ordered, and is in the air or to get there.
+        """True for a vehicle that does not climb or land as ordered, and is in the air or should be.
 
-        It may have received goals late, or hovered while none came, and does not take up goals far away.
+        It may have received goals late, or hovered without goals, and does not accept goals that are far
+        away.
         """
         if self.doing not in (Doing.CLIMBING, Doing.LANDING) or self._off() <= _BEHIND:
             return False
         return self.doing is Doing.CLIMBING or self._last_state.body.position[2] > self.ground + _ALOFT
 
     def _begin_anew(self, now: float) -> bool:
-        """Begin the route anew from where the vehicle is, and return True.
+        """Restart the route from where the vehicle is, and return True.
 
-        The vehicle is left to itself, and False returned, where the order has taken too long, or where its
-        position was seen to leap, since goals would leap too.
+        The vehicle is left to itself, and False returned, where the order has taken too long, or where the
+        observed position has jumped, since goals would jump too.
         """
         if self._leapt or now > self._there_by:
             order = "climb" if self.doing is Doing.CLIMBING else "land"
@@ -229,7 +230,7 @@ class Commander:
         return self.route
 
     def _off(self) -> float:
-        """How far the vehicle was off its route [m] when it was last observed."""
+        """Return the distance of the vehicle from its route [m] at its last observation."""
         goal = self._present_route.goal(self._last_state.time).position
         return float(np.linalg.norm(np.array(self._last_state.body.position) - goal))
 

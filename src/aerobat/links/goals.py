@@ -1,4 +1,4 @@
-"""Goals, modes and observed states, as a link and a vehicle exchange them; ENU and FLU."""
+"""Goals, modes and observed states that a link and a vehicle exchange; axes ENU and FLU."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from aerobat.kernels.rigid_body import Body
 
 
 class Mode(StrEnum):
-    """Who says where to go: a client that streams goals, or the autopilot itself."""
+    """The source of goals: a client that streams them (offboard), or the autopilot itself."""
 
     HOLD = "hold"
     TAKEOFF = "takeoff"
@@ -23,8 +23,8 @@ class Mode(StrEnum):
     OFFBOARD = "offboard"
 
 
-_LARGEST = 1e6  # [m], [m/s] and [rad/s] that a vehicle can have
-_UNIT = 1e-2  # [-] by which the norm of a quaternion may be off: what few decimals leave
+_LARGEST = 1e6  # [m], [m/s] and [rad/s] largest plausible values
+_UNIT = 1e-2  # [-] tolerance of the norm of a quaternion, which may be sent with few decimals
 _STILL: Array = np.zeros(3)
 _STILL.flags.writeable = False
 
@@ -45,7 +45,7 @@ class PositionGoal(NamedTuple):
 
 
 class PathGoal(NamedTuple):
-    """A point of a path, with the attitude that it is passed in; all of it in world axes."""
+    """A point of a path, with its attitude; all in world axes."""
 
     position: Array  # [m], (3,)
     velocity: Array  # [m/s], (3,)
@@ -57,7 +57,7 @@ class PathGoal(NamedTuple):
 
     @classmethod
     def upright(cls, goal: PositionGoal, gravity: float) -> PathGoal:
-        """A point of a route near a hover, leaning as its acceleration asks; its rates change slowly."""
+        """Return a point of a route near a hover, tilted for its acceleration; its rates change slowly."""
         thrust = goal.acceleration + gravity * so3.UP
         size = float(np.linalg.norm(thrust))
         heading = so3.about_axis(so3.UP, goal.yaw)
@@ -84,7 +84,7 @@ class AttitudeGoal(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """A vehicle's state, by its telemetry."""
+    """A vehicle's state from its telemetry."""
 
     time: float  # [s] by the link's clock
     body: Body
@@ -93,12 +93,12 @@ class Observed(NamedTuple):
 def observed(
     time: float, position: Vector, q_world_body: Quaternion, velocity_body: Vector, omega_body: Vector
 ) -> Observed | None:
-    """Return the state that a message of telemetry holds, or None for numbers that no vehicle can have.
+    """Return the state in a message of telemetry, or None for numbers that no vehicle can have.
 
-    Every number is finite and below 10⁶, and the attitude is a unit quaternion within 1 %.
+    Every number must be finite and at most 10⁶, and the attitude a unit quaternion within 1 %.
 
     Args:
-        time: When the state held [s], by the link's clock.
+        time: The time of the state [s], by the link's clock.
         position: World [m].
         q_world_body: The attitude, body to world.
         velocity_body: The velocity in the body's axes [m/s].
@@ -106,7 +106,7 @@ def observed(
     """
     numbers = np.array([*position, *velocity_body, *omega_body])
     norm = hypot(*q_world_body)
-    if not (np.abs(numbers).max() <= _LARGEST and abs(norm - 1.0) <= _UNIT):  # NaN is neither
+    if not (np.abs(numbers).max() <= _LARGEST and abs(norm - 1.0) <= _UNIT):  # false for NaN, too
         return None
     velocity = so3.rotate(np.array(q_world_body) / norm, np.array(velocity_body))
     w, x, y, z = (part / norm for part in q_world_body)
@@ -114,6 +114,6 @@ def observed(
 
 
 def yaw_of(q_world_body: Array | Quaternion) -> float:
-    """The angle of the body's x axis about the vertical, from east [rad]."""
+    """Return the angle of the body's x axis about the vertical, from east [rad]."""
     x, y, _ = so3.axes(q_world_body)[:, 0]
     return atan2(y, x)

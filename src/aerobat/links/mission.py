@@ -1,6 +1,6 @@
-"""A plan's whole flight by a live link: to its start, along it, to a hover and down; and when to give it up.
+"""A plan's whole flight over a live link: to its start, along the plan, to a hover and down; abort criteria.
 
-The same for every link: it knows times, states and goals, but no messages.
+Missions are the same for every link: they use times, states and goals, but no messages.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from aerobat.simulation.autopilot.braking import Braking
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 
-_NEAR = 0.1  # [m] from the start, within which a vehicle has come to it
-_SLOW = 0.15  # [m/s] likewise
-_AT_REST = 1e-3  # [m/s] of a plan's start that is a hover
-_CLIMB = 1.0  # [m] straight up at the least, before anything else
+_NEAR = 0.1  # [m] distance from the start within which a vehicle has reached it
+_SLOW = 0.15  # [m/s] speed below which a vehicle has reached the start
+_AT_REST = 1e-3  # [m/s], [m/s²] largest motion of a plan's start and end at a hover
+_CLIMB = 1.0  # [m] least vertical climb before the approach
 
 
 class Phase(StrEnum):
-    """The part of a mission that is on."""
+    """The phase of a mission."""
 
     READY = "ready on the ground"
     CLIMB = "climbing"
@@ -43,7 +43,7 @@ class Phase(StrEnum):
 
 @declared
 class MissionSettings:
-    """Settings of a flight by a live link, and the bounds beyond which it is given up."""
+    """Settings of a flight over a live link, and its abort criteria."""
 
     cruise_speed: Positive = 2.0  # [m/s] on the way to the plan's start
     cruise_acceleration: Positive = 2.0  # [m/s²] likewise
@@ -64,28 +64,28 @@ class Follower(Protocol[GoalT_co]):
     stream: SetpointStream  # of the path, in the vehicle's own frame
 
     def observe(self, observed: Observed) -> None:
-        """Take note of a state."""
+        """Process an observed state."""
 
     def command(self, time: float) -> GoalT_co:
-        """The goal at a time. Something must have been observed before."""
+        """Return the goal at a time. A state must have been observed before."""
 
 
 class Mission(Generic[GoalT_co]):
-    """The course of a flight: the goal of each tick, from observed states of the vehicle."""
+    """The sequence of a flight: returns the goal of each tick from observed states of the vehicle."""
 
     def __init__(self, plan: Plan, settings: MissionSettings, follower: Follower[GoalT_co]) -> None:
         """Prepare to fly a plan.
 
         Args:
-            plan: what is flown, certified for its vehicle; see `require_flyable`.
-            settings: how.
-            follower: makes the goals along its set-points.
+            plan: the plan, certified for its vehicle; see `require_flyable`.
+            settings: of the mission.
+            follower: computes the goals along its set-points.
         """
         assert plan.vehicle is not None, "a plan that is flyable has a vehicle"
         self.settings = settings
         self.phase = Phase.READY
-        self.reason = ""  # of an abort
-        self.max_lateness = 0.0  # [s] of all set-points of the plan so far
+        self.reason = ""  # the reason of an abort
+        self.max_lateness = 0.0  # [s] largest delay of the plan's set-points so far
         environment = plan.problem.environment
         self.stream = follower.stream
         self._follower = follower
@@ -101,15 +101,15 @@ class Mission(Generic[GoalT_co]):
         self._final_yaw = yaw_of(self.stream.at(self.stream.duration).q_world_body)
         motion = last.position, last.velocity
         self._after = Braking.of(*motion, plan.vehicle, environment.gravity, -np.inf).trajectory
-        self.began = np.nan  # [s] when the phase did
+        self.began = np.nan  # [s] start time of the phase
         self.maneuver_began = np.nan  # [s]
         self._last_tick = np.nan
         self._rested_since = np.nan
         self._routes: list[Trajectory] = []
-        self._turn = (0.0, 0.0)  # [rad] the yaw at first, and by how much to turn while climbing
+        self._turn = (0.0, 0.0)  # [rad] initial yaw, and the turn during the climb
 
     def begin(self, now: float, observed: Observed) -> None:
-        """Leave the ground, the vehicle being armed and obedient; `observed` is how it stands."""
+        """Take off with an armed vehicle that obeys; `observed` is its state on the ground."""
         here = np.array(observed.body.position)
         above = np.array([here[0], here[1], max(self._start[2], here[2] + _CLIMB)])
         limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
@@ -118,7 +118,7 @@ class Mission(Generic[GoalT_co]):
         self._enter(Phase.CLIMB, now)
 
     def join(self, now: float, observed: Observed) -> None:
-        """Go to the plan's start from a hover; `observed` is where."""
+        """Fly to the plan's start from the hover that `observed` is."""
         limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
         self._routes = [rest_to_rest(np.array(observed.body.position), self._start, *limits)]
         self._turn = self._turn_from(observed)
@@ -127,13 +127,13 @@ class Mission(Generic[GoalT_co]):
     def step(
         self, now: float, observed: Observed, delay: float, late: float = 0.0
     ) -> PositionGoal | GoalT_co | None:
-        """The goal at this time; None where the vehicle is to look after itself: to hold, or to land.
+        """Return the goal at this time; None where the vehicle holds or lands by itself.
 
         Args:
             now: the time [s].
             observed: the latest state of the vehicle.
-            delay: how long a goal is on its way to it [s].
-            late: by how much this goal misses its time [s], beside what it is after the one before.
+            delay: of a goal on its way to the vehicle [s].
+            late: by how much this goal is late [s]; the time since the last tick counts if it is longer.
         """
         self._watch(now, observed, late)
         self._last_tick = now
@@ -150,23 +150,23 @@ class Mission(Generic[GoalT_co]):
         return self._hovering(now)
 
     def abort(self, now: float, reason: str) -> None:
-        """Give it up: the vehicle is to hover."""
+        """Abort the mission: the vehicle is to hover."""
         if self.phase not in (Phase.ABORTED, Phase.LAND):
             self.reason = reason
             self._enter(Phase.ABORTED, now)
 
     @property
     def end(self) -> PositionGoal:
-        """The hover after the plan."""
+        """The goal of the hover after the plan."""
         return goal_on(self._after, self._after.duration, self._final_yaw)
 
     def error(self, observed: Observed) -> float:
-        """Return the distance of the vehicle from the plan at the time that it was observed [m]."""
+        """Return the distance of the vehicle from the plan at the time of the observation [m]."""
         expected = self.stream.flat(observed.time - self.maneuver_began).position
         return float(np.linalg.norm(np.array(observed.body.position) - expected))
 
     def _turn_from(self, observed: Observed) -> tuple[float, float]:
-        """The yaw of a vehicle [rad], and how far it has to turn to the plan's."""
+        """Return the yaw of a vehicle [rad], and the turn to the plan's heading [rad]."""
         yaw = yaw_of(observed.body.q_world_body)
         return yaw, (self._heading - yaw + pi) % (2 * pi) - pi
 
@@ -174,7 +174,7 @@ class Mission(Generic[GoalT_co]):
         self.phase, self.began = phase, now
 
     def _watch(self, now: float, observed: Observed, late: float) -> None:
-        """Abort where something is over its bound."""
+        """Abort where an abort criterion is met: silence, lateness or position error."""
         flying = self.phase is Phase.MANEUVER
         if self.phase in (Phase.READY, Phase.ABORTED, Phase.LAND):
             return
@@ -191,7 +191,7 @@ class Mission(Generic[GoalT_co]):
             self.abort(now, f"the vehicle is {length(error)} off its path")
 
     def _along(self, now: float, following: Phase) -> PositionGoal:
-        """A point on the way to the plan's start, and the next phase at its end."""
+        """Return the goal on the present route, and enter the next phase at its end."""
         route = self._routes[0]
         since = min(now - self.began, route.duration)
         yaw, turn = self._turn
@@ -202,7 +202,7 @@ class Mission(Generic[GoalT_co]):
         return goal_on(route, since, yaw + turn * since / route.duration)
 
     def _settle(self, now: float, observed: Observed) -> None:
-        """Begin the plan once the vehicle has been at rest at its start for long enough."""
+        """Begin the plan once the vehicle has been at rest at its start for long enough, or abort."""
         body = observed.body
         off = float(np.linalg.norm(np.array(body.position) - self._start))
         if off > _NEAR or hypot(*body.velocity) > _SLOW:
@@ -224,7 +224,7 @@ class Mission(Generic[GoalT_co]):
         return self._follower.command(since)
 
     def _hovering(self, now: float) -> PositionGoal | None:
-        """The goal at the plan's start or end."""
+        """Return the goal of the hover at the plan's start or end; None in other phases."""
         if self.phase is Phase.SETTLE:
             return PositionGoal.hover(self._start, self._heading)
         if self.phase is Phase.HOLD:
@@ -233,14 +233,14 @@ class Mission(Generic[GoalT_co]):
 
 
 def require_flyable(plan: Plan, offset: Array, vehicle_name: str | None = None) -> None:
-    """Refuse what is not proven for the vehicle that is to fly it, or leads not from a hover to a hover.
+    """Check that a plan is proven for the vehicle that will fly it, and begins and ends at a hover.
 
-    Raises SpecError, one sentence; nothing is armed before.
+    Raises SpecError, one sentence, otherwise; nothing has been armed by then.
 
     Args:
-        plan: what is to be flown.
-        offset: where its origin lies in the vehicle's frame [m], ENU, (3,).
-        vehicle_name: of what is to fly it, where that is known.
+        plan: the plan.
+        offset: position of its origin in the vehicle's frame [m], ENU, (3,).
+        vehicle_name: of the vehicle that will fly it, where that is known.
     """
     label = f"the plan '{plan.problem.name}'"
     if plan.vehicle is None:

@@ -1,8 +1,8 @@
-"""Attitude, rates and thrust that keep a vehicle on a plan, from telemetry that comes late.
+"""Attitude, rates and thrust that keep a vehicle on a plan, from delayed telemetry.
 
-The outer loop of the tracking controller, run where the plan is. A state is held against the set-point of its
-own instant; from there its error is carried on to when a command arrives, by the feedback that was commanded
-in between (Smith's predictor: e'' = -a). So a link's delay takes no damping from the loop.
+This is the outer loop of the tracking controller, run where the plan is. An observed state is compared with
+the set-point of its own instant. The error is then predicted to the arrival time of the command, from the
+feedback commanded meanwhile (Smith predictor: e'' = -a). Thus the link's delay does not reduce the damping.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from aerobat.vehicle.fleet import Fleet
 
 
 class PathForwarder:
-    """The points of a stream as they are, for vehicles whose own controller tracks them."""
+    """The points of a stream, unchanged, for vehicles whose own controller tracks them."""
 
     def __init__(self, stream: SetpointStream) -> None:
         self.stream = stream
 
     def observe(self, observed: Observed) -> None:
-        """Let the vehicle see to its errors."""
+        """Ignore the state: the vehicle's own controller handles errors."""
 
     def command(self, time: float) -> PathGoal:
-        """The goal at a time [s] since the plan's start."""
+        """Return the goal at a time [s] since the plan's start."""
         return self.stream.goal(time)
 
 
@@ -52,24 +52,24 @@ class PathFollower:
         """Prepare to follow.
 
         Args:
-            stream: set-points.
-            vehicle: the nominal one, whose gains count.
-            environment: where it flies.
+            stream: the set-points.
+            vehicle: the nominal vehicle, whose gains are used.
+            environment: of the flight.
         """
         model = controller_parameters(vehicle.controller, Fleet.of([vehicle]), environment)
         self._model: ControllerModel = first_numbers(model)
         self.stream = stream
         self._outer: PositionLoopState | None = None
         self._observed: Observed | None = None
-        self._commanded: deque[tuple[float, Vector]] = deque()  # [s] from when, [m/s²] the feedback
+        self._commanded: deque[tuple[float, Vector]] = deque()  # [s] start time, [m/s²] feedback
 
     def observe(self, observed: Observed) -> None:
-        """Take note of a state; its time is since the plan's start [s]. Older ones than known say nothing."""
+        """Process a state; its time is since the plan's start [s]. States older than the last are ignored."""
         if self._observed is None or observed.time > self._observed.time:
             self._observed = observed
 
     def command(self, time: float) -> AttitudeGoal:
-        """The goal at a time [s] since the plan's start. Something must have been observed before."""
+        """Return the goal at a time [s] since the plan's start. A state must have been observed before."""
         reference = self.stream.at(time)
         model, body = self._model, self._predicted(time, reference)
         if self._outer is None:
@@ -86,7 +86,7 @@ class PathFollower:
         )
 
     def _predicted(self, time: float, reference: ReferencePoint) -> Body:
-        """The body at a time, as far from its reference as what was seen, and commanded since, makes it."""
+        """Return the body at a time, predicted from the last observed error and the feedback since then."""
         assert self._observed is not None, "a vehicle is observed before it is commanded"
         observed_at, body = self._observed.time, self._observed.body
         then = self.stream.at(observed_at)

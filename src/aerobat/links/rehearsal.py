@@ -1,4 +1,4 @@
-"""A flight without a vehicle, which imports all that a real one needs before a vehicle waits for it."""
+"""A dry run without a vehicle, which imports all modules of a real flight before a vehicle waits for them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from aerobat.vehicle import Vehicle
 
 
 def rehearse(vehicle: Vehicle, gravity: float) -> None:
-    """Lead a vehicle that is always at its goal up, to a halt, and down.
+    """Fly a vehicle that is always at its goal up, to a halt, and down.
 
     Args:
-        vehicle: whose thrust counts when braking.
+        vehicle: of which the maximum thrust is used for braking.
         gravity: [m/s²].
     """
     period, now = 0.1, 0.0  # [s]

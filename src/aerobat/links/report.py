@@ -1,4 +1,4 @@
-"""Report of what a live flight came to, by the telemetry that was heard of it."""
+"""The report of a live flight, from its telemetry."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from aerobat.simulation.passages import NearestObstacle, Passage, log_rows, near
 
 @dataclass(frozen=True)
 class LinkReport:
-    """A flight by a live link: how far off its plan, through which gates, or why it was given up."""
+    """A flight over a live link: its errors and gate passages, or why it was aborted."""
 
-    aborted: str  # why; empty where it was flown to its end
-    ended: str  # what was reached
-    delay_s: float  # of a message, either way
+    aborted: str  # the reason; empty where the plan was flown to its end
+    ended: str  # the last stage reached
+    delay_s: float  # one-way delay of a message
     max_lateness_s: float  # of set-points, while the plan was flown
-    observations: int  # while the plan was flown; of fewer than two, nothing of what follows is known
+    observations: int  # while the plan was flown; with fewer than two, the following fields are unknown
     max_position_error_m: float | None = None
     max_attitude_error_deg: float | None = None
     longest_silence_s: float | None = None  # between two observations
@@ -35,7 +35,7 @@ class LinkReport:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """All that went wrong, in words."""
+        """All failures, in words."""
         judged = (*((self.nearest,) if self.nearest else ()), *self.passages)
         missed = [each.failure.sentence() for each in judged if each.failure is not None]
         return (*((f"aborted: {self.aborted}",) if self.aborted else ()), *missed)
@@ -47,11 +47,11 @@ class LinkReport:
 
     @property
     def is_late(self) -> bool:
-        """True where a set-point was later than a vehicle carries the one before on."""
+        """True where a set-point came later than the time for which a vehicle keeps the previous one."""
         return self.max_lateness_s > KEPT
 
     def __str__(self) -> str:
-        """One sentence."""
+        """Return one sentence."""
         late = f"; set-points were up to {1e3 * self.max_lateness_s:.0f} ms late" if self.is_late else ""
         if self.failures:
             return f"{'; '.join(self.failures)}{late}; {self.ended}"
@@ -76,14 +76,14 @@ def link_report(
     """Judge a flight.
 
     Args:
-        plan: what was flown.
+        plan: the plan that was flown.
         stream: its set-points.
-        log: states while it was flown, times since its start [s].
-        offset: where the plan's origin lay [m], (3,).
-        aborted: why it was given up, empty where it was not.
-        ended: what was reached.
-        delay: of a message, either way [s].
-        late: by how much the latest set-point missed its time [s].
+        log: states observed during the plan, with times since its start [s].
+        offset: position of the plan's origin [m], (3,).
+        aborted: the reason of an abort, empty where there was none.
+        ended: the last stage reached.
+        delay: one-way delay of a message [s].
+        late: largest delay of a set-point beyond its time [s].
     """
     inside = [observed for observed in log if 0.0 <= observed.time <= stream.duration]
     if len(inside) < 2:

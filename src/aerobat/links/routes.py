@@ -1,4 +1,4 @@
-"""Routes outside a maneuver, from hover to hover or to the ground."""
+"""Routes outside of maneuvers, from hover to hover or to the ground."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from aerobat.trajectory import Trajectory, minimum_effort
 
 SPEED = 2.0  # [m/s] on the way from hover to hover
 DESCENT_SPEED = 1.0  # [m/s] of a landing
-_SHORTEST = 0.2  # [s] of any route, however near its end is
-_PEAK_SPEED = 15.0 / 8.0  # [-] of the quintic from rest to rest, over its mean speed
-_PEAK_ACCELERATION = 10.0 / sqrt(3.0)  # [-] likewise, times duration squared over length
+_SHORTEST = 0.2  # [s] shortest duration of a route
+_PEAK_SPEED = 15.0 / 8.0  # [-] peak speed of the quintic from rest to rest, over its mean speed
+_PEAK_ACCELERATION = 10.0 / sqrt(3.0)  # [-] its peak acceleration, times duration squared over length
 
 
 class Route(NamedTuple):
-    """A route that began at some time; at its end the vehicle hovers."""
+    """A route with its start time; at its end the vehicle hovers."""
 
     path: Trajectory
     began: float  # [s]
@@ -29,31 +29,31 @@ class Route(NamedTuple):
 
     @property
     def end(self) -> Array:
-        """The position that it leads to [m], (3,)."""
+        """The position at the end of the route [m], (3,)."""
         return self.path.evaluate(self.path.duration)
 
     def goal(self, now: float) -> PositionGoal:
-        """The goal at a time [s]."""
+        """Return the goal at a time [s]."""
         return goal_on(self.path, max(now - self.began, 0.0), self.yaw)
 
     def reference(self, times: Array, gravity: float) -> ReferencePoint:
-        """References of a controller at times [s], leaves (T,)."""
+        """Return references for a controller at times [s], leaves (T,)."""
         since = times - self.began
         flat = self.path.flat(np.clip(since, 0.0, self.path.duration))
-        jerk = np.where((since < self.path.duration)[:, None], flat.jerk, 0.0)  # at its end it jumps to rest
+        jerk = np.where((since < self.path.duration)[:, None], flat.jerk, 0.0)  # discontinuous at the end
         return point_reference(flat.position, flat.velocity, flat.acceleration, jerk, self.yaw, gravity)
 
 
 def rest_to_rest(
     start: Array, goal: Array, max_speed: float = SPEED, max_acceleration: float = 2.0
 ) -> Trajectory:
-    """Return the straight route between two hovers, of least jerk.
+    """Return the straight minimum-jerk route between two hovers.
 
     Args:
-        start: from where [m], (3,).
-        goal: to where [m], (3,).
-        max_speed: that it reaches at most [m/s].
-        max_acceleration: likewise [m/s²].
+        start: initial position [m], (3,).
+        goal: final position [m], (3,).
+        max_speed: largest speed [m/s].
+        max_acceleration: largest acceleration [m/s²].
     """
     length = float(np.linalg.norm(np.asarray(goal) - start))
     by_speed = _PEAK_SPEED * length / max_speed
@@ -66,13 +66,13 @@ def rest_to_rest(
 def straight_down(start: Array, ground: float) -> Trajectory:
     """Return the route of a landing from a hover at `start` [m], (3,), to the ground at a height [m].
 
-    It ends 0.3 m under the ground, so that the ground is reached in motion.
+    It ends 0.3 m below the ground, so that the vehicle is still moving at touchdown.
     """
     return rest_to_rest(start, np.array([start[0], start[1], ground - 0.3]), DESCENT_SPEED)
 
 
 def goal_on(route: Trajectory, time: float, yaw: float) -> PositionGoal:
-    """The goal at a time [s] on a route to a hover, at its end from then on, at a yaw [rad]."""
+    """Return the goal at a time [s] on a route, constant from its end on, at a yaw [rad]."""
     flat = route.flat(min(time, route.duration))
-    jerk = flat.jerk if time < route.duration else np.zeros(3)  # it jumps to rest
+    jerk = flat.jerk if time < route.duration else np.zeros(3)  # jerk is discontinuous at the end
     return PositionGoal(flat.position, flat.velocity, flat.acceleration, yaw, jerk)

@@ -1,4 +1,4 @@
-"""Set-points of a plan at any time: what every live link streams, on a clock of its own."""
+"""Set-points of a plan at any time, which live links stream by their own clocks."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from aerobat.states import FlatState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-_RATE = 1000.0  # [1/s] of rows; straight lines between are off by 0.1 mm and 0.01° in the fastest flips
+_RATE = 1000.0  # [1/s] of rows; linear interpolation errs by 0.1 mm and 0.01° in the fastest flips
 
 
 class SetpointStream:
-    """Set-points of a trajectory, moved by an offset, at any time; before and after it those of its ends."""
+    """Set-points of a trajectory with an offset, at any time; constant before its start and after its end."""
 
     def __init__(
         self, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, offset: Array
     ) -> None:
-        """Prepare to give set-points.
+        """Prepare the set-points.
 
         Args:
             trajectory: the path.
-            vehicle: what it is for.
-            environment: where it is flown.
-            offset: where the path's origin lies [m], world, (3,).
+            vehicle: the nominal vehicle.
+            environment: of the flight.
+            offset: position of the path's origin [m], world, (3,).
         """
         self.trajectory = trajectory
         self._offset = np.asarray(offset, dtype=float)
@@ -44,25 +44,25 @@ class SetpointStream:
 
     @property
     def duration(self) -> float:
-        """Of the trajectory [s]."""
+        """The duration of the trajectory [s]."""
         return self.trajectory.duration
 
     def flat(self, time: float) -> FlatState:
-        """Position to snap [m/s^k] at a time [s] since the start, (3,) each."""
+        """Return position to snap [m/s^k] at a time [s] since the start, (3,) each."""
         flat = self.trajectory.flat(min(max(time, 0.0), self.duration))
         return FlatState(flat.position + self._offset, flat.velocity, flat.acceleration, flat.jerk, flat.snap)
 
     def goal(self, time: float) -> PathGoal:
-        """The point of the path at a time [s] since the start, for a vehicle that tracks it by itself."""
+        """Return the path's point at a time [s] since the start, for a vehicle that tracks it by itself."""
         point, flat = self.at(time), self.flat(time)
         turning = (np.array(part) for part in (point.q_world_body, point.omega, point.omega_dot))
         return PathGoal(flat.position, flat.velocity, flat.acceleration, flat.jerk, *turning)
 
     def at(self, time: float) -> ReferencePoint:
-        """All that a controller follows at a time [s] since the start, in plain numbers."""
+        """Return the controller's reference at a time [s] since the start, in plain numbers."""
         place = min(max(time, 0.0), self.duration) * _RATE
         row = min(int(place), len(self._rows) - 2)
-        # the last row is at the end, which need not be a whole one after the row before
+        # the last row is at the end, which may be less than a period after the row before
         length = 1.0 if row < len(self._rows) - 2 else self.duration * _RATE - row
         fraction = min((place - row) / length, 1.0)
         values = self._rows[row] + fraction * (self._rows[row + 1] - self._rows[row])

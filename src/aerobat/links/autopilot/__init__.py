@@ -1,1 +1,1 @@
-"""A simulated vehicle with an autopilot of its own, to be flown live by whichever link."""
+"""A simulated vehicle with its own autopilot, to be flown live over any link."""

@@ -1,4 +1,4 @@
-"""The simulation's loop of one vehicle, stepped with references that come as it flies, over flat ground."""
+"""The simulation loop of one vehicle over flat ground, stepped with references that come as it flies."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from aerobat.simulation.components import log_row
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
 
-_LONG = 10**6  # ticks, since the length of a live flight is not known
+_LONG = 10**6  # ticks, an arbitrary large number, since the length of a live flight is unknown
 
 
 class LiveBody:
-    """A vehicle's body, rotors and controller; at rest at the origin of ENU at first."""
+    """A vehicle's body, rotors and controller; initially at rest at the origin of ENU."""
 
     def __init__(self, vehicle: Vehicle, environment: Environment) -> None:
         vehicle.require_hover(environment.gravity)
         self._idle = tuple(np.array([least]) for least in vehicle.min_thrusts)
-        self.state = _at_rest(np.zeros(2), 0.0)  # the true one, (·,)
+        self.state = _at_rest(np.zeros(2), 0.0)  # the true state, (·,)
         setup = autopilot_setup(_one(self.state), vehicle, environment)
         _, model, _ = setup.parameters.own
         self._gains: tuple[Gains, Gains] = first_numbers((model.tracking.gains, model.upright))
@@ -47,7 +47,7 @@ class LiveBody:
         self.state = BodyState(*(np.concatenate(leaves) for leaves in self._carry[2].body))
 
     def restart_position_loop(self, references: ReferencePoint, upright: bool) -> None:
-        """Restart the outer loop towards the first of the references, without its state from before.
+        """Restart the outer loop towards the first of the references, without its previous state.
 
         See `autopilot_inputs` for `upright`.
         """
@@ -65,7 +65,7 @@ class LiveBody:
         self._carry = (observer, controller, VehicleState(_one(self.state), motion.thrusts))
 
     def stop_rotors(self) -> None:
-        """Set all rotors to their least thrust, in the plant and as the controller knows them."""
+        """Set all rotors to their minimum thrust, in the plant and in the controller's model."""
         observer, controller, motion = self._carry
         commands = controller.commands._replace(thrusts=self._idle)
         stopped = controller._replace(thrusts=self._idle, commands=commands)
@@ -78,7 +78,7 @@ def _at_rest(place: Array, yaw: float) -> BodyState:
 
 
 def _one(state: BodyState) -> Body:
-    """A state with leaves (1,)."""
+    """Return a state with leaves (1,)."""
     return bodies(BodyState(*(part[None] for part in vars(state).values())))
 
 

@@ -1,4 +1,4 @@
-"""The references that an autopilot follows of what a client sends: points, pieces of a path, attitudes."""
+"""The references that an autopilot follows, from a client's points, pieces of a path or attitudes."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from aerobat.links.goals import AttitudeGoal, PathPiece, PositionGoal
 from aerobat.simulation.autopilot.braking import point_reference
 from aerobat.simulation.autopilot.loop import KEPT
 
-_SLOW = 0.5  # [m/s] and [m/s²]: a piece that ends no faster is almost at rest then
-_SMOOTHING = 0.002  # [s] time constant of the low-pass on the change of commanded rates and thrust
+_SLOW = 0.5  # [m/s] and [m/s²]: a piece that ends with less motion ends almost at rest
+_SMOOTHING = 0.002  # [s] time constant of the low-pass filter on the change of commanded rates and thrust
 
 
 class PointReference(NamedTuple):
@@ -26,7 +26,7 @@ class PointReference(NamedTuple):
     arrived: float  # [s]
 
     def reference(self, times: Array, gravity: float) -> ReferencePoint:
-        """References at times [s], leaves (T,)."""
+        """Return references at times [s], leaves (T,)."""
         goal, ones = self.goal, np.ones((len(times), 1))
         age = np.clip(times - self.arrived, 0.0, KEPT)[:, None]
         position = goal.position + age * goal.velocity
@@ -41,12 +41,12 @@ class PathReference(NamedTuple):
 
     @property
     def leads_away(self) -> bool:
-        """True unless it ends almost at rest."""
+        """True unless the piece ends almost at rest."""
         end = self.piece.end
         return float(np.linalg.norm(end.velocity)) > _SLOW or float(np.linalg.norm(end.acceleration)) > _SLOW
 
     def reference(self, times: Array, period: float, gravity: float) -> ReferencePoint:
-        """References at times [s], leaves (T,), for a controller that steps every `period` [s]."""
+        """Return references at times [s], leaves (T,), for a controller that steps every `period` [s]."""
         begin, end, stamp, duration = self.piece
         age = np.clip(times - stamp, 0.0, duration + KEPT)[:, None]
         snap = (end.jerk - begin.jerk) / duration
@@ -76,7 +76,7 @@ class PathReference(NamedTuple):
 
 
 def _extrapolated(age: Array, derivatives: Sequence[Array]) -> list[Array]:
-    """A quantity and its derivatives, known at first, at ages [s] (T, 1); the last derivative stays."""
+    """Return a quantity and its derivatives at ages [s] (T, 1) by Taylor series; the last is constant."""
     last = len(derivatives) - 1
     parts = [np.broadcast_to(derivatives[last], (len(age), 3))] * (last + 1)
     for lower in range(last):
@@ -86,19 +86,19 @@ def _extrapolated(age: Array, derivatives: Sequence[Array]) -> list[Array]:
 
 
 class AttitudeReference(NamedTuple):
-    """An attitude goal, extrapolated by its rates and by how rates and thrust changed in the last goals.
+    """An attitude goal, extrapolated by its rates and by the changes of rates and thrust in the last goals.
 
-    Goals carry the time at which they were sent, so that the varying delay of a link has little effect.
+    Goals carry the time at which they were sent, so that a varying delay of the link has little effect.
     """
 
     goal: AttitudeGoal
     sent: float  # [s] by the sender's clock
-    since: float  # [s] by our clock, when it holds
+    since: float  # [s] by our clock, from when it holds
     omega_dot: Array = np.zeros(3)  # [rad/s²] body axes, (3,)
     thrust_rate: float = 0.0  # [N/s]
 
     def followed_by(self, goal: AttitudeGoal, sent: float, arrived: float) -> AttitudeReference:
-        """Return the reference of the next goal, or this one where that goal was overtaken by it."""
+        """Return the reference of the next goal, or this one where the next goal is older (reordered)."""
         elapsed = sent - self.sent
         if abs(elapsed) > 10.0 * KEPT:
             return AttitudeReference(goal, sent, arrived)
@@ -116,7 +116,7 @@ class AttitudeReference(NamedTuple):
         )
 
     def reference(self, times: Array, period: float, mass: float) -> ReferencePoint:
-        """References at times [s], leaves (T,), for a controller's period [s] and a vehicle's mass [kg]."""
+        """Return references at times [s], leaves (T,), for a controller's period [s] and a mass [kg]."""
         age = np.clip(times - self.since, 0.0, KEPT)[:, None]
         omega_body = self.goal.omega_body + age * self.omega_dot
         mean_rate = self.goal.omega_body + 0.5 * age * self.omega_dot

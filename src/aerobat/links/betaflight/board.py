@@ -1,4 +1,4 @@
-"""A board that is flown live: goals and states come in, a receiver's channels go out over a line."""
+"""A real Betaflight board, flown live: goals and states in, a receiver's channels out over a serial line."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
 PROTOCOLS = {"msp": MSP, "crsf": CRSF}
-_LIFT = 0.01  # [m] above where it stands, from which on a goal means to take off
-_DOWN = 0.05  # [m] above the ground, within which a goal beneath it ends the flight
-_ALOFT = 0.3  # [m] above the ground, from which on motors are not stopped: the failsafe says what is done
-_PAUSE = 0.1  # [s] without goals, after which the outer loop begins anew
+_LIFT = 0.01  # [m] height of a goal above the ground that means take-off
+_DOWN = 0.05  # [m] height above the ground within which a goal below the ground ends the flight
+_ALOFT = 0.3  # [m] height above the ground from which motors are not stopped: the failsafe decides
+_PAUSE = 0.1  # [s] without goals, after which the outer loop is reset
 
 
 class SerialLine:
-    """A serial line, or a TCP connection in its place, that frames are written to."""
+    """A serial line, or a TCP connection in its place, to which frames are written."""
 
     def __init__(self, address: str, baud: int) -> None:
         """Open the line.
@@ -54,7 +54,7 @@ class SerialLine:
             ) from None
 
     def send(self, frame: bytes) -> None:
-        """Write a frame, and discard what was received. Raises SpecError where the line is cut."""
+        """Write a frame, and discard received bytes. Raises SpecError where the line is cut."""
         try:
             self._line.write(frame)
             self._line.read(4096)
@@ -69,8 +69,8 @@ class SerialLine:
 class Board:
     """A Betaflight board that is flown by body rates and thrust along goals; see `take`.
 
-    It is armed by a goal above the ground, and disarmed where one leads it into the ground. Where goals stop
-    in the air it gets no more channels, and does what its failsafe says.
+    A goal above the ground arms the board, and a goal below the ground disarms it. If goals stop in the air,
+    the board receives no more channels, and its failsafe takes over.
     """
 
     def __init__(
@@ -85,9 +85,9 @@ class Board:
 
         Args:
             line: To the board.
-            protocol: That its receiver is set to.
-            vehicle: The nominal one, by which the board is set up.
-            environment: Where it flies.
+            protocol: Of its receiver setting.
+            vehicle: The nominal vehicle, for which the board is configured.
+            environment: Of the flight.
             period: From one goal to the next [s].
         """
         rotor_order(vehicle)
@@ -98,8 +98,8 @@ class Board:
         self._model: ControllerModel = first_numbers(model)
         self._law = Rates()
         self._state: RatesState | None = None
-        self._last = 0.0  # [s] when the law stepped
-        self._ground: float | None = None  # [m] where it was armed
+        self._last = 0.0  # [s] time of the law's last step
+        self._ground: float | None = None  # [m] height where the board was armed
 
     def take(self, piece: PathPiece | None, observed: Observed | None, now: float) -> None:
         """Send the channels of a tick.
@@ -107,7 +107,7 @@ class Board:
         Args:
             piece: Of the path from now on; None where there is no goal.
             observed: The last state, None before the first.
-            now: [s].
+            now: The time [s].
 
         Raises SpecError where the line is cut.
         """
@@ -135,7 +135,7 @@ class Board:
         self._line.send(self._sticks.idle(armed=False))
 
     def _flown(self, piece: PathPiece, observed: Observed, now: float) -> bytes:
-        """The frame of rates and thrust along a piece, as they hold on average until the next."""
+        """Return the frame of rates and thrust along a piece, averaged until the next tick."""
         middle = now + 0.5 * self._period
         points = PathReference(piece).reference(np.array([middle]), self._period, self._gravity)
         reference: ReferencePoint = first_numbers(points)
@@ -151,12 +151,12 @@ class Board:
 
 
 def board_at(address: str, vehicle: Vehicle, environment: Environment, period: float) -> Board | None:
-    """Return the board that an address names, None for an address of something else.
+    """Return the board of an address, None for an address of something else.
 
     Args:
         address: msp: or crsf:, and a serial device or socket://HOST:PORT.
-        vehicle: See `Board`, as for the others.
-        environment: Where it flies.
+        vehicle: The nominal vehicle, see `Board`.
+        environment: Of the flight.
         period: From one goal to the next [s].
 
     Raises SpecError for a line that cannot be opened or a vehicle that no board flies, BackendMissing without
@@ -170,7 +170,7 @@ def board_at(address: str, vehicle: Vehicle, environment: Environment, period: f
 
 
 def _extrapolated(observed: Observed, reference: ReferencePoint, time: float, gravity: float) -> Body:
-    """The body at a time [s], extrapolated from its observation by the accelerations of its reference."""
+    """Return the body at a time [s], extrapolated from its observation by the reference's accelerations."""
     age, body = time - observed.time, observed.body
     acceleration = subtract(reference.specific_thrust, (0.0, 0.0, gravity))
     turning = to_body(axes(body.q_world_body), reference.omega_dot)

@@ -12,8 +12,8 @@ from aerobat.links.betaflight.packets import ReceiverProtocol
 
 STATUS_EX, SET_RAW_RC = 150, 200
 _FROM_BOARD, _REFUSED = b"$M>", b"$M!"
-_HEAD = 5  # bytes before the payload: three, its size, the code
-# the firmware's src/main/fc/runtime_config.c, bit by bit
+_HEAD = 5  # bytes before the payload: three of the preamble, its size, the code
+# from the firmware's src/main/fc/runtime_config.c, bit by bit
 ARMING_DISABLE_FLAGS = (
     "NOGYRO", "FAILSAFE", "RXLOSS", "NOT_DISARMED", "BOXFAILSAFE", "RUNAWAY", "CRASH", "THROTTLE", "ANGLE",
     "BOOTGRACE", "NOPREARM", "LOAD", "CALIB", "CLI", "CMS", "BST", "MSP", "PARALYZE", "GPS", "RESCUE_SW",
@@ -23,7 +23,7 @@ ARMING_DISABLE_FLAGS = (
 
 
 def request(code: int, payload: bytes = b"") -> bytes:
-    """The frame of a request to a board, its payload 255 bytes at most."""
+    """Return the frame of a request to a board, with a payload of at most 255 bytes."""
     return _framed(b"$M<", code, payload)
 
 
@@ -36,9 +36,9 @@ def _framed(head: bytes, code: int, payload: bytes) -> bytes:
 
 
 def response(data: bytes, code: int) -> bytes | None:
-    """The payload of the first whole answer to a request in some bytes, None where none is whole yet.
+    """Return the payload of the first complete answer to a request in received bytes, None if none is.
 
-    Raises SpecError for an answer that says that the board does not know the request.
+    Raises SpecError for an answer that the board does not know the request.
     """
     begin = 0
     while (begin := data.find(b"$M", begin)) >= 0:
@@ -60,9 +60,9 @@ def response(data: bytes, code: int) -> bytes | None:
 
 
 def flags_of(status: bytes) -> tuple[str, ...]:
-    """The names of the arming-disable flags that a status holds.
+    """Return the names of the arming-disable flags in a status.
 
-    The switch's own, which is set beside others while the switch asks for arming, is left out then.
+    ARM_SWITCH is left out beside other flags, since it is then set only because the switch requests arming.
     """
     modes = status[15] & 15  # the number of bytes of flight modes beyond the first four
     (bits,) = struct.unpack_from("<I", status, 17 + modes)
@@ -71,10 +71,10 @@ def flags_of(status: bytes) -> tuple[str, ...]:
 
 
 def arming_disable_flags(exchange: Callable[[bytes, Callable[[bytes], bool]], bytes]) -> tuple[str, ...]:
-    """The arming-disable flags of a board.
+    """Return the arming-disable flags of a board.
 
     Args:
-        exchange: sends bytes, and returns what comes back once a predicate holds of it.
+        exchange: sends bytes, and returns the answer once a predicate of the answer is true.
     """
     answer = exchange(request(STATUS_EX), lambda data: response(data, STATUS_EX) is not None)
     payload = response(answer, STATUS_EX)

@@ -1,4 +1,4 @@
-"""Packets between Betaflight's simulator target and a simulated vehicle, and the signs of what they hold.
+"""Packets between Betaflight's simulator target and a simulated vehicle, and the signs of their contents.
 
 Betaflight counts roll to the right, pitch nose down on its stick, and yaw clockwise seen from above. Its
 motors are numbered rear right, front right, rear left, front left, and sent in another order.
@@ -14,12 +14,12 @@ from aerobat.kernels.ops import Vector
 from aerobat.simulation.flight_controller import Sensed
 
 _LOWEST, _CENTRE, _HIGHEST = 1000, 1500, 2000  # [µs] pulses of a stick
-_TIMESTAMP = 1.0  # [s] always: the firmware would set its clock's pace by differences
+_TIMESTAMP = 1.0  # [s] constant: the firmware would adjust its clock speed by differences
 MOTORS = ("front right", "rear left", "front left", "rear right")  # in the order of the packet
 
 
 def state_packet(sensed: Sensed) -> bytes:
-    """The packet of a state; position and velocity, which the firmware does not fly by, are zero."""
+    """Return the packet of a state; position and velocity, which the firmware does not use, are zero."""
     p, q, r = sensed.omega
     force = (-part for part in sensed.specific_force)
     air_pressure = 101325.0  # [Pa]
@@ -28,15 +28,15 @@ def state_packet(sensed: Sensed) -> bytes:
 
 
 class ReceiverProtocol(NamedTuple):
-    """The form in which a firmware receives channels: whole counts of a step, beyond an offset."""
+    """The channel format of a receiver: integer counts with a step and an offset."""
 
     frame: Callable[[Sequence[int]], bytes]  # of 16 counts
-    offset: float = 0.0  # [µs] of a stick's pulse, which count 0 stands for
+    offset: float = 0.0  # [µs] pulse of count 0
     step: float = 1.0  # [µs]
     baud: int = 115200  # of a serial line [bit/s]
 
     def count(self, pulse: float) -> int:
-        """The count nearest to a pulse [µs]."""
+        """Return the count nearest to a pulse [µs]."""
         return round((pulse - self.offset) / self.step)
 
 
@@ -51,14 +51,14 @@ class Sticks:
 
         Args:
             max_rate: [rad/s] at the end of each stick.
-            protocol: By which they are sent.
+            protocol: The format of the channels.
         """
         self._scale = 500.0 / max_rate  # [µs/(rad/s)]
         self._protocol = protocol
         self._carried = [0.0] * 4
 
     def packet(self, omega: Vector, throttle: float) -> bytes:
-        """Return the packet, armed, of body rates [rad/s] and a thrust, 0 to 1 of what all rotors give."""
+        """Return the armed packet of body rates [rad/s] and a throttle, 0 to 1 of the thrust range."""
         p, q, r = omega
         wanted = (
             _CENTRE + self._scale * p,
@@ -69,7 +69,7 @@ class Sticks:
         return self._framed([self._rounded(k, pulse) for k, pulse in enumerate(wanted)], armed=True)
 
     def idle(self, armed: bool) -> bytes:
-        """The packet of centred sticks and no throttle."""
+        """Return the packet of centred sticks and no throttle."""
         return self._framed([*map(self._protocol.count, (_CENTRE, _CENTRE, _LOWEST, _CENTRE))], armed)
 
     def _rounded(self, channel: int, pulse: float) -> int:

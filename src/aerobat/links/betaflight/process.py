@@ -1,4 +1,4 @@
-"""Betaflight's simulator target as a process of its own, in step with the simulation of its vehicle."""
+"""Betaflight's simulator target as a process of its own, in lockstep with the simulation of its vehicle."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from aerobat.errors import BackendMissing, SpecError
 
 _ORDER = struct.Struct("<QII144s40s")
 _ANSWER = struct.Struct("<QI4f4x")
-_PATIENCE = 20.0  # [s] of the wall for an answer
-_STEP = 0.01  # [s] of the firmware between looks at its serial line
-_LOOK = 0.002  # [s] of the wall that each look lasts
+_PATIENCE = 20.0  # [s] of wall time, limit for an answer
+_STEP = 0.01  # [s] of firmware time between polls of its serial line
+_LOOK = 0.002  # [s] of wall time for each poll
 _PROMPT = b"\n# "
-_LINES_AT_ONCE = 20  # that its buffer holds
-_PREFIX = "aerobat-betaflight-"  # of temporary folders
+_LINES_AT_ONCE = 20  # capacity of its input buffer
+_PREFIX = "aerobat-betaflight-"  # prefix of temporary folders
 
 
 class FirmwareEnded(SpecError):
-    """The firmware's process came to an end while it was needed."""
+    """The firmware's process has ended while it was needed."""
 
 
 class _Folder(tempfile.TemporaryDirectory[str]):
-    """A temporary folder, locked while this process lives; folders that killed processes left are removed."""
+    """A temporary folder, locked while this process lives; folders left by killed processes are removed."""
 
     def __init__(self) -> None:
         for abandoned in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
-            with suppress(OSError):  # it is another's, or gone
-                if time.time() - abandoned.stat().st_mtime > 60.0:  # a younger one may not be locked yet
+            with suppress(OSError):  # it is in use, or gone
+                if time.time() - abandoned.stat().st_mtime > 60.0:  # a younger folder may not be locked yet
                     os.close(_locked(abandoned))
                     shutil.rmtree(abandoned)
         super().__init__(prefix=_PREFIX)
@@ -52,8 +52,8 @@ class _Folder(tempfile.TemporaryDirectory[str]):
 
 
 def _locked(folder: str | Path) -> int:
-    """The descriptor of a folder that this process has locked. Raises OSError where another has."""
-    import fcntl  # of Unix alone
+    """Return the descriptor of a folder, locked by this process. Raises OSError if another has locked it."""
+    import fcntl  # Unix only
 
     descriptor = os.open(folder, os.O_RDONLY)
     try:
@@ -65,17 +65,17 @@ def _locked(folder: str | Path) -> int:
 
 
 class Motors(NamedTuple):
-    """Answer of the firmware to a step."""
+    """The firmware's answer to a step."""
 
     time: float  # [s] of its clock
-    commands: tuple[float, ...]  # 0 to 1, in the order of the packet
+    commands: tuple[float, ...]  # 0 to 1, in the order of the packet's motors
 
 
 class Firmware:
     """A running firmware; its clock stands still between steps.
 
-    No UDP port is taken, and its serial line has a port of its own, so that several can run. It ends with
-    this process, however that ends.
+    No UDP port is used, and its serial line has a port of its own, so that several can run. It ends with
+    this process, even if this process is killed.
     """
 
     def __init__(self, saved: bytes | None = None) -> None:
@@ -111,13 +111,13 @@ class Firmware:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                start_new_session=True,  # Ctrl-C is for us, who end it
+                start_new_session=True,  # Ctrl-C is for this process, which ends the firmware
             )
         finally:
             theirs.close()
 
     def step(self, duration: float, state: bytes | None = None, sticks: bytes | None = None) -> Motors:
-        """Advance the firmware by a duration [s], once it has a state and the receiver's channels.
+        """Advance the firmware by a duration [s], after giving it a state and receiver channels, if any.
 
         Raises FirmwareEnded where its process has ended.
         """
@@ -147,7 +147,7 @@ class Firmware:
             return ", it answers no more"
 
     def exchange(self, data: bytes, until: Callable[[bytes], bool]) -> bytes:
-        """Send bytes to the serial line, and return what comes back once a predicate holds of it.
+        """Send bytes to the serial line, and return the answer once a predicate of the answer is true.
 
         The firmware is advanced meanwhile. Raises FirmwareEnded where no such answer comes.
         """
@@ -178,9 +178,9 @@ class Firmware:
         raise FirmwareEnded(f"autopilot: Betaflight does not listen on port {self._port}; run it again")
 
     def configure(self, lines: tuple[str, ...]) -> bytes:
-        """Enter lines at its command line and save, which ends it; return the saved settings.
+        """Enter lines at the command line and save, which ends the firmware; return the saved settings.
 
-        Raises SpecError for a line that it refuses.
+        Raises SpecError for a line that the firmware refuses.
         """
         self.exchange(b"#", partial(_has_prompts, 1))
         for begin in range(0, len(lines), _LINES_AT_ONCE):
@@ -202,7 +202,7 @@ class Firmware:
         raise FirmwareEnded("autopilot: Betaflight does not save its settings; run it again")
 
     def log(self) -> bytes:
-        """Return the last log that it wrote as if to a card; empty if there is none."""
+        """Return the last log that the firmware wrote to its virtual card; empty if there is none."""
         logs = sorted(Path(self._folder.name).glob("LOG*"))
         return logs[-1].read_bytes() if logs else b""
 
@@ -210,7 +210,7 @@ class Firmware:
         """End the process and remove its folder."""
         if self._serial is not None:
             self._serial.close()
-        self._orders.close()  # at which it ends by itself
+        self._orders.close()  # the firmware ends when this is closed
         try:
             self._process.wait(1.0)
         except subprocess.TimeoutExpired:
@@ -220,7 +220,7 @@ class Firmware:
 
 
 def _looks() -> Iterator[None]:
-    """Iterate for as long as an answer is waited for, at whatever pace a busy machine gives it."""
+    """Yield until the time limit for an answer is over."""
     last = time.monotonic() + _PATIENCE
     while time.monotonic() < last:
         yield
@@ -228,9 +228,9 @@ def _looks() -> Iterator[None]:
 
 @lru_cache(maxsize=32)
 def configured(lines: tuple[str, ...]) -> bytes:
-    """Return the settings that a firmware saves of lines of its command line.
+    """Return the settings that the firmware saves from lines of its command line.
 
-    Another program may have taken the port that was free: a second firmware gets another one.
+    If another program has taken the free port meanwhile, a second firmware is started on another port.
     """
     with suppress(FirmwareEnded), closing(Firmware()) as firmware:
         return firmware.configure(lines)
@@ -243,13 +243,13 @@ def _has_prompts(count: int, answer: bytes) -> bool:
 
 
 def require_firmware() -> None:
-    """Raise BackendMissing, with the remedy, where the firmware or a compiler is not there."""
+    """Raise BackendMissing, with the remedy, where the firmware or a compiler is missing."""
     _executable()
     _lockstep()
 
 
 def _executable() -> str:
-    """The firmware's path. Raises BackendMissing where it is not installed."""
+    """Return the firmware's path. Raises BackendMissing where it is not installed."""
     try:
         place = Path(str(distribution("betaflight").locate_file("betaflight")))
     except PackageNotFoundError:
@@ -265,7 +265,7 @@ def _executable() -> str:
 
 @lru_cache(maxsize=1)
 def _lockstep() -> Path:
-    """The library that stands between the firmware and the system's clock, compiled in a moment."""
+    """Return the library that replaces the system clock for the firmware, compiled at the first call."""
     if sys.platform != "linux":
         raise BackendMissing("the autopilot betaflight needs Linux; fly by --controller rates elsewhere")
     compiler = shutil.which("cc") or shutil.which("gcc")

@@ -1,7 +1,7 @@
 """Betaflight's settings for a vehicle, as lines of its command line that can be pasted to a board.
 
-The gains are those of `kernels.rate_loop`, in the firmware's units. What would change rates or thrust on
-the way is switched off: stick expo and smoothing, attenuation by throttle, relaxed integrals, boosts.
+The gains are those of `kernels.rate_loop`, in the firmware's units. Features that would alter rates or thrust
+are switched off: stick expo and smoothing, throttle attenuation, integral relaxation, boosts.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from aerobat.simulation.law_controller import DERIVATIVE, GYRO
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
-GYRO_LIMIT = 1998.0  # [°/s] of the gyro, and of what a stick can ask
-_COARSEST = 10.0  # [°/s] by which the rates of sticks can be set
-_MIN_RATE = 570.0  # [°/s] at a stick's end, room for corrections included
-_CORRECTION = 9.0  # [rad/s] beside the reference's rates: what the outer loop adds, and its lead
-_LEVER_SPREAD = 0.02  # [-] by which the levers of the rotors may differ
+GYRO_LIMIT = 1998.0  # [°/s] range of the gyro, and largest rate of a stick
+_COARSEST = 10.0  # [°/s] resolution of the sticks' rates
+_MIN_RATE = 570.0  # [°/s] least rate at a stick's end, with room for corrections
+_CORRECTION = 9.0  # [rad/s] beyond the reference's rates: corrections of the outer loop, and its lead
+_LEVER_SPREAD = 0.02  # [-] largest relative difference of the rotors' lever arms
 
 _OFF = {
     "iterm_relax": "OFF", "iterm_windup": 100, "anti_gravity_gain": 0, "throttle_boost": 0, "tpa_rate": 0,
@@ -39,7 +39,7 @@ _WHOLE = {
     "airmode_start_throttle_percent": 0,
     "gyro_lpf1_static_hz": round(0.5 / (pi * GYRO)), "dterm_lpf1_static_hz": round(0.5 / (pi * DERIVATIVE)),
 }  # fmt: skip
-# what protects a real vehicle on its way to the ground, and would end a flip
+# features that protect a real vehicle near the ground, and would end a flip
 _SIMULATED = {
     "runaway_takeoff_prevention": "OFF", "yaw_spin_recovery": "OFF", "gyro_overflow_detect": "OFF",
     "small_angle": 180, "motor_pwm_protocol": "PWM", "motor_idle": 0,
@@ -47,9 +47,9 @@ _SIMULATED = {
 
 
 def stick_rate(peak: float) -> float:
-    """The rate at a stick's end [rad/s] for references that turn at `peak` [rad/s] at most about any axis.
+    """Return the rate at a stick's end [rad/s] for references of at most `peak` [rad/s] about any axis.
 
-    Raises SpecError for more than the firmware's gyro can tell.
+    Raises SpecError for rates beyond the firmware's gyro range.
     """
     if (fastest := 180.0 / pi * peak) > GYRO_LIMIT:
         raise SpecError(
@@ -61,25 +61,25 @@ def stick_rate(peak: float) -> float:
 
 
 def board_rate(vehicle: Vehicle, peak: float = 0.0) -> float:
-    """The rate at a stick's end [rad/s] of a vehicle's board, for any plan within its limits.
+    """Return the rate at a stick's end [rad/s] of a vehicle's board, for any plan within its limits.
 
     Args:
-        vehicle: Whose `max_body_rate` counts.
-        peak: The most [rad/s] that references turn, where that is more.
+        vehicle: Of which `max_body_rate` is used.
+        peak: The largest rate of references [rad/s], if it is larger.
 
-    Raises SpecError for more than the firmware's gyro can tell.
+    Raises SpecError for rates beyond the firmware's gyro range.
     """
     return stick_rate(max(peak, min(vehicle.max_body_rate, pi / 180.0 * GYRO_LIMIT)))
 
 
 def throttle_of(vehicle: Vehicle, thrust: float) -> float:
-    """The throttle, 0 to 1, at which all rotors together give a thrust [N]."""
+    """Return the throttle, 0 to 1, at which all rotors together give a thrust [N]."""
     low, high = vehicle.min_thrusts.sum(), vehicle.max_thrusts.sum()
     return float(np.clip((thrust - low) / (high - low), 0.0, 1.0))
 
 
 def rotor_order(vehicle: Vehicle) -> tuple[int, ...]:
-    """The vehicle's rotor at each of the packet's motors. Raises SpecError for any but a quadrotor in X."""
+    """Return the rotor of each of the packet's motors. Raises SpecError for any but a quadrotor in X."""
     places = np.array([rotor.position_body for rotor in vehicle.rotors])
     complaint = SpecError(
         f"autopilot: Betaflight's simulator flies quadrotors in X, and the rotors of '{vehicle.name}' are no "
@@ -101,12 +101,12 @@ def rotor_order(vehicle: Vehicle) -> tuple[int, ...]:
 
 
 def betaflight_settings(vehicle: Vehicle, max_rate: float, simulated: bool = False) -> tuple[str, ...]:
-    """Return lines of Betaflight's command line for a vehicle, without the `save` behind them.
+    """Return lines of Betaflight's command line for a vehicle, without the final `save`.
 
     Args:
-        vehicle: Whose inertia, levers and lag give the gains.
+        vehicle: Of which inertia, lever arms and lag determine the gains.
         max_rate: [rad/s] at the end of each stick.
-        simulated: Whether what protects a real vehicle is switched off too.
+        simulated: Whether protections of a real vehicle are switched off too.
 
     Raises SpecError for a vehicle that the firmware's mixer or gains do not fit.
     """
@@ -131,15 +131,15 @@ def betaflight_settings(vehicle: Vehicle, max_rate: float, simulated: bool = Fal
 
 
 def _gains(vehicle: Vehicle) -> Iterator[tuple[str, int]]:
-    """The gains in the firmware's units.
+    """Yield the gains in the firmware's units.
 
-    One unit is `scale` thousandths of a motor's range for 1°/s, 1° and 1°/s²: its src/main/flight/pid.h, for
-    the integral of yaw pid_init.c.
+    One unit is `scale` thousandths of a motor's range for 1°/s, 1° and 1°/s². Source: its
+    src/main/flight/pid.h, for the integral of yaw pid_init.c.
     """
     fleet = Fleet.of([vehicle])
     gains = rate_gains(FloatOps, first_numbers(airframe_parameters(fleet)))
     span = fleet.max_thrusts[0] - fleet.min_thrusts[0]
-    torque = np.abs(fleet.allocation[0, 1:]) @ span  # [N·m] when every motor gives all that it can to an axis
+    torque = np.abs(fleet.allocation[0, 1:]) @ span  # [N·m] torque with every motor at its limit for an axis
     authority = torque / np.diagonal(fleet.inertia[0])  # [rad/s²]
     for k, axis in enumerate(("roll", "pitch", "yaw")):
         for letter, kind, scale in (
@@ -148,8 +148,8 @@ def _gains(vehicle: Vehicle) -> Iterator[tuple[str, int]]:
             ("d", gains.derivative, 0.000529),
         ):
             value = round(kind[k] / authority[k] * 1000.0 * pi / 180.0 / scale)
-            value = max(value, 1 if kind[k] > 0.0 else 0)  # a small gain is no gain at all else
-            if value > 250:  # the most that its command line takes
+            value = max(value, 1 if kind[k] > 0.0 else 0)  # a small gain must not be rounded to zero
+            if value > 250:  # the largest value of its command line
                 raise SpecError(
                     f"autopilot: the rotors of '{vehicle.name}' are too slow for Betaflight's gains, "
                     f"{letter}_{axis} would be {value}; take a vehicle of less lag or less inertia"

@@ -1,4 +1,4 @@
-"""An autopilot as a client knows it: its clock, its state, its mode; and how to give it orders."""
+"""An autopilot as seen by a client: its clock, state and mode, and the orders to it."""
 
 from __future__ import annotations
 
@@ -16,63 +16,63 @@ from aerobat.links.mavlink.connection import Connection, MavlinkMessage, message
 from aerobat.links.mavlink.dialects import ARMED, CUSTOM_MODE_ENABLED, PX4, Dialect, dialect_of
 from aerobat.links.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
 
-SYSTEM, COMPONENT = 245, 191  # ours: a companion computer
-_AUTOPILOT = 1  # the component of an autopilot
-_GROUND_STATION = 8  # the autopilot number of who is none
-_SYNCHRONIZATIONS = 50  # of which the quickest counts
-_MAX_AHEAD = 0.02  # [s] beside that by which states may be stamped ahead
-_MAX_APART = 0.1  # [s] between the attitude and the position of one state
+SYSTEM, COMPONENT = 245, 191  # our system and component: a companion computer
+_AUTOPILOT = 1  # the component number of an autopilot
+_GROUND_STATION = 8  # the autopilot number of systems that are no autopilots
+_SYNCHRONIZATIONS = 50  # clock synchronizations that are kept; the one with the shortest round trip is used
+_MAX_AHEAD = 0.02  # [s] added to the one-way delay: largest lead of a state's time stamp
+_MAX_APART = 0.1  # [s] largest difference between the times of a state's attitude and position
 
 
 class AutopilotLink:
     """An autopilot at the other end of a connection."""
 
     def __init__(self, connection: Connection, system: int | None, say: Callable[[str], None]) -> None:
-        """Prepare to talk.
+        """Prepare the link.
 
         Args:
-            connection: the way to it.
-            system: its number; None for the first that is heard.
-            say: what takes sentences that it sends, and those about states that are left out.
+            connection: to the autopilot.
+            system: the autopilot's number; None for the first one that is heard.
+            say: receives sentences that the autopilot sends, and sentences about ignored states.
         """
         self._connection = connection
         self._wanted = system
-        self._system: int | None = None  # of the autopilot, once it has answered
-        self.systems: set[int] = set()  # of all autopilots that are heard
-        self._sent: dict[object, float] = {}  # [s] when an order, or a question, was sent last
-        self._mark = randrange(10**6)  # [ns] by which our questions for the time differ from others'
-        self._requested: dict[int, float] = {}  # [s] when those were asked that are unanswered
+        self._system: int | None = None  # number of the autopilot, once it has answered
+        self.systems: set[int] = set()  # numbers of all autopilots that are heard
+        self._sent: dict[object, float] = {}  # [s] time when an order or a question was last sent
+        self._mark = randrange(10**6)  # [ns] offset that distinguishes our time questions from other clients'
+        self._requested: dict[int, float] = {}  # [s] times of time questions without an answer
         self._times: deque[tuple[float, float]] = deque(maxlen=_SYNCHRONIZATIONS)  # [s] round trip, offset
         self._now = 0.0
-        self.heard = self.beat = -inf  # [s] when the last message came, and the last heartbeat
+        self.heard = self.beat = -inf  # [s] times of the last message and of the last heartbeat
         self.mode: Mode | None = None
         self.armed = False
         self.landed: bool | None = None
         self.observed: Observed | None = None
-        self.dialect: Dialect = PX4  # once it is known, the autopilot's
+        self.dialect: Dialect = PX4  # the autopilot's, once it is known
         self.parameters: dict[str, float] = {}
-        self.complaints: dict[str, None] = {}  # what ails it, each once
-        self._attitude: MavlinkMessage = None  # the last message of it
+        self.complaints: dict[str, None] = {}  # the autopilot's warnings, each once
+        self._attitude: MavlinkMessage = None  # the last attitude message
         self._say = say
-        self._left_out: set[str] = set()  # why states were, each told once
+        self._left_out: set[str] = set()  # the reasons why states were ignored, each reported once
 
     @property
     def is_known(self) -> bool:
-        """True once it has answered."""
+        """True once the autopilot has answered."""
         return self._system is not None
 
     @property
     def is_synchronized(self) -> bool:
-        """True once its clock is known."""
+        """True once the autopilot's clock is known."""
         return len(self._times) >= 5
 
     @property
     def delay(self) -> float:
-        """The time that a message is on its way [s]: half of the shortest round trip."""
+        """The one-way delay of a message [s]: half of the shortest round trip."""
         return 0.5 * min(self._times, default=(0.0, 0.0))[0]
 
     def receive(self, now: float) -> list[Observed]:
-        """Take what has come by this time [s], keep the link up, and return the states among it."""
+        """Process received messages at this time [s], keep the link alive, and return the received states."""
         self._now = now
         states = []
         for message in self._connection.receive():
@@ -95,26 +95,26 @@ class AutopilotLink:
         return states
 
     def ask_parameter(self, name: str) -> None:
-        """Ask for a parameter, now and then until it is there."""
+        """Request a parameter, repeatedly until it is received."""
         if name not in self.parameters and self._again(name):
             self._send("param_request_read", self._system, _AUTOPILOT, name.encode(), -1)
 
     def set_mode(self, mode: Mode) -> None:
-        """Order a mode, now and then until it is on."""
+        """Order a mode, repeatedly until it is active."""
         if self.mode is not mode:
             self.command(176, CUSTOM_MODE_ENABLED, *self.dialect.modes[mode])
 
     def arm(self) -> None:
-        """Have the rotors turn, now and then until they do."""
+        """Order arming, repeatedly until the autopilot is armed."""
         if not self.armed:
             self.command(400, 1.0)
 
     def take_off(self, height: float) -> None:
-        """Have it climb by so much [m], now and then until it flies."""
+        """Order a climb by `height` [m], repeatedly while this is called."""
         self.command(22, *(0.0,) * 6, height)
 
     def command(self, number: int, *parameters: float) -> None:
-        """Give an order, unless the same was given just now."""
+        """Send an order, unless the same order was sent just now."""
         if self._again((number, parameters)):
             padded = (*parameters, *(0.0,) * (7 - len(parameters)))
             self._send("command_long", self._system, _AUTOPILOT, number, 0, *padded)
@@ -143,7 +143,7 @@ class AutopilotLink:
         )
 
     def _is_ours(self, message: MavlinkMessage) -> bool:
-        """True for messages of the autopilot: the one that is wanted, or the first that is heard."""
+        """Return True for messages of the autopilot: the requested one, or the first that is heard."""
         if message.get_srcComponent() != _AUTOPILOT:
             return False
         system: int = message.get_srcSystem()
@@ -154,7 +154,7 @@ class AutopilotLink:
         return system == self._system
 
     def _again(self, order: object, every: float = 0.3) -> bool:
-        """True where something was not sent for so long [s]; then it counts as sent now."""
+        """Return True if an order was not sent for `every` [s]; the order then counts as sent now."""
         if self._now - self._sent.get(order, -inf) < every - 1e-9:
             return False
         self._sent[order] = self._now
@@ -172,13 +172,13 @@ class AutopilotLink:
         self.landed = message.landed_state == 1
 
     def _ask_time(self) -> None:
-        """Ask for the time, by a number that no other client's question has."""
+        """Ask for the time, by a number that no other client uses."""
         question = round(1e9 * self._now) + self._mark
         self._requested = dict([*self._requested.items(), (question, self._now)][-_SYNCHRONIZATIONS:])
         self._send("timesync", 0, question)
 
     def _take_timesync(self, message: MavlinkMessage) -> None:
-        """Take the answer to a question of ours; those to other clients come here too."""
+        """Process an answer to one of our time questions; answers to other clients are ignored."""
         sent = self._requested.pop(message.ts1, None)
         if sent is not None and message.tc1 > 0:
             self._times.append((self._now - sent, 1e-9 * message.tc1 - 0.5 * (self._now + sent)))
@@ -196,10 +196,10 @@ class AutopilotLink:
         self._attitude = message
 
     def _state(self, message: MavlinkMessage) -> list[Observed]:
-        """Return a state by our clock, if it is newer than the last and can be one.
+        """Return a state by our clock, if it is newer than the last and plausible.
 
-        Nothing is returned before the vehicle's clock is known. Where a message takes longer one way than the
-        other, states are stamped ahead by up to half a round trip.
+        Nothing is returned before the vehicle's clock is known. If messages take longer one way than the
+        other, time stamps of states are ahead by up to half a round trip.
         """
         if not self.is_synchronized or message.get_type() not in self.dialect.states:
             return []
@@ -220,19 +220,19 @@ class AutopilotLink:
             self._leave_out("stamped later than now")
             return []
         if self.observed is not None and state.time <= self.observed.time:
-            return []  # one that was overtaken, or a copy
+            return []  # a late message, or a copy
         self.observed = state
         return [state]
 
     def _leave_out(self, reason: str) -> None:
-        """Tell once that states of a kind are left out."""
+        """Report once that states of a kind are ignored."""
         if reason not in self._left_out:
             self._left_out.add(reason)
             self._say(f"states are left out that are {reason}")
 
 
 def _of_odometry(message: MavlinkMessage, offset: float) -> Observed | None:
-    """The state in one message, by a clock that is `offset` [s] behind the vehicle's."""
+    """Return the state in one message, by a clock that is `offset` [s] behind the vehicle's."""
     return observed(
         1e-6 * message.time_usec - offset,
         swap_world((message.x, message.y, message.z)),
@@ -245,7 +245,7 @@ def _of_odometry(message: MavlinkMessage, offset: float) -> Observed | None:
 def _of_position(
     position: MavlinkMessage, attitude: MavlinkMessage, age: float, offset: float
 ) -> Observed | None:
-    """The state in two messages, the attitude extrapolated by its rates to the time of the position."""
+    """Return the state in two messages, the attitude extrapolated by its rates to the position's time."""
     rates = swap_body((attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed))
     attitude_then = np.array(swap_attitude((attitude.q1, attitude.q2, attitude.q3, attitude.q4)))
     q = so3.multiply(attitude_then, so3.exp(age * np.array(rates)))

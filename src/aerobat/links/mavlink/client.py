@@ -1,4 +1,4 @@
-"""Our client: flies a plan on an autopilot over MAVLink, from the ground to the ground."""
+"""A client that flies a plan on an autopilot over MAVLink, from take-off to landing."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from aerobat.links.report import LinkReport, link_report
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan
 
-_HOVER_TOLERANCE = 0.1  # [-] by which a vehicle's hovering thrust may differ from that of the plan's vehicle
-_STREAMED = 1.2  # [s] of set-points before PX4 takes the mode offboard
-_LIFT = 1.0  # [m] that a vehicle takes off by, which set-points do not lead off the ground
-_LIFTED = 0.2  # [m] off there, within which it is led on
-_PATIENCE = 8.0  # [s] for a vehicle to do as it is told
-_HOVERING = 3.0  # [s] of hover after an abort, before it lands
-_STILL = 0.3  # [m/s] of a hover
-_SILENCE = 10.0  # [s] without news after an abort, after which the vehicle is told to land, or given up
-_RECOVERY = 60.0  # [s] for coming to a hover, and for a landing beside its way down
-_SLOWEST_DESCENT = 0.2  # [m/s] of a landing
+_HOVER_TOLERANCE = 0.1  # [-] largest relative difference of hover thrust from the plan's vehicle
+_STREAMED = 1.2  # [s] of streamed set-points that PX4 requires before the mode offboard
+_LIFT = 1.0  # [m] height of take-off for vehicles that set-points cannot lift off the ground
+_LIFTED = 0.2  # [m] height error within which take-off is complete
+_PATIENCE = 8.0  # [s] time limit for a vehicle to obey an order
+_HOVERING = 3.0  # [s] of hover after an abort, before landing
+_STILL = 0.3  # [m/s] largest speed of a hover
+_SILENCE = 10.0  # [s] without news after an abort, after which the vehicle is ordered to land, or is given up
+_RECOVERY = 60.0  # [s] time limit for coming to a hover, and for a landing beside the descent
+_SLOWEST_DESCENT = 0.2  # [m/s] slowest descent of a landing
 
 
 class ClientStage(StrEnum):
-    """Stage of a flight that the client is at."""
+    """Stage of a client's flight."""
 
     CONNECTING = "connecting"
     ASKING = "asking the vehicle"
@@ -55,11 +55,11 @@ class ClientSettings:
     rate: float = 200.0  # [1/s] of set-points
     wait: float = 10.0  # [s] for a vehicle to answer
     hover_thrust: float | None = None  # [-] where the vehicle does not say it
-    system: int | None = None  # the number of the vehicle among MAVLink's systems; None for the only one
+    system: int | None = None  # number among MAVLink's systems; None for the only vehicle
 
 
 class Client:
-    """One flight of a plan; `tick` it at its rate until it is `done`."""
+    """One flight of a plan; call `tick` at the settings' rate until it is `done`."""
 
     def __init__(
         self,
@@ -75,13 +75,13 @@ class Client:
         """Prepare to fly.
 
         Args:
-            plan: what is flown; see `require_flyable`.
-            connection: the way to the vehicle.
-            offset: where the plan's origin lies in the vehicle's frame [m], ENU, (3,).
-            mission: how it is flown, and when it is given up.
+            plan: the plan; see `require_flyable`.
+            connection: to the vehicle.
+            offset: position of the plan's origin in the vehicle's frame [m], ENU, (3,).
+            mission: settings of the flight and its abort criteria.
             settings: of the link.
-            say: what takes sentences about the course of things.
-            announcement: what is said before the vehicle is armed.
+            say: receives sentences about the progress.
+            announcement: a sentence for `say` before the vehicle is armed.
         """
         assert plan.vehicle is not None, "a plan that is flyable has a vehicle"
         environment = plan.problem.environment
@@ -91,31 +91,31 @@ class Client:
         self._plan, self._offset = plan, offset
         self.link = AutopilotLink(connection, settings.system, say)
         self.stage = ClientStage.CONNECTING
-        self.log: list[Observed] = []  # while the plan was flown
+        self.log: list[Observed] = []  # states observed while the plan was flown
         self.settings = settings
         self._say = say
         self._announcement = announcement
-        self._now = self._began = nan  # [s] of the last tick, and when the present stage began
+        self._now = self._began = nan  # [s] time of the last tick, and start time of the present stage
         self._ground: PositionGoal | None = None
         self._hovering_since = inf
-        self._refusal = ""  # why it was not begun
-        self._lost = ""  # why the vehicle was not followed to the ground
+        self._refusal = ""  # the reason why the plan was not begun
+        self._lost = ""  # the reason why the vehicle was not followed to the ground
         self._name = plan.vehicle.name
         self._weight = plan.vehicle.mass * environment.gravity
-        self._max_thrust = float(plan.vehicle.max_thrusts.sum())  # [N] later as the vehicle's hover says
+        self._max_thrust = float(plan.vehicle.max_thrusts.sum())  # [N] corrected by the vehicle's hover later
 
     @property
     def done(self) -> bool:
-        """True once there is nothing left to do."""
+        """True once the flight has ended."""
         return self.stage in (ClientStage.LANDED, ClientStage.LOST)
 
     def tick(self, now: float) -> None:
-        """Take what has come by this time [s], and send what is due.
+        """Process received messages at this time [s], and send due ones.
 
-        Raises SpecError for a vehicle that does not answer, is another one, or cannot be armed; nothing flies
-        then.
+        Raises SpecError for a vehicle that does not answer, is not the plan's, or cannot be armed; nothing is
+        flown then.
         """
-        self._now = round(now, 3)  # goals are stamped in whole milliseconds, and are those of their stamps
+        self._now = round(now, 3)  # goals are computed for their time stamps, which are whole milliseconds
         if isnan(self._began):
             self._began = self._now
         states = self.link.receive(self._now)
@@ -124,7 +124,7 @@ class Client:
         getattr(self, f"_while_{self.stage.name.lower()}")()
 
     def abort(self, now: float, reason: str) -> None:
-        """Give the flight up: the vehicle is told to hover, then to land."""
+        """Abort the flight: the vehicle is ordered to hover, then to land."""
         if self.stage is ClientStage.FLYING:
             self._now = now
             self.mission.abort(now, reason)
@@ -133,7 +133,7 @@ class Client:
             self._lost = reason
 
     def report(self) -> LinkReport:
-        """Return the report of what the flight came to."""
+        """Return the report of the flight."""
         began = self.mission.maneuver_began
         return link_report(
             self._plan,
@@ -156,7 +156,7 @@ class Client:
 
     @property
     def _elapsed(self) -> float:
-        """Time in the present stage [s]."""
+        """The time in the present stage [s]."""
         return self._now - self._began
 
     def _while_connecting(self) -> None:
@@ -171,13 +171,13 @@ class Client:
             raise SpecError(f"no vehicle answers within {waited}; check the address, and that it is on")
 
     def _require_one_system(self) -> None:
-        """Raise SpecError where there are several autopilots and none is named."""
+        """Raise SpecError where several autopilots answer and the settings name none."""
         if self.settings.system is None and len(self.link.systems) > 1:
             numbers = " and ".join(map(str, sorted(self.link.systems)))
             raise SpecError(f"the systems {numbers} answer; name the vehicle's by --system")
 
     def _while_asking(self) -> None:
-        """Wait for its clock, its state and its parameters, and see that it is the plan's vehicle."""
+        """Wait for the vehicle's clock, state and parameters, and check that it is the plan's vehicle."""
         self._require_one_system()
         dialect, parameters = self.link.dialect, self.link.parameters
         hover = self.settings.hover_thrust or parameters.get(dialect.hover_thrust)
@@ -223,7 +223,7 @@ class Client:
             )
 
     def _while_arming(self) -> None:
-        """Stream where it stands, as PX4 asks before it obeys; then take the mode, then arm."""
+        """Stream the vehicle's position, as PX4 requires before offboard; then set the mode, then arm."""
         assert self._ground is not None, "its state is known"
         self.link.follow(self._ground, self._max_thrust)
         if self._elapsed <= _STREAMED:
@@ -237,12 +237,12 @@ class Client:
             self._enter(ClientStage.TAKING_OFF)
             self._while_taking_off()
         elif self._elapsed > _PATIENCE:
-            # a vehicle that was ordered to arm may have, and is told to land
+            # a vehicle that was ordered to arm may be armed, and is ordered to land
             has_mode = self.link.mode is Mode.OFFBOARD
             self._refuse("arm" if has_mode else "take the mode offboard", lands=has_mode)
 
     def _while_taking_off(self) -> None:
-        """Have it take off where set-points do not lead it off the ground; then fly."""
+        """Order a take-off for vehicles that set-points cannot lift off the ground; then begin to fly."""
         assert self._ground is not None, "its state is known"
         height = self._observed.body.position[2] - self._ground.position[2]
         if self.link.dialect.leads_off or abs(height - _LIFT) < _LIFTED:
@@ -254,7 +254,7 @@ class Client:
             self.link.take_off(_LIFT)
 
     def _refuse(self, what: str, lands: bool = True) -> None:
-        """Raise SpecError, with what ails the vehicle as it says, once it is on the ground."""
+        """Land, if necessary, then raise SpecError with the vehicle's own complaints."""
         complaints = "; ".join(self.link.complaints)
         reason = f": {complaints}" if complaints else "; its own ground station says why"
         self._refusal = f"the vehicle does not {what}{reason}"
@@ -278,7 +278,7 @@ class Client:
             self.link.follow(goal, self._max_thrust)
 
     def _watch_vehicle(self) -> None:
-        """Abort where the vehicle no longer obeys."""
+        """Abort where the vehicle has left the mode offboard or is disarmed."""
         if self.link.mode is not Mode.OFFBOARD:
             mode = "a mode of a pilot's" if self.link.mode is None else f"the mode {self.link.mode}"
             self.mission.abort(self._now, f"the vehicle went into {mode}")
@@ -291,7 +291,7 @@ class Client:
         self._while_recovering()
 
     def _while_recovering(self) -> None:
-        """Have it hover; once it has for a while, or is not seen to, have it land."""
+        """Order a hover; once the vehicle has hovered for a while, or is not seen to, order it to land."""
         if self._yields():
             return
         self.link.set_mode(Mode.HOLD)
@@ -308,14 +308,14 @@ class Client:
             self._land("the vehicle does not come to a hover")
 
     def _land(self, reason: str = "") -> None:
-        """Have it land, for a reason that is told."""
+        """Order a landing, with a reason that is reported."""
         if reason:
             self._say(f"{reason}; it is told to land")
         self._enter(ClientStage.LANDING)
         self._while_landing()
 
     def _while_landing(self) -> None:
-        """Have it land until it has, a pilot takes over, or there is no hope."""
+        """Order a landing until the vehicle has landed, a pilot takes over, or it does not obey in time."""
         height = max(self._observed.body.position[2], 0.0)
         if self._is_down and self._refusal:
             raise SpecError(self._refusal)
@@ -331,11 +331,11 @@ class Client:
 
     @property
     def _is_down(self) -> bool:
-        """True of a vehicle that has landed, by what it has told since it was told what to do."""
+        """True for a vehicle that reports, after the last order, that it is landed and disarmed."""
         return bool(self.link.landed) and not self.link.armed and self.link.beat > self._began
 
     def _yields(self) -> bool:
-        """True where a pilot has taken over: the vehicle is left to him."""
+        """Return True where a pilot has taken over; the vehicle is then left to the pilot."""
         if self.link.mode is not None:
             return False
         self._lose("a pilot has taken over", "the pilot")
@@ -348,7 +348,7 @@ class Client:
 
 
 def run(client: Client, clock: Clock) -> None:
-    """Tick a client until it is done. Interrupted, it tells the vehicle to hover first."""
+    """Tick a client until it is done. On Ctrl-C, order the vehicle to hover first."""
     due, period = clock.now(), 1.0 / client.settings.rate
     try:
         while not client.done:

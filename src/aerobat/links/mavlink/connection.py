@@ -1,4 +1,4 @@
-"""Connections that carry MAVLink messages, by pymavlink, and one that loses and delays them for trials."""
+"""Connections for MAVLink messages by pymavlink, and a connection with losses and delays for tests."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from aerobat.errors import BackendMissing, SpecError
 from aerobat.links.clock import Clock
 
 _KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
-_PATIENCE = 1.0  # [s] of the wall, for opening a broken link, and until that is tried again
+_PATIENCE = 1.0  # [s] of wall time, limit for reopening a broken link, and pause between attempts
 
-MavlinkMessage: TypeAlias = Any  # of pymavlink's own class
+MavlinkMessage: TypeAlias = Any  # of pymavlink's classes
 
 
 class Connection(Protocol):
-    """A way for messages."""
+    """A connection for messages."""
 
     def receive(self) -> list[MavlinkMessage]:
-        """The messages that have come since the last call; never waits."""
+        """Return the messages received since the last call; never waits."""
 
     def send(self, message: MavlinkMessage) -> None:
         """Send a message of the dialect `common`."""
 
     def close(self) -> None:
-        """Give up the socket or the device."""
+        """Close the socket or the device."""
 
 
 @cache
 def dialect() -> Any:
-    """The messages of pymavlink's dialect `common`. Raises BackendMissing where that is not installed."""
+    """Return pymavlink's dialect `common`. Raises BackendMissing where pymavlink is not installed."""
     if find_spec("pymavlink") is None:
         raise BackendMissing('MAVLink needs pymavlink; install it with pip install "aerobat[mavlink]"')
     os.environ["MAVLINK20"] = "1"  # read by pymavlink when it is imported
@@ -49,21 +49,21 @@ def dialect() -> Any:
 
 
 def message_class(name: str) -> Any:
-    """The class of the dialect's messages of a name in small letters, as "param_value"."""
+    """Return the dialect's message class of a name in small letters, as "param_value"."""
     return getattr(dialect(), f"MAVLink_{name}_message")
 
 
 def connect(address: str, *, listen: bool, system: int, component: int = 1, baud: int = 57600) -> Connection:
     """Open a connection.
 
-    Raises SpecError, one sentence, for an address that is none or cannot be had, BackendMissing without
+    Raises SpecError, one sentence, for an invalid or unavailable address, BackendMissing without
     pymavlink.
 
     Args:
         address: udp:HOST:PORT, udpin:, udpout:, tcp: or tcpin: likewise, or a serial device.
-        listen: of udp: and tcp:, to wait on that port rather than send there first.
+        listen: for udp: and tcp:, wait on that port rather than send there first.
         system: our number among MAVLink's systems.
-        component: likewise among its components.
+        component: our number among the system's components.
         baud: the rate of a serial device [bit/s].
     """
     dialect()
@@ -72,7 +72,7 @@ def connect(address: str, *, listen: bool, system: int, component: int = 1, baud
         address = address.replace("tcp:", "tcpin:", 1)
     from pymavlink import mavutil
 
-    # pymavlink prints what ails a link on standard output, which is the report's
+    # pymavlink prints link errors on standard output, which is for the report
     mavutil.print = lambda *words: None
     open_link = partial(
         mavutil.mavlink_connection,
@@ -86,15 +86,15 @@ def connect(address: str, *, listen: bool, system: int, component: int = 1, baud
     )
     try:
         if place is not None:
-            socket.getaddrinfo(*place)  # by UDP a name that nobody knows is only a link that is silent
+            socket.getaddrinfo(*place)  # UDP would accept an unknown host name in silence
         return _PymavlinkConnection(open_link)
-    except Exception as error:  # sockets, devices and resolvers raise what they like
+    except Exception as error:  # sockets, devices and resolvers raise various exceptions
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise SpecError(f"cannot open {address}: {reason}; give another address or port") from None
 
 
 def _host_and_port(address: str) -> tuple[str, str] | None:
-    """The host and the port of an address; None of a device's. Raises SpecError for what is neither."""
+    """Return the host and port of an address; None for a device. Raises SpecError for anything else."""
     kind, _, rest = address.partition(":")
     if kind in _KINDS:
         host, _, port = rest.rpartition(":")
@@ -110,11 +110,11 @@ def _host_and_port(address: str) -> tuple[str, str] | None:
 
 
 class _PymavlinkConnection:
-    """A link by pymavlink; one that breaks is silent, and opened anew now and then."""
+    """A pymavlink link; a broken link is silent, and is reopened from time to time."""
 
     def __init__(self, open_link: Callable[[], Any]) -> None:
         self._open_link = open_link
-        self._broke = 0.0  # [s] of the wall, when it did, or was not to be opened
+        self._broke = 0.0  # [s] of wall time when the link broke, or could not be opened
         self._link: Any = None
         self._open()
 
@@ -124,7 +124,7 @@ class _PymavlinkConnection:
         if not self._is_open():
             return messages
         try:
-            # after a thousand others have their turn
+            # at most a thousand messages, so that other work is not delayed
             while len(messages) < 1000 and (message := self._link.recv_msg()) is not None:
                 messages.append(message)
             self._let_go_of_client()
@@ -148,7 +148,7 @@ class _PymavlinkConnection:
                 link.close()
 
     def _is_open(self) -> bool:
-        """True of a link that works; a broken one is opened anew where it was left alone for long enough."""
+        """Return True for a working link; a broken link is reopened first, if the pause is over."""
         if self._link is None and time.monotonic() - self._broke > _PATIENCE:
             patience = socket.getdefaulttimeout()
             socket.setdefaulttimeout(_PATIENCE)
@@ -165,7 +165,7 @@ class _PymavlinkConnection:
         self._link.handle_eof = self._link.handle_disconnect = _end_of_link  # of TCP
 
     def _let_go_of_client(self) -> None:
-        """Let the next client in where that of a TCP server has hung up."""
+        """Close the connection of a client that has hung up, so that a TCP server accepts the next one."""
         port = getattr(self._link, "listen", None) and self._link.port
         if port:
             with suppress(BlockingIOError):
@@ -179,7 +179,7 @@ def _end_of_link() -> None:
 
 
 class LossyConnection:
-    """A connection that loses some messages of either direction and delays all others alike."""
+    """A connection that loses some messages in both directions and delays all others equally."""
 
     def __init__(
         self, connection: Connection, clock: Clock, *, loss: float = 0.0, delay: float = 0.0, seed: int = 0
@@ -187,10 +187,10 @@ class LossyConnection:
         """Wrap a connection.
 
         Args:
-            connection: what carries the messages.
+            connection: carries the messages.
             clock: of the delay.
-            loss: the probability of a message to be lost, either way.
-            delay: of each message, either way [s].
+            loss: the probability that a message is lost, in either direction.
+            delay: of each message, in either direction [s].
             seed: of the losses.
         """
         self._connection = connection
@@ -202,7 +202,7 @@ class LossyConnection:
         self._going: list[tuple[float, int, MavlinkMessage]] = []
 
     def receive(self) -> list[MavlinkMessage]:
-        """See `Connection.receive`; also sends what has waited for long enough."""
+        """See `Connection.receive`; also sends messages whose delay is over."""
         for message in self._connection.receive():
             self._keep(self._coming, message)
         for message in self._due(self._going):

@@ -1,4 +1,4 @@
-"""The dialects of autopilots' MAVLink: modes, thrust, states, taking off, refusals. One value for each."""
+"""MAVLink dialects of autopilots: modes, thrust, states, take-off and refusals, one value for each."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 
 
 class RequiredBits(NamedTuple):
-    """Bits of a parameter without which no set-point is flown as it is meant."""
+    """Required bits of a parameter, without which set-points are not flown as intended."""
 
     mask: int
     bits: int
-    meaning: str  # of other bits
+    meaning: str  # effect of other bits
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """The words in which one autopilot speaks MAVLink."""
+    """The MAVLink conventions of one autopilot."""
 
     autopilot: int  # its number in heartbeats, MAV_AUTOPILOT
-    firmware: int  # the version for which clients take the simulated vehicle
-    modes: Mapping[Mode, tuple[int, int]]  # main mode and sub-mode, as orders have them
-    mode_shift: int  # by which the main mode's bits stand in a heartbeat's number, the sub-mode's 8 higher
-    hover_thrust: str  # the parameter by whose value thrusts are scaled: the part at which it hovers
-    silence: str  # the parameter of the time [s] after which a silent client is taken for lost
-    states: Mapping[str, int]  # messages to be asked for, and every how many states each is needed
-    settings: Mapping[str, RequiredBits]  # parameters that have to have a value
-    leads_off: bool  # whether set-points lead it off the ground; else an order to take off does
-    refused: int  # MAV_RESULT of an order that is not obeyed
-    refusal: str  # how its sentences on a refused arming begin
+    firmware: int  # the version that the simulated vehicle reports to clients
+    modes: Mapping[Mode, tuple[int, int]]  # main mode and sub-mode, as in orders
+    mode_shift: int  # bit position of the main mode in a heartbeat's number; the sub-mode is 8 bits higher
+    hover_thrust: str  # parameter of the hover thrust [-] of the maximum, by which thrusts are scaled
+    silence: str  # the parameter of the time [s] after which a silent client counts as lost
+    states: Mapping[str, int]  # messages to request, and their interval in states
+    settings: Mapping[str, RequiredBits]  # parameters that must have certain bits
+    leads_off: bool  # whether set-points lift it off the ground; else a take-off order does
+    refused: int  # MAV_RESULT of a refused order
+    refusal: str  # beginning of its sentences on a refused arming
 
     def custom_mode(self, mode: Mode) -> int:
-        """The number of a mode in heartbeats."""
+        """Return the number of a mode in heartbeats."""
         main, sub = self.modes[mode]
         return main << self.mode_shift | sub << self.mode_shift + 8
 
     def mode_of(self, number: int) -> Mode | None:
-        """The mode of a number in heartbeats; None for one that is not among ours."""
+        """Return the mode of a number in heartbeats; None for an unknown number."""
         return next((mode for mode in self.modes if self.custom_mode(mode) == number), None)
 
 
@@ -81,5 +81,5 @@ DIALECTS = {"px4": PX4, "ardupilot": ARDUPILOT}
 
 
 def dialect_of(autopilot: int) -> Dialect:
-    """The dialect of an autopilot by its number in heartbeats; PX4's for one that is not known."""
+    """Return the dialect of an autopilot by its number in heartbeats; PX4's for an unknown number."""
     return next((dialect for dialect in DIALECTS.values() if dialect.autopilot == autopilot), PX4)

@@ -1,4 +1,4 @@
-"""The simulated vehicle as an autopilot that MAVLink clients know: with the messages of PX4, or ArduPilot."""
+"""The simulated vehicle as a MAVLink autopilot, with the messages of PX4 or ArduPilot."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from aerobat.links.mavlink.frames import (
     to_global,
 )
 
-SYSTEM = 1  # the vehicle's number
-_TAKEOFF_HEIGHT = "MIS_TAKEOFF_ALT"  # the one parameter that clients may set
+SYSTEM = 1  # the vehicle's system number
+_TAKEOFF_HEIGHT = "MIS_TAKEOFF_ALT"  # the only parameter that clients may set
 _IGNORED_POSITION, _IGNORED_VELOCITY, _IGNORED_ACCELERATION, _IGNORED_YAW = 7, 56, 448, 1024
 _IGNORED_RATES, _IGNORED_ATTITUDE = 7, 128
 
 
 class FrontEnd:
-    """The messages of a simulated vehicle: streams that it sends, orders that it takes."""
+    """The messages of a simulated vehicle: streams that it sends, and orders that it accepts."""
 
     def __init__(
         self,
@@ -39,17 +39,17 @@ class FrontEnd:
         speaks: Dialect = PX4,
     ) -> None:
         self.vehicle, self.dialect = vehicle, speaks
-        self._guided = False  # in ArduPilot's mode GUIDED, in which it holds where no set-points come
+        self._guided = False  # in ArduPilot's mode GUIDED, in which it holds without set-points
         self._say = say
         self._connection = connection
         self._began = vehicle.time
         self.parameters = {
             self.dialect.hover_thrust: vehicle.hover_fraction,
-            _TAKEOFF_HEIGHT: 2.5,  # [m] PX4's own, until a client says otherwise
+            _TAKEOFF_HEIGHT: 2.5,  # [m] PX4's default, until a client sets it
             self.dialect.silence: POINT_TIMEOUT,
             **{name: float(setting.bits) for name, setting in self.dialect.settings.items()},
         }
-        # by the message's number: its name, its fields, and the interval [s], NaN until somebody asks for it
+        # by the message's number: its name, its fields, and the interval [s], NaN until a client requests it
         self._streams: dict[int, tuple[str, Callable[[], Sequence[Any]], float]] = {
             message_class(name).id: (name, fields, interval)
             for name, fields, interval in (
@@ -70,7 +70,7 @@ class FrontEnd:
         }  # [s]
 
     def tick(self, now: float) -> None:
-        """Go on to this time [s], take what has come, and send what is due."""
+        """Advance to this time [s], process received messages, and send due ones."""
         self.vehicle.advance(now)
         for message in self._connection.receive():
             if getattr(message, "target_system", SYSTEM) not in (0, SYSTEM):
@@ -90,7 +90,7 @@ class FrontEnd:
     def _send(self, name: str, *fields: Any) -> None:
         self._connection.send(message_class(name)(*fields))
 
-    # the fields of what is streamed
+    # the fields of streamed messages
 
     @property
     def _milliseconds(self) -> int:
@@ -110,7 +110,7 @@ class FrontEnd:
 
     @property
     def _mode(self) -> Mode:
-        """The mode as heartbeats tell it."""
+        """The mode that heartbeats report."""
         guided = self._guided and self.vehicle.mode in (Mode.HOLD, Mode.TAKEOFF)
         return Mode.OFFBOARD if guided else self.vehicle.mode
 
@@ -176,7 +176,7 @@ class FrontEnd:
         yaw = swap_yaw(yaw_of(self.vehicle.state.q_world_body))
         return round(100 * degrees(yaw % (2 * pi))) % 36000
 
-    # what is taken
+    # received messages
 
     def _take_timesync(self, message: MavlinkMessage) -> None:
         if message.tc1 == 0:
@@ -206,7 +206,7 @@ class FrontEnd:
         self._obey(message, (message.x, message.y, message.z))
 
     def _obey(self, message: MavlinkMessage, place: tuple[float, float, float]) -> None:
-        """Do what a command says, and acknowledge it: accepted, denied, or not known.
+        """Execute a command and acknowledge it: accepted, denied, or unknown.
 
         `place`: latitude and longitude [1e-7 °] and altitude [m].
         """
@@ -225,7 +225,7 @@ class FrontEnd:
         self._send("command_ack", message.command, result, 0, 0, *source)
 
     def _arm(self) -> bool:
-        """Arm, or say why not."""
+        """Arm; if that is impossible, send the reason and return False."""
         if not self.dialect.leads_off and not self._guided:
             reason = f"{self._mode.name} mode not armable"
         elif self.vehicle.arm():
@@ -249,7 +249,7 @@ class FrontEnd:
         return True
 
     def _take_off(self, height: float = 0.0) -> bool:
-        """Climb, PX4 by its own height, others by the order's [m], when they are guided."""
+        """Take off: PX4 by the height of its own parameter, others by the order's height [m] if guided."""
         if self.dialect.leads_off:
             height = self.parameters[_TAKEOFF_HEIGHT]
         return height > 0.0 and (self.dialect.leads_off or self._guided) and self.vehicle.take_off(height)
@@ -285,7 +285,7 @@ class FrontEnd:
         return True
 
     def _take_set_position_target_local_ned(self, message: MavlinkMessage) -> None:
-        """A point with its velocity and acceleration; of velocity alone, from where the vehicle is."""
+        """Follow a point with velocity and acceleration; for a velocity alone, from the present position."""
         mask = message.type_mask
         state = self.vehicle.state
         position = state.position
@@ -303,7 +303,7 @@ class FrontEnd:
             self._obey_set_points(not self.vehicle.landed)
 
     def _take_set_attitude_target(self, message: MavlinkMessage) -> None:
-        """An attitude with its rates and thrust; without the attitude it is not followed."""
+        """Follow an attitude with its rates and thrust; a message without an attitude is ignored."""
         if message.type_mask & _IGNORED_ATTITUDE:
             return
         q = swap_attitude(tuple(message.q))
@@ -316,11 +316,11 @@ class FrontEnd:
             self._obey_set_points(thrust > 0.0)
 
     def _obey_set_points(self, flies: bool) -> None:
-        """Go where set-points lead in the mode GUIDED, which is on without any too."""
+        """Enter offboard control in the mode GUIDED, which is active without set-points too."""
         if flies and self._guided and self.vehicle.mode in (Mode.HOLD, Mode.TAKEOFF):
             self.vehicle.go_offboard()
 
 
 def _whole(number: float) -> int:
-    """The integer that a command says as a float, -1 for what is none."""
+    """Return a command's integer that is sent as a float, −1 for a number that is not finite."""
     return int(number) if isfinite(number) else -1

@@ -1,1 +1,1 @@
-"""ROS 1 and ROS 2, by one core: a node that flies maneuvers on demand, and a simulated vehicle for it."""
+"""ROS 1 and ROS 2 with common code: a node that flies maneuvers on demand, and a simulated vehicle for it."""

@@ -1,7 +1,8 @@
-"""A Crazyflie behind crazyswarm2's server of ROS 2: requests to its services, and full states on its topic.
+"""A Crazyflie behind crazyswarm2's ROS 2 server: requests to its services, full states on its topic.
 
-Routes to a hover and to the ground are the firmware's own. It hovers by itself where it receives nothing.
-Maneuvers are streamed as full states, or, where the plan has the pieces, uploaded and flown by itself.
+Routes to a hover and to the ground are flown by the firmware. It hovers by itself if it receives nothing.
+Maneuvers are streamed as full states or, if the plan has polynomial pieces, uploaded and flown by the
+firmware.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from aerobat.links.ros.maneuver_node import Tick
 from aerobat.links.ros.middleware import Middleware
 from aerobat.links.ros.preparation import Prepared
 
-PREFIX = "crazyswarm2:"  # of a goal that is a Crazyflie's name
+PREFIX = "crazyswarm2:"  # prefix of a goal that is a Crazyflie's name
 FULL_STATE = "crazyflie_interfaces/msg/FullState"
 SERVICES = {
     "takeoff": "crazyflie_interfaces/srv/Takeoff",
@@ -30,22 +31,22 @@ SERVICES = {
     "start_trajectory": "crazyflie_interfaces/srv/StartTrajectory",
     "notify_setpoints_stop": "crazyflie_interfaces/srv/NotifySetpointsStop",
 }
-_SHORTEST = 0.5  # [s] of a route, however near its end is
-_TRAJECTORY = 1  # the number of the trajectory that is flown
+_SHORTEST = 0.5  # [s] shortest duration of a route
+_TRAJECTORY = 1  # number of the uploaded trajectory
 
 
 class Ros2(Middleware, Protocol):
-    """A node's access to ROS 2, with services of others."""
+    """A node's access to ROS 2, with services of other nodes."""
 
     def client(self, service: str, kind: str) -> Callable[..., None]:
-        """Return a function that asks a service by its request's fields, and waits for no answer."""
+        """Return a function that calls a service with its request's fields, without waiting for an answer."""
 
     def serve(self, service: str, kind: str, take: Callable[[RosMessage], None]) -> None:
-        """Offer a service whose answer is empty."""
+        """Offer a service with an empty answer."""
 
 
 class Crazyflie:
-    """The orders that the server is given at each tick; see `take`."""
+    """The orders to the server at each tick; see `take`."""
 
     def __init__(self, ros: Ros2, name: str) -> None:
         """Find the services of a Crazyflie by its name, as in /cf231."""
@@ -53,14 +54,14 @@ class Crazyflie:
         self._publish = ros.publisher(f"{name}/cmd_full_state", FULL_STATE)
         self._ask = {service: ros.client(f"{name}/{service}", kind) for service, kind in SERVICES.items()}
         self._doing = Doing.NOTHING
-        self._streams = self._flies = False  # whether full states are sent, and a trajectory is flown
+        self._streams = self._flies = False  # whether full states are sent, and whether a trajectory is flown
 
     def take(self, tick: Tick) -> None:
-        """Send what is due: an order where another route begins, else the full state of a maneuver's goal."""
+        """Send due orders: a service call when a route begins, the goal's full state in a maneuver."""
         enters, self._doing = tick.doing is not self._doing, tick.doing
         own = tick.flown is not None and tick.flown.pieces is not None
         if tick.route is None and tick.doing is Doing.NOTHING:
-            if enters and self._streams:  # in the air: the firmware stops the rotors where full states stop
+            if enters and self._streams:  # in the air: the firmware stops rotors when full states end
                 self._order("go_to", relative=True, duration=self._duration(_SHORTEST))
         elif tick.route is not None and tick.doing is not Doing.BRAKING:
             if enters:
@@ -90,7 +91,7 @@ class Crazyflie:
             self._order("go_to", relative=False, goal=goal, yaw=tick.route.yaw, duration=duration)
 
     def _order(self, service: str, **given: Any) -> None:
-        """Ask for a route of the firmware's own, in place of full states."""
+        """Request a route by the firmware, in place of full states."""
         if self._streams:
             self._ask["notify_setpoints_stop"](group_mask=0, remain_valid_millisecs=100)
         self._streams = False
@@ -114,7 +115,7 @@ class Crazyflie:
         self._ask["upload_trajectory"](trajectory_id=_TRAJECTORY, piece_offset=0, pieces=pieces)
 
     def _full_state(self, piece: PathPiece, stamp: int) -> RosMessage:
-        """The goal that begins; body rates are in the body's axes there."""
+        """Return the full state of the goal that begins; its body rates are in body axes."""
         goal = piece.begin
         omega_body = so3.unrotate(goal.q_world_body, np.asarray(goal.omega))
         return self._messages.make(

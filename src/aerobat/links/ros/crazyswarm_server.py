@@ -1,7 +1,7 @@
 """The simulated vehicle as a Crazyflie behind crazyswarm2's server: orders in, odometry out.
 
-A stand-in: routes are flown at the simulated vehicle's own speeds, trajectories with their first heading.
-Jerk and angular acceleration, which full states leave out, are taken from the last two.
+Simplifications: routes are flown at the simulated vehicle's own speeds, trajectories with their first
+heading. Full states contain no jerk and angular acceleration; these are computed from the last two.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from aerobat.links.ros.crazyswarm import FULL_STATE, SERVICES, Ros2
 from aerobat.links.ros.vehicle_node import VehicleNode
 from aerobat.links.stream import SetpointStream
 
-_KEPT = 0.5  # [s] for which a full state is carried on at most
-_STREAM = 0.05  # [s] between two full states of one stream, at most
-_AHEAD = 0.01  # [s] of a trajectory, given to the controller at once
+_KEPT = 0.5  # [s] for which a full state is extrapolated at most
+_STREAM = 0.05  # [s] largest interval between two full states of one stream
+_AHEAD = 0.01  # [s] length of a trajectory's pieces for the controller
 _ZERO: Array = np.zeros(3)
 
 
 class CrazyswarmServer(VehicleNode):
-    """The services of one Crazyflie; `tick` it often."""
+    """The services of one Crazyflie; call `tick` often."""
 
     def __init__(self, ros: Ros2, vehicle: SimulatedVehicle, name: str, **settings: Any) -> None:
         """Offer the services of a name, as in /cf231; see `VehicleNode` for the settings."""
         super().__init__(ros, vehicle, goal=f"{name}/goal", odometry=f"{name}/odom", **settings)
         self._trajectories: dict[int, list[RosMessage]] = {}
-        self._flown: tuple[SetpointStream, float] | None = None  # and when it began [s]
+        self._flown: tuple[SetpointStream, float] | None = None  # the trajectory and its start time [s]
         nowhere = PathGoal(_ZERO, _ZERO, _ZERO, _ZERO, so3.IDENTITY, _ZERO, _ZERO)
         self._last = nowhere, -np.inf  # the last full state, and its stamp [s]
         ros.subscribe(f"{name}/cmd_full_state", FULL_STATE, self._take_full_state)
@@ -43,7 +43,7 @@ class CrazyswarmServer(VehicleNode):
             ros.serve(f"{name}/{service}", kind, getattr(self, f"_{service}"))
 
     def tick(self, now: float) -> None:
-        """Go on to this time [s] along the trajectory, and send what is due."""
+        """Advance to this time [s] along the trajectory, and send due messages."""
         if self._flown is not None:
             stream, began = self._flown
             since = self.vehicle.time - began
@@ -77,7 +77,7 @@ class CrazyswarmServer(VehicleNode):
             self._follow(PathPiece(goal, goal, stamp, _KEPT))
 
     def _with_jerk(self, goal: PathGoal, stamp: float) -> PathGoal:
-        """The goal with the jerk and the angular acceleration since the one before."""
+        """Return the goal with jerk and angular acceleration by differences from the previous goal."""
         (before, when), self._last = self._last, (goal, stamp)
         elapsed = stamp - when
         if not 0.0 < elapsed < _STREAM:

@@ -1,4 +1,4 @@
-"""The node that flies maneuvers on demand: services in, goals at a steady rate out, states from odometry."""
+"""The node that flies maneuvers on demand: services, goals at a fixed rate, and states from odometry."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from aerobat.planning import Planner
 from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
 
-_MAX_AHEAD = 0.1  # [s] by which another machine's clock may be ahead of ours
+_MAX_AHEAD = 0.1  # [s] largest lead of another machine's clock
 
 
 @dataclass(frozen=True)
@@ -36,30 +36,30 @@ class NodeSettings:
 
     rate: float = 100.0  # [1/s] of goals
     takeoff_height: float = 3.0  # [m]
-    in_world: bool = False  # whether gates and goals stay where their problems have them
-    with_jerk: bool = True  # whether goals tell the jerk, as a second joint
-    in_pieces: bool = False  # whether plans are for a Crazyflie that flies them by itself
+    in_world: bool = False  # whether gates and goals keep their world positions, or move with the start
+    with_jerk: bool = True  # whether goals contain the jerk, as a second joint
+    in_pieces: bool = False  # whether plans are for a Crazyflie that flies polynomial pieces by itself
     goal: str = topics.GOAL
     odometry: str = topics.ODOMETRY
     mission: MissionSettings = field(default_factory=MissionSettings)
 
 
 class Tick(NamedTuple):
-    """The orders that are due at one tick, for what flies the vehicle."""
+    """The orders that are due at one tick, for the component that flies the vehicle."""
 
-    piece: PathPiece | None  # of the path, that begins; None where there is no goal
+    piece: PathPiece | None  # the piece of the path that begins; None where there is no goal
     observed: Observed | None  # the last state, None before the first
     now: float  # [s]
-    stamp: int  # [ns] when the piece begins, by ROS time
+    stamp: int  # [ns] start of the piece, in ROS time
     doing: Doing
     route: Route | None
-    ground: float  # [m] where it took off
-    flown: Prepared | None  # the maneuver that is flown
-    is_flown: bool  # whether its plan is: neither the way to its start nor the hover at its end
+    ground: float  # [m] height of take-off
+    flown: Prepared | None  # the maneuver that is being flown
+    is_flown: bool  # true during the plan itself, not on the way to its start or in the hover at its end
 
 
 class ManeuverNode:
-    """The node; `tick` it at its rate. Its clock begins with it."""
+    """The node; call `tick` at its rate. Its clock begins with its creation."""
 
     def __init__(
         self,
@@ -74,13 +74,13 @@ class ManeuverNode:
         """Offer the services.
 
         Args:
-            ros: of which generation.
-            vehicle: what flies.
-            maneuvers: by their services' names, each with how it is planned.
-            executor: what plans, beside this process.
+            ros: access to ROS 1 or ROS 2.
+            vehicle: the vehicle.
+            maneuvers: problems and their planners by the names of their services.
+            executor: for planning in another process.
             settings: of the node.
-            say: what takes sentences about the course of things.
-            take: what flies the vehicle in place of the topic of goals, told of every tick.
+            say: receives sentences about the progress.
+            take: flies the vehicle instead of the topic of goals; called at every tick.
         """
         self.origin = ros.time()  # [ns]
         self._ros = ros
@@ -93,12 +93,12 @@ class ManeuverNode:
         self._take = take or partial(self._send, ros.publisher(settings.goal, topics.KIND_OF_GOAL))
         self._send_markers = ros.publisher(topics.MARKERS, topics.KIND_OF_MARKERS, latched=True)
         self._send_report = ros.publisher(topics.REPORT, topics.KIND_OF_REPORT, latched=True)
-        self._now = 0.0  # [s] of the last tick
-        self._last: tuple[float, PathGoal] | None = None  # [s] when the goal before holds
+        self._now = 0.0  # [s] time of the last tick
+        self._last: tuple[float, PathGoal] | None = None  # the previous goal and its time [s]
         self._planning: tuple[Future[Prepared | str], Answer] | None = None
-        self._flown: Prepared | None = None  # what is flown
-        self._judging: Future[LinkReport] | None = None  # what came of it
-        self._left_out: set[str] = set()  # why odometry was, each said once
+        self._flown: Prepared | None = None  # the maneuver that is being flown
+        self._judging: Future[LinkReport] | None = None  # the report of the last maneuver
+        self._left_out: set[str] = set()  # the reasons why odometry was ignored, each reported once
         ros.subscribe(settings.odometry, topics.KIND_OF_ODOMETRY, self._take_odometry, every=False)
         for name in maneuvers:
             ros.offer(f"/aerobat/{name}", partial(self._take_request, partial(self._plan, name)))
@@ -107,7 +107,7 @@ class ManeuverNode:
         ros.offer("/aerobat/land", partial(self._take_request, self._land))
 
     def tick(self, now: float) -> None:
-        """Go on to this time [s]: take what was planned, and send the goal that is due."""
+        """Advance to this time [s]: begin a maneuver that has been planned, and send the due goal."""
         self._now = now
         if self._planning is not None and self._planning[0].done():
             (planned, answer), self._planning = self._planning, None
@@ -142,7 +142,7 @@ class ManeuverNode:
             publish(topics.goal_message(self._messages, tick.piece, tick.stamp, self.settings.with_jerk))
 
     def _follow_up(self) -> None:
-        """Have a maneuver judged once it is over, and tell what came of it."""
+        """Have a maneuver judged once it has ended, and publish the report."""
         if self._flown is not None and self.commander.doing is not Doing.MANEUVERING:
             commander = self.commander
             assert commander.mission is not None, "maneuvers are missions"
@@ -164,7 +164,7 @@ class ManeuverNode:
             self._send_report(self._messages.make(topics.KIND_OF_REPORT, data=sentence))
 
     def _take_odometry(self, message: RosMessage) -> None:
-        """Take a state, unless it cannot be one."""
+        """Process a state, unless it is implausible."""
         observed = topics.read_odometry(message, self.origin)
         if observed is None:
             self._leave_out("is not finite, or its attitude no unit quaternion; see to the estimator")
@@ -174,13 +174,13 @@ class ManeuverNode:
             self.commander.observe(observed)
 
     def _leave_out(self, reason: str) -> None:
-        """Say once that odometry of a kind is left out."""
+        """Report once that odometry of a kind is ignored."""
         if reason not in self._left_out:
             self._left_out.add(reason)
             self._say(f"odometry is left out that {reason}")
 
     def _take_request(self, obey: Callable[[Answer], None], answer: Answer) -> None:
-        """Obey, or answer why not."""
+        """Execute a request, or answer with the reason why not."""
         try:
             if self._planning is not None:
                 raise SpecError("a maneuver is being planned; wait for it")
@@ -217,7 +217,7 @@ class ManeuverNode:
         self._planning = self._executor.submit(prepare, request), answer
 
     def _begin(self, planned: Prepared | str, answer: Answer) -> None:
-        """Fly what was planned, or answer why not."""
+        """Begin a planned maneuver, or answer with the reason why not."""
         if isinstance(planned, str):
             answer(False, planned)
             return
@@ -233,7 +233,7 @@ class ManeuverNode:
         answer(True, planned.announcement)
 
     def _show(self, planned: Prepared) -> None:
-        """Have markers of the path, its gates and the vehicle along it take the place of those before."""
+        """Publish markers of the path, its gates and the vehicle along it, in place of earlier markers."""
         stamp = self.origin + round(self._now * NANOSECONDS)
         shown = PlanMessages(self._messages, planned.plan, stamp, planned.offset)
         kind = "visualization_msgs/msg/Marker"

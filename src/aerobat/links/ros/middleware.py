@@ -1,4 +1,4 @@
-"""ROS of either generation, as the nodes here use it: its calls come one after the other, in one thread."""
+"""The interface to ROS 1 and ROS 2 for the nodes here: callbacks run one after the other, in one thread."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from typing import Any, Protocol, TypeAlias
 from aerobat.errors import SpecError
 from aerobat.interchange.ros import NANOSECONDS
 
-Answer: TypeAlias = Callable[[bool, str], None]  # success, and a sentence
+Answer: TypeAlias = Callable[[bool, str], None]  # arguments: success, and a sentence
 
-QUEUE = 1000  # messages that wait for a slow receiver: ten seconds of goals
-NEWEST = 5  # messages of which not every one counts
+QUEUE = 1000  # messages that may wait for a slow receiver: ten seconds of goals
+NEWEST = 5  # messages that may wait if only the newest matter
 
-_PATIENCE = 5.0  # [s] of the wall, for which a clock waits
-_FIRST_TIME = 20.0  # [s] of the wall, for which somebody who tells the time is waited for
-_TOLD_AGAIN = 0.1  # [s] of the wall, after which a clock that waits tells its time once more
-_MAX_STEP = 0.01  # [s] between two looks at a clock that waits, its own process' being held up among it
-_MAX_WAIT, _MIN_WAIT = 0.005, 0.0002  # [s] between looks at a clock that may run at another pace than ours
+_PATIENCE = 5.0  # [s] of wall time, longest wait of a clock
+_FIRST_TIME = 20.0  # [s] of wall time, longest wait for simulated time to begin
+_TOLD_AGAIN = 0.1  # [s] of wall time, after which a waiting clock sends its time again
+_MAX_STEP = 0.01  # [s] largest step of a waiting clock between two reads, delays of its own process included
+_MAX_WAIT, _MIN_WAIT = 0.005, 0.0002  # [s] between reads of a clock that may not run at wall time
 
 
 def interface_class(kind: str) -> Any:
-    """The class of messages or services of a kind, package/msg/Name or package/srv/Name, of the ROS at hand.
+    """Return the class of messages or services of a kind, package/msg/Name or package/srv/Name.
 
-    Raises SpecError where its package is not there.
+    Raises SpecError where its package is not found.
     """
     package, folder, name = kind.split("/")
     try:
@@ -38,22 +38,22 @@ def interface_class(kind: str) -> Any:
 
 
 class PacedClock:
-    """A clock that other nodes follow, `speed` times as fast as the wall's, whose time it begins with.
+    """A clock that other nodes follow, `speed` times as fast as wall time, with which it begins.
 
-    It waits for nodes that are late, its own among them, so that a flight is the same on a busy machine.
-    While it waits, its last time is sent again: a late node may have missed the message by which to go on.
+    It waits for late nodes, its own node included, so that a flight is the same on a busy machine. While it
+    waits, its last time is sent again, since a late node may have missed the message that it needs to go on.
     """
 
     def __init__(self, speed: float) -> None:
-        self.tell_again: Callable[[], None] = lambda: None  # sends the last time to others
+        self.tell_again: Callable[[], None] = lambda: None  # sends the last time to other nodes
         self._speed = speed
         self._began = time.time_ns()
         self._elapsed = 0.0  # [ns] of this clock
         self._looked = self._asked = self._told = time.monotonic()
-        self._end = inf  # [ns] of `_elapsed`, to be waited at
+        self._end = inf  # [ns] value of `_elapsed` at which the clock waits
 
     def time(self) -> int:
-        """The time [ns]."""
+        """Return the time [ns]."""
         wall = time.monotonic()
         passed = min(self._speed * (wall - self._looked), _MAX_STEP)
         further = self._elapsed + NANOSECONDS * passed
@@ -66,7 +66,7 @@ class PacedClock:
         return self._began + round(self._elapsed)
 
     def wait_at(self, instant: int) -> None:
-        """Go no further than to a time [ns], until asked again or for as long as patience lasts."""
+        """Stop the clock at a time [ns] until the next call, or for _PATIENCE at most."""
         self.time()
         self._end, self._asked = float(instant - self._began), self._looked
 
@@ -75,29 +75,29 @@ class Middleware(Protocol):
     """A node's access to ROS."""
 
     def make(self, kind: str, /, **given: Any) -> Any:
-        """A message of a kind; see `interchange.ros.Make`."""
+        """Return a message of a kind; see `interchange.ros.Make`."""
 
     def time(self) -> int:
-        """ROS time [ns]."""
+        """Return ROS time [ns]."""
 
     def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
-        """Announce a topic; what sends a message to it. Latched, the last one reaches who comes later."""
+        """Announce a topic and return its publishing function; latched: late subscribers get the last."""
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None], every: bool = True) -> None:
-        """Have messages of a topic taken, in order: `every` one, or where they come too fast the newest."""
+        """Subscribe to a topic; messages are processed in order: `every` message, or only the newest ones."""
 
     def offer(self, service: str, take: Callable[[Answer], None]) -> None:
-        """Offer a service of std_srvs/Trigger; what takes a request answers it, now or later."""
+        """Offer a std_srvs/Trigger service; `take` receives a function to answer with, now or later."""
 
     def work_until(self, instant: int, patience: float = inf) -> None:
-        """Do what comes, messages and requests, until a time [ns] or for so long [s] of the wall."""
+        """Process messages and requests until a time [ns], or for `patience` [s] of wall time."""
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Shut the node down."""
 
 
 def require_time(clock: Callable[[], int]) -> None:
-    """Wait for simulated time to begin. Raises SpecError where nobody tells it."""
+    """Wait for simulated time to begin. Raises SpecError where no node publishes it."""
     end = time.monotonic() + _FIRST_TIME
     while clock() == 0:
         if time.monotonic() > end:
@@ -106,26 +106,26 @@ def require_time(clock: Callable[[], int]) -> None:
 
 
 class Calls:
-    """Calls that the threads of ROS ask for, done by the thread that `work`s."""
+    """Calls requested by threads of ROS and executed by the thread that runs `work_until`."""
 
     def __init__(self) -> None:
-        # no SimpleQueue: its `get` may wait for ever where a busy machine lets a short timeout pass within it
+        # not SimpleQueue: on a busy machine its `get` may wait for ever if a short timeout passes within it
         self._waiting: Queue[Callable[[], None]] = Queue()
         self._unanswered: set[Future[tuple[bool, str]]] = set()
 
     def put(self, call: Callable[[], None]) -> None:
-        """Have it done soon."""
+        """Request a call."""
         self._waiting.put(call)
 
     def answer(self, take: Callable[[Answer], None]) -> tuple[bool, str]:
-        """Have a request taken, and wait for its answer."""
+        """Request a service call, and wait for its answer."""
         answered: Future[tuple[bool, str]] = Future()
         self._unanswered.add(answered)
         self.put(lambda: take(lambda success, sentence: self._settle(answered, success, sentence)))
         return answered.result()
 
     def close(self) -> None:
-        """Answer whoever still waits."""
+        """Answer all waiting requests."""
         for answered in tuple(self._unanswered):
             self._settle(answered, False, "the node has ended")
 
@@ -135,7 +135,7 @@ class Calls:
             answered.set_result((success, sentence))
 
     def work_until(self, instant: int, clock: Callable[[], int], patience: float = inf) -> None:
-        """Do calls, those that wait in any case, until a time [ns] or for so long [s] of the wall."""
+        """Execute calls, waiting ones in any case, until a time [ns] or for `patience` [s] of wall time."""
         end = time.monotonic() + patience
         for _ in range(self._waiting.qsize()):
             self._waiting.get()()

@@ -1,4 +1,4 @@
-"""Planning beside a node, in a process of its own so that goals keep coming."""
+"""Planning for a node, in a process of its own so that goals are not delayed."""
 
 from __future__ import annotations
 
@@ -28,31 +28,31 @@ MANEUVERS = {
 
 @dataclass(frozen=True)
 class ManeuverRequest:
-    """Request for a plan: what is to be planned, and from where."""
+    """A request for a plan: the problem, the planner, and the vehicle's hover."""
 
     problem: Problem
     vehicle: Vehicle
     planner: Planner
-    position: Array  # [m] of the vehicle that hovers, (3,)
-    yaw: float  # [rad] likewise
+    position: Array  # [m] of the hovering vehicle, (3,)
+    yaw: float  # [rad] of the hovering vehicle
     ground: float  # [m] the height of the ground
-    in_world: bool  # whether gates and goal stay where the problem has them; else they move with its start
-    in_pieces: bool = False  # whether a Crazyflie is to fly it by itself
+    in_world: bool  # whether gates and goal keep their world positions; else they move with the start
+    in_pieces: bool = False  # whether a Crazyflie flies the plan by itself
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A plan that may be flown."""
+    """A plan that is ready to be flown."""
 
     plan: Plan
-    offset: Array  # [m] where its origin lies in the world, (3,)
+    offset: Array  # [m] position of its origin in the world, (3,)
     stream: SetpointStream
     announcement: str
-    pieces: Pieces | None = None  # for a Crazyflie that flies them by itself, from the plan's own origin
+    pieces: Pieces | None = None  # for a Crazyflie that flies them by itself, from the plan's origin
 
 
 def prepare(request: ManeuverRequest) -> Prepared | str:
-    """The plan from where the vehicle hovers, or a sentence that says why there is none."""
+    """Return the plan from where the vehicle hovers, or a sentence that says why there is none."""
     try:
         return _prepared(request)
     except Infeasible as error:
@@ -78,7 +78,7 @@ def _prepared(request: ManeuverRequest) -> Prepared:
 
 
 def _from_here(request: ManeuverRequest) -> tuple[Problem, Array]:
-    """The problem that begins where the vehicle hovers, and where its origin lies in the world [m]."""
+    """Return the problem from where the vehicle hovers, and the position of its origin in the world [m]."""
     problem = replace(request.problem, heading=replace(request.problem.heading, start=request.yaw))
     if request.in_world:
         return replace(problem, start=at_rest(request.position)), np.zeros(3)

@@ -1,4 +1,4 @@
-"""ROS 2: rclpy, of whichever installation the interpreter has at hand."""
+"""ROS 2 by rclpy, from the installation that the interpreter finds."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class RclpyMiddleware:
 
         Args:
             name: of the node.
-            clock: what it lives by; else ROS time.
+            clock: the clock of the node; None for ROS time.
             sim_time: whether ROS time is that of the topic /clock.
         """
         self._rclpy = rclpy = _rclpy()
@@ -39,12 +39,13 @@ class RclpyMiddleware:
 
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         self._node = rclpy.create_node(name, parameter_overrides=[Parameter("use_sim_time", value=sim_time)])
-        # a node of their own: the executor that lets them wait takes several times as long for each message
+        # services have a node of their own: an executor that lets them wait is several times slower per
+        # message
         self._waiting = rclpy.create_node(f"{name}_services")
         self._clock = clock
         self._calls = Calls()
         self._services = ReentrantCallbackGroup()
-        # four services at most wait for their answers, each in a thread
+        # at most four services wait for their answers, each in a thread
         self._executors = SingleThreadedExecutor(), MultiThreadedExecutor(4)
         for executor, node in zip(self._executors, (self._node, self._waiting), strict=True):
             executor.add_node(node)
@@ -92,7 +93,7 @@ class RclpyMiddleware:
         self._waiting.create_service(trigger, service, respond, callback_group=self._services)
 
     def client(self, service: str, kind: str) -> Callable[..., None]:
-        """See `crazyswarm.Ros2.client`. Raises SpecError where nobody offers it."""
+        """See `crazyswarm.Ros2.client`. Raises SpecError where no node offers the service."""
         interface = interface_class(kind)
         client = self._waiting.create_client(interface, service, callback_group=self._services)
         if not client.wait_for_service(10.0):  # [s] of the wall

@@ -1,4 +1,4 @@
-"""ROS 1: rospy, of whichever installation the interpreter has at hand."""
+"""ROS 1 by rospy, from the installation that the interpreter finds."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from aerobat.links.ros.middleware import (
     require_time,
 )
 
-_SIM_TIME = "/use_sim_time"  # the parameter that nodes read when they begin
+_SIM_TIME = "/use_sim_time"  # the parameter that nodes read when they start
 
 
 class RospyMiddleware:
@@ -27,11 +27,11 @@ class RospyMiddleware:
     def __init__(self, name: str, clock: PacedClock | None = None) -> None:
         """Register with the master.
 
-        Raises SpecError where none answers or time stands still, BackendMissing without rospy.
+        Raises SpecError where no master answers or time stands still, BackendMissing without rospy.
 
         Args:
             name: of the node.
-            clock: what it lives by, and all that come after it; else ROS time.
+            clock: the clock of this node and of all nodes started later; None for ROS time.
         """
         self._rospy = rospy = _rospy()
         import rosgraph

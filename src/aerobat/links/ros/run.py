@@ -1,4 +1,4 @@
-"""The loop of a node: tick, and take what comes until the next one is due."""
+"""The loop of a node: tick, and process messages until the next tick is due."""
 
 from __future__ import annotations
 
@@ -9,33 +9,33 @@ from typing import Protocol
 from aerobat.interchange.ros import NANOSECONDS
 from aerobat.links.ros.middleware import Middleware
 
-# by the class of the middleware: what shows the topics
+# by the class of the middleware: the command that shows the topics
 _FOLDER = files("aerobat.links.ros") / "rviz"
 RVIZ = {
     "RospyMiddleware": f"rviz -d {_FOLDER / 'ros1.rviz'}",
     "RclpyMiddleware": f"rviz2 -d {_FOLDER / 'ros2.rviz'}",
 }
-_MADE_UP_FOR = 5  # ticks that were missed and are done at once
-_CATCHING_UP = 0.005  # [s] after more, in which messages are taken that a tick would count as lost;
-# of the wall too, for a clock may stand still until this very node goes on
+_MADE_UP_FOR = 5  # largest number of missed ticks that are made up for at once
+_CATCHING_UP = 0.005  # [s] after more, for processing messages that a tick would count as lost;
+# limited by wall time too, since a clock may stand still until this node goes on
 
 
 class Node(Protocol):
     """A node that is ticked."""
 
-    origin: int  # [ns] when its clock began
+    origin: int  # [ns] start of its clock
 
     def tick(self, now: float) -> None:
-        """Go on to this time [s]."""
+        """Advance to this time [s]."""
 
 
 def run(node: Node, ros: Middleware, rate: float, seconds: float = inf) -> None:
     """Tick a node.
 
     Args:
-        node: which.
+        node: the node.
         ros: its clock, and its messages.
-        rate: of ticks [1/s], each for its own time; of many that were missed all but the last are left out.
+        rate: of ticks [1/s], each with its own time; of many missed ticks only the last is made up for.
         seconds: after which it ends.
     """
     period, tick = round(NANOSECONDS / rate), 0

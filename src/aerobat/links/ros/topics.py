@@ -1,9 +1,9 @@
 """The topics of both nodes: their names, and goals and states as messages.
 
-A goal is a trajectory_msgs/MultiDOFJointTrajectory of two points: where the vehicle is to be at its stamp,
-and a period later, so that a receiver knows what comes between two messages. The first joint is the vehicle.
-That message ends at accelerations; the second joint is the vehicle's velocity taken for a place, whose
-velocity is therefore the acceleration, and whose acceleration is the jerk.
+A goal is a trajectory_msgs/MultiDOFJointTrajectory of two points: the vehicle's motion at the stamp, and one
+period later, so that a receiver can interpolate between messages. The first joint is the vehicle. The message
+type ends at accelerations. Therefore a second joint has the vehicle's velocity as its position, so that its
+velocity is the acceleration, and its acceleration the jerk.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ KIND_OF_REPORT = "std_msgs/msg/String"
 KIND_OF_CLOCK = "rosgraph_msgs/msg/Clock"
 JERK_JOINT = f"{BODY}/velocity"
 
-_ALONE = 1.0  # [s] for which a goal of one point tells the way, more than it is followed
+_ALONE = 1.0  # [s] duration of a goal of a single point, longer than it is followed
 _ZERO: Array = np.zeros(3)
 
 
 def goal_message(messages: Messages, piece: PathPiece, stamp: int, with_jerk: bool = True) -> RosMessage:
-    """A piece of a path from a stamp [ns] on; without the jerk it has the vehicle's joint alone."""
+    """Return the message of a piece of a path from a stamp [ns] on; without jerk only the vehicle's joint."""
     later = round(piece.duration * NANOSECONDS)
     points = [
         messages.trajectory_point(time, *_joints(goal)[: 1 + with_jerk])
@@ -41,9 +41,9 @@ def goal_message(messages: Messages, piece: PathPiece, stamp: int, with_jerk: bo
 
 
 def read_goal(message: RosMessage, origin: int) -> PathPiece | None:
-    """The piece of a path in a message, by a clock that began at an instant [ns]; None if malformed.
+    """Return a message's piece of a path, by a clock that began at `origin` [ns]; None if it is malformed.
 
-    Goals of other programs may lack the jerk, a second point, velocities and accelerations.
+    Goals of other programs may lack jerk, the second point, velocities and accelerations.
     """
     if not message.points or not all(point.transforms for point in message.points):
         return None
@@ -60,9 +60,9 @@ def read_goal(message: RosMessage, origin: int) -> PathPiece | None:
 
 
 def read_odometry(message: RosMessage, origin: int) -> Observed | None:
-    """Return a state by a clock that began at an instant [ns]; see `observed` for what is none.
+    """Return the state by a clock that began at `origin` [ns]; None if it is implausible, see `observed`.
 
-    The message has its velocities in the body's axes.
+    The message has its velocities in body axes.
     """
     pose, twist = message.pose.pose, message.twist.twist
     time = (nanoseconds(message.header.stamp) - origin) / NANOSECONDS
@@ -72,7 +72,7 @@ def read_odometry(message: RosMessage, origin: int) -> Observed | None:
 
 
 def nanoseconds(time: RosMessage) -> int:
-    """An instant or a duration of either ROS [ns]."""
+    """Return an instant or a duration of ROS 1 or ROS 2 [ns]."""
     if hasattr(time, "nanosec"):
         return int(time.sec) * NANOSECONDS + int(time.nanosec)
     return int(time.secs) * NANOSECONDS + int(time.nsecs)
@@ -102,10 +102,10 @@ def _norm(goal: PathGoal) -> float:
 
 
 def vector(message: RosMessage) -> Array:
-    """A Vector3 or a Point of either ROS, (3,)."""
+    """Return a Vector3 or a Point as an array, (3,)."""
     return np.array([message.x, message.y, message.z])
 
 
 def quaternion(message: RosMessage) -> Array:
-    """A Quaternion of either ROS, (w, x, y, z)."""
+    """Return a Quaternion as an array, (w, x, y, z)."""
     return np.array([message.w, message.x, message.y, message.z])

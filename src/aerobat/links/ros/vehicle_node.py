@@ -1,4 +1,4 @@
-"""The simulated vehicle as the other node: goals in, odometry out, nothing else."""
+"""The node of the simulated vehicle: it receives goals and publishes odometry, nothing else."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from aerobat.links.goals import Mode, PathGoal
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Middleware, PacedClock
 
-_NEAR = 0.5  # [m] of the vehicle, within which a stream of goals is taken up
-_SLOW = 1.0  # [m/s] likewise
-_LIFT = 0.01  # [m] above where it stands, from which on a goal means to take off
-_OVERLAP = 0.004  # [s] a tick, after which the time is told at which the next goal is due
-_STALE = 0.5  # [s] after its stamp, from which on a goal is none
+_NEAR = 0.5  # [m] largest distance of the first goal from the vehicle
+_SLOW = 1.0  # [m/s] largest difference of velocity of the first goal from the vehicle
+_LIFT = 0.01  # [m] height of a goal above the ground that means take-off
+_OVERLAP = 0.004  # [s] delay of a tick after which the time is told at which the next goal is due
+_STALE = 0.5  # [s] age from which a goal is rejected
 
 
 class VehicleNode:
-    """A vehicle that obeys goals; `tick` it often. Its clock begins with it.
+    """A vehicle that follows goals; call `tick` often. Its clock begins with its creation.
 
-    On the ground it is armed by a goal above it, and disarmed where a goal leads it to the ground. In the
-    air it hovers; it takes up goals that begin where it is, and hovers again once they stop.
+    A goal above the ground arms the vehicle on the ground, and a goal on the ground disarms it. In the air
+    the vehicle hovers; it follows goals that begin where it is, and hovers again once they stop.
     """
 
     def __init__(
@@ -37,16 +37,16 @@ class VehicleNode:
         clock: PacedClock | None = None,
         say: Callable[[str], None] = lambda sentence: None,
     ) -> None:
-        """Subscribe and announce.
+        """Subscribe and announce topics.
 
         Args:
-            ros: of which generation.
-            vehicle: what flies; its time begins at zero.
+            ros: access to ROS 1 or ROS 2.
+            vehicle: the simulated vehicle; its time begins at zero.
             goal: the topic of goals.
             odometry: the topic of states.
             rate: of states [1/s].
-            clock: what all live by, this node first; it waits for goals that are late. None for ROS time.
-            say: what takes sentences about the course of things.
+            clock: the clock of all nodes, published by this node; it waits for late goals. None for ROS time.
+            say: receives sentences about the progress.
         """
         self.origin = ros.time()  # [ns]
         self._ros = ros
@@ -55,15 +55,15 @@ class VehicleNode:
         self._period, self._due = 1.0 / rate, 0.0
         self._send_odometry = ros.publisher(odometry, topics.KIND_OF_ODOMETRY)
         self._clock = clock
-        self._published = self.origin  # [ns] the last time that was told
+        self._published = self.origin  # [ns] the last published time
         if clock is not None:
             self._send_clock = ros.publisher(topics.CLOCK, topics.KIND_OF_CLOCK)
             clock.tell_again = self._tell_time
-        self._refused = ""  # the last reason, so that it is told once
+        self._refused = ""  # the last reason, so that it is reported once
         ros.subscribe(goal, topics.KIND_OF_GOAL, self._take_goal)
 
     def tick(self, now: float) -> None:
-        """Go on to this time [s], and send what is due."""
+        """Advance to this time [s], and send due messages."""
         self.vehicle.advance(now)
         for sentence in self.vehicle.notices:
             self._say(sentence)
@@ -88,9 +88,9 @@ class VehicleNode:
         if piece is None:
             self._refuse("a goal is malformed, or its numbers are not finite")
             return
-        if self._clock is not None:  # time waits just after the piece ends, when the next one is due
+        if self._clock is not None:  # it waits just after the piece ends, when the next goal is due
             self._clock.wait_at(self._stamp(piece.stamp + piece.duration + self._period + _OVERLAP))
-        # up to there by the goal before it: of goals that a pause of this process held up each has its time
+        # until then the previous goal holds: goals delayed by a pause of this process each get their time
         self.vehicle.advance(min(piece.stamp, (self._ros.time() - self.origin) / NANOSECONDS))
         if self.vehicle.time - piece.stamp > _STALE:
             self._refuse("a goal is from long ago by its stamp; set the clocks alike")
@@ -108,7 +108,7 @@ class VehicleNode:
             self._say("following goals")
 
     def _begins_here(self, goal: PathGoal) -> bool:
-        """True for a goal by which a vehicle may begin to obey."""
+        """Return True for a goal with which a vehicle may begin to follow."""
         state = self.vehicle.state
         if self.vehicle.landed and goal.position[2] < _LIFT:
             return False
