@@ -95,7 +95,7 @@ class LoopParameters(NamedTuple):
 
 
 class Due(NamedTuple):
-    """Whether a component that does not step at every tick steps at this one."""
+    """The turn of a component that does not step at every tick."""
 
     now: Scalar  # 1 at a tick at which the component steps, else 0
     clock: StepClock  # about the latest of these ticks: since the one before, until the next

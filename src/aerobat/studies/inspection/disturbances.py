@@ -113,8 +113,9 @@ class CommandDelay:
 def command_delay(flight: Flight, vehicle: Vehicle) -> CommandDelay:
     """Return the delay from commands to rotor thrusts, identified with the rotors' nominal lags.
 
-    For rotors of lag τ and a delay d of at most one row h, a command change from u to u' leaves the error
-    (u − u') (e^(−(h − d)/τ) − e^(−h/τ)) against no delay. The factor, and so d, is found by regression.
+    Rotors have the lag τ, a row lasts h, and the delay d is at most one row. A command change from u to u'
+    then leaves the error (u − u') (e^(−(h − d)/τ) − e^(−h/τ)) against no delay. The factor, and so d, is
+    found by regression.
     """
     steps = np.diff(flight.times)
     h = float(np.median(steps))

@@ -72,8 +72,8 @@ def why(
 
     Changes are tried one at a time: without each limit, with stronger rotors, with stages at any time, and so
     on. If no change suffices alone, a smallest sufficient set of them is searched. Each change is planned by
-    `planner`, by the planner that suits the problem, and by all other registered ones, until a planner finds
-    a plan that is certified and flies, or 10 s of processor time are over. The whole search takes up to
+    `planner`, by the planner that suits the problem, and by all other registered ones. This ends with the
+    first plan that is certified and flies, or after 10 s of processor time. The whole search takes up to
     minutes.
 
     Args:
