@@ -46,13 +46,13 @@ class MissionSettings:
     """Settings of a flight over a live link, and its abort criteria."""
 
     cruise_speed: Positive = 2.0  # [m/s] on the way to the plan's start
-    cruise_acceleration: Positive = 2.0  # [m/s²] likewise
+    cruise_acceleration: Positive = 2.0  # [m/s²] on the way to the plan's start
     settling: Positive = 0.5  # [s] at rest at the start before the plan begins, and at its end
-    patience: Positive = 20.0  # [s] for coming to rest at the start
-    max_error: Positive = 1.0  # [m] off the path
-    max_silence: Positive = 0.25  # [s] without news of the vehicle while the plan is flown
-    max_silence_outside: Positive = 1.0  # [s] likewise at other times
-    max_lateness: Positive = 0.1  # [s] by which a set-point may miss its time while the plan is flown
+    patience: Positive = 20.0  # [s] time limit for coming to rest at the start
+    max_error: Positive = 1.0  # [m] largest distance from the path
+    max_silence: Positive = 0.25  # [s] longest time without a state of the vehicle while the plan is flown
+    max_silence_outside: Positive = 1.0  # [s] longest time without a state at other times
+    max_lateness: Positive = 0.1  # [s] largest delay of a set-point while the plan is flown
 
 
 GoalT_co = TypeVar("GoalT_co", covariant=True)

@@ -20,9 +20,9 @@ class PlannedPassage:
 
     gate: Gate
     time: NonNegative  # [s]
-    up: UnitVector  # where the thrust axis shall point
-    attitude_tolerance: Number = np.inf  # [rad] between them, at most; infinite where no attitude is asked
-    min_speed: NonNegative = CROSSING_SPEED  # [m/s] in the gate's direction; 0 where it may be met along it
+    up: UnitVector  # required direction of the thrust axis
+    attitude_tolerance: Number = np.inf  # [rad] largest angle of thrust axis and `up`; infinite: any attitude
+    min_speed: NonNegative = CROSSING_SPEED  # [m/s] in the gate's direction; 0: any motion is allowed
     margin: NonNegative = 0.0  # [m] from the edges of its opening
     lap: Count = 1  # of a course
 

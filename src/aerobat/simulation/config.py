@@ -66,28 +66,28 @@ class FlightChanges(TypedDict, total=False):
 class FlightConfig:
     """Settings of a flight, whatever plan is flown.
 
-    Raises SpecError for flights without conditions, and for conditions beside a start or a nominal vehicle,
-    which they draw, and say, themselves.
+    Raises SpecError for `flights` without `conditions`, and for `conditions` beside `start` or `nominal`,
+    both of which conditions determine.
     """
 
-    # what tracks the path, by default the nominal vehicle's: settings, a law, or a name: full, paper, lee, …
+    # controller settings, a control law, or a name (full, paper, lee, …); by default the nominal vehicle's
     controller: Annotated[Controller | ControlLaw | str | None, PlainValidator(as_controller)] = None
-    rate: ControlRate = 500.0  # [1/s] of the controller, unless conditions say it
-    # as it would really be flown: what varies, disturbs, and is measured how; left out, as planned
+    rate: ControlRate = 500.0  # [1/s] of the controller, unless the conditions set it
+    # realistic variations, disturbances and sensors; left out, the flight is ideal
     conditions: Annotated[Dispersion | None, _or_named(Dispersion, as_dispersion)] = None
-    seed: Seed = 0  # of conditions
-    # of a batch under conditions, so many, or which; left out, one flight, number 0
+    seed: Seed = 0  # of the draws from conditions
+    # number of flights under conditions, or a range of their numbers; left out, flight 0 alone
     flights: Annotated[range | None, PlainValidator(_flights)] = None
-    start: Annotated[BodyState, AS_IT_IS] | None = None  # true, by default the trajectory's; or a batch's
-    # that controller and set-points are made for, or its name; by default what flies
+    start: Annotated[BodyState, AS_IT_IS] | None = None  # initial state or states; by default the path's
+    # the vehicle, or its name, that controller and set-points are made for; by default the one that flies
     nominal: Annotated[Vehicle | None, _or_named(Vehicle, as_vehicle)] = None
-    # floats, compiled, jax, jax-float32, or the fastest for so many ticks
+    # floats, compiled, jax, jax-float32, or auto: the fastest for this number of ticks
     engine: str = "auto"
-    # physics that others wrote in place of ours, or its name, mujoco or rotorpy: one vehicle a flight
+    # external simulator in place of the built-in plant, or its name, mujoco or rotorpy; flies one vehicle
     plant: Annotated[Plant | None, PlainValidator(PLANTS.instance)] = None
-    # a firmware that holds the rates in place of our model, or its name, betaflight: one vehicle a flight
+    # firmware in place of the inner loop's model, or its name, betaflight; flies one vehicle
     autopilot: Annotated[Autopilot | None, PlainValidator(AUTOPILOTS.instance)] = None
-    log_rate: LogRate | None = None  # [1/s] of the flight's rows, rate over a whole number; by default rate
+    log_rate: LogRate | None = None  # [1/s] of logged rows: rate over a whole number; by default rate
 
     def __post_init__(self) -> None:
         if self.conditions is None:

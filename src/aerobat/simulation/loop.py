@@ -53,7 +53,7 @@ class Signals:
     clock: StepClock
     reference: ReferencePoint
     start: Body  # the true initial state
-    states: list[Tree]  # of the components in their order; before the first tick, of those that have one
+    states: list[Tree]  # of the components in order; in `init`, of the components initialized so far
 
     def find(self, kind: type[State]) -> State | None:
         """Return the state of that type, or None where no component has one."""

@@ -35,8 +35,8 @@ class Betaflight(Autopilot):
     The vehicle is held at its start until the firmware is armed and its motors turn, then released.
     """
 
-    lines: tuple[str, ...] = ()  # of its command line, behind those that the vehicle's settings are
-    blackbox: str | None = None  # the file that its own log is written to, left out none
+    lines: tuple[str, ...] = ()  # of its command line, after those of the vehicle's settings
+    blackbox: str | None = None  # file of the firmware's own log; None for no log
 
     def begin(self, vehicle: Vehicle, setpoint: RateSetpoint, max_rate: float) -> BetaflightRun:
         """Return the firmware, armed, its motors at the first set-point; see `Autopilot.begin`."""

@@ -15,7 +15,7 @@ from aerobat.links.ros.middleware import Middleware, PacedClock
 _NEAR = 0.5  # [m] largest distance of the first goal from the vehicle
 _SLOW = 1.0  # [m/s] largest difference of velocity of the first goal from the vehicle
 _LIFT = 0.01  # [m] height of a goal above the ground that means take-off
-_OVERLAP = 0.004  # [s] delay of a tick after which the time is told at which the next goal is due
+_OVERLAP = 0.004  # [s] of a tick, added to the time at which the clock waits for the next goal
 _STALE = 0.5  # [s] age from which a goal is rejected
 
 

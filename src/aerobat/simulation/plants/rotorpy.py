@@ -42,7 +42,7 @@ class RotorPy(Plant):
     The rotors' speeds, not their thrusts, follow with a lag. RotorPy has no contacts.
     """
 
-    # one of RotorPy's own, with its drag, lift and flapping, as hummingbird; left out, made of what flies
+    # one of RotorPy's own with drag, lift and flapping, as hummingbird; left out, made from the vehicle
     vehicle: Annotated[str | None, PlainValidator(_vehicle_name)] = None
 
     def begin(self, scene: PlantScene, motion: VehicleState) -> RotorPyRun:

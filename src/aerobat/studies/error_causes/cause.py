@@ -32,7 +32,7 @@ class Trial:
     planner: Annotated[Planner, AS_IT_IS]
     conditions: Dispersion
     controller: Controller
-    vehicle_known: bool = True  # by the planner; false: it plans for none, and no rotor has a limit
+    vehicle_known: bool = True  # to the planner; false: it plans without a vehicle, so without rotor limits
 
 
 @declared

@@ -112,7 +112,7 @@ class Inspection:
     saturated: float  # [-] fraction of rows with a saturated rotor
     observed: bool  # false where the log lacks the observer's state
     alignment: Alignment
-    fault: Fault | None = None  # of the inner loop or of rotors, whatever it cost
+    fault: Fault | None = None  # of the inner loop or of rotors, whatever its effect
 
     def __post_init__(self) -> None:
         """Write-protect the arrays."""
