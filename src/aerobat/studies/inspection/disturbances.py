@@ -3,7 +3,7 @@
 The error is e = p − p_ref; the position loop's feedback to an error is F(e) = −(k_p e + k_v e' + k_i ∫e).
 Thus
 
-e'' = F(e) + [F(ê) − F(e)] + [a_thrust − a_ref − F(ê)] + [a − a_thrust].
+    e'' = F(e) + [F(ê) − F(e)] + [a_thrust − a_ref − F(ê)] + [a − a_thrust].
 
 Here ê is the error that the observer estimates, and a_thrust is the acceleration of the nominal vehicle under
 the logged thrusts. The brackets are the effect of estimation errors, the part of the command that thrust and
