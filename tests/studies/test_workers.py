@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import pickle
 import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -173,6 +174,27 @@ def test_of_three_dask_workers_one_is_killed_and_no_flight_is_lost() -> None:
         swept = ab.sweep(hop(), "lab", len(seen()), SEED, workers=address, progress=progress)
     assert 0 < killed[0] < len(seen())
     assert swept == seen()
+
+
+@pytest.mark.process
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's memory")
+def test_flights_of_a_dask_worker_take_the_same_memory_again_and_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By Dask's default every flight of this plan waited for the system to clear eighteen pages."""
+    monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "65536")  # as Dask starts its workers
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as executor:
+        ab.sweep(hop(), "lab", 1000, SEED, executor=executor)
+        before = executor.submit(page_faults).result()
+        ab.sweep(hop(), "lab", 1000, SEED, executor=executor)
+        assert executor.submit(page_faults).result() - before < 5000
+
+
+def page_faults() -> int:
+    """The number of pages that this process waited for."""
+    import resource  # not on Windows
+
+    return int(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
 
 
 @pytest.mark.process

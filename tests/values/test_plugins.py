@@ -123,7 +123,7 @@ def test_help_lists_a_planner_of_ones_own_and_its_options() -> None:
     code, out, _ = aerobat("plan", "--help", "--import", "my_planner.py")
     text = " ".join(out.replace("│", " ").split())
     assert code == 0
-    assert "mine, One polynomial from start to goal" in text
+    assert "mine: One polynomial from start to goal" in text
     assert "--my-option" in text
     assert "mine: The duration in seconds. Default: 2.0." in text
     assert "--my-option" not in aerobat("plan", "--help")[1]

@@ -89,7 +89,7 @@ def _shaped(value: Any, shape: tuple[int, ...], infinite: bool) -> Array:
 
 
 def number(value: Any, name: str) -> float:
-    """Return a finite number within reason that a file gives under `name`. Raises FieldError for anything else."""
+    """Return a finite number that a file gives under `name`. Raises FieldError for anything else."""
     with within_field(name):
         made = _numbers(value, "", infinite=False)
         if not isinstance(made, float):
