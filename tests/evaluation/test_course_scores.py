@@ -11,7 +11,7 @@ import pytest
 import aerobat as ab
 from aerobat.reporting.plain_data import plain
 from aerobat.reporting.report import Report
-from aerobat.simulation.passages.waypoint import GRAZING
+from aerobat.simulation.passages.waypoint import MISS_TOLERANCE
 
 RED = ab.tilted_gate((3.0, 0.0, 1.0), 0.0, width=2.0, height=2.0, name="red")
 BACK = ab.tilted_gate((3.0, 4.0, 2.0), np.pi, width=2.0, height=2.0, name="back")
@@ -46,7 +46,7 @@ def test_every_passage_of_every_lap_is_scored_in_the_order_of_the_course() -> No
     times = [stage.time for stage in planned().stages]
     passed = sorted(each.time for each in (*score.passages, *score.waypoints))
     assert passed == pytest.approx(times, abs=0.05)
-    assert all(waypoint.miss <= waypoint.radius + GRAZING for waypoint in score.waypoints)
+    assert all(waypoint.miss <= waypoint.radius + MISS_TOLERANCE for waypoint in score.waypoints)
 
 
 def test_laps_end_with_their_last_passage_and_add_up() -> None:

@@ -21,7 +21,7 @@ from aerobat.problem.gate import GateWall
 from aerobat.reporting.facts import Fact, Facts, facts
 from aerobat.simulation import Outcome, fly, load_flight
 from aerobat.simulation.passages import FlownBodies, NearestObstacle, nearest_obstacles
-from aerobat.simulation.passages.obstacles import AS_NEAR
+from aerobat.simulation.passages.obstacles import CLEARANCE_TOLERANCE
 from aerobat.studies.feasibility.probe import Feasibility, ProbedTask, probe
 from aerobat.studies.lens import Scenario, lens
 from aerobat.vehicle import Ellipsoid
@@ -95,7 +95,7 @@ def test_the_nearest_is_the_least_over_all_rows_and_pieces_until_the_first_conta
         assert (found.clearance[k] < 0.0) == touches.any()
         if touches.any():
             assert found.time[k] == flown.times[row]
-        assert found.clearance[k] == pytest.approx(least, abs=AS_NEAR) or touches.any()
+        assert found.clearance[k] == pytest.approx(least, abs=CLEARANCE_TOLERANCE) or touches.any()
 
 
 def _gaps(pieces: Pieces, flown: FlownBodies, flight: int, piece: int) -> Array:
@@ -119,7 +119,9 @@ def test_a_flight_that_is_moved_with_its_obstacles_has_the_same_contact(seed: in
     )
     here, found = nearest_obstacles(pieces, flown), nearest_obstacles(there, moved)
     clear = np.asarray(here.clearance) > 1e-6
-    np.testing.assert_allclose(found.clearance[clear], here.clearance[clear], rtol=0, atol=2.0 * AS_NEAR)
+    np.testing.assert_allclose(
+        found.clearance[clear], here.clearance[clear], rtol=0, atol=2.0 * CLEARANCE_TOLERANCE
+    )
     np.testing.assert_array_equal(found.clearance < 0.0, here.clearance < 0.0)
     np.testing.assert_array_equal(found.time[~clear], here.time[~clear])
 

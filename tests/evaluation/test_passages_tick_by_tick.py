@@ -30,7 +30,7 @@ from aerobat.simulation.passages import (
     waypoint_passages,
 )
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, bounding_ellipsoid, gate_places
-from aerobat.simulation.passages.waypoint import GRAZING
+from aerobat.simulation.passages.waypoint import MISS_TOLERANCE
 from gate_motions import CRUISE, SPEED
 from polyline_judge import gate_progress
 from score_cases import QUAD
@@ -187,14 +187,14 @@ def test_a_waypoint_is_judged_by_the_nearest_approach_within_its_window(
     distance = np.hypot(aside, SPEED * beyond)
     assert passage.miss == pytest.approx(distance, abs=SPEED * (2e-3 + step))
     assert passage.speed == pytest.approx(SPEED, rel=1e-3)
-    assert (passage.failure is None) == (passage.miss <= radius + GRAZING)
+    assert (passage.failure is None) == (passage.miss <= radius + MISS_TOLERANCE)
     if beyond == 0.0:
         assert passage.miss == pytest.approx(aside, abs=2e-3)
 
 
 def test_a_waypoint_missed_by_more_than_what_grazes_it_is_missed() -> None:
     flight = ab.fly(CRUISE, QUAD)
-    for beyond, failure in ((0.5 * GRAZING, None), (2.0 * GRAZING, Outcome.MISSED_WAYPOINT)):
+    for beyond, failure in ((0.5 * MISS_TOLERANCE, None), (2.0 * MISS_TOLERANCE, Outcome.MISSED_WAYPOINT)):
         planned = PlannedWaypoint("point", Ball(np.array([SPEED, 0.0, 1.3]), 0.3 - beyond), 1.0)
         passage = waypoint_passage(flight, planned)
         assert (passage.failure and passage.failure.outcome) is failure

@@ -121,12 +121,12 @@ def test_a_rate_that_does_not_fit_the_ticks_is_refused_in_a_sentence() -> None:
 
 
 @cache
-def seam_of(hand_off: HandOff) -> Any:
-    return sensor_of(with_capture(hand_off=hand_off))[1].seam
+def hand_off_of(hand_off: HandOff) -> Any:
+    return sensor_of(with_capture(hand_off=hand_off))[1].hand_off
 
 
-def as_seen(seam: Any, position: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    pose = mocap.as_seen(ArrayOps, seam, Pose(components(position), components(q)))
+def as_seen(hand_off: Any, position: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    pose = mocap.as_seen(ArrayOps, hand_off, Pose(components(position), components(q)))
     return from_components(pose.position), from_components(pose.q_world_body)
 
 
@@ -136,7 +136,7 @@ def test_beyond_the_plane_poses_are_turned_and_moved_exactly_before_it_not_at_al
 ) -> None:
     columns = drawn(with_capture(hand_off=WALL), QUAD, 1).columns
     q = so3.exp(turn)
-    seen, seen_q = as_seen(seam_of(WALL), position[None], q[None])
+    seen, seen_q = as_seen(hand_off_of(WALL), position[None], q[None])
     point, rotation = np.array([0.3, 0.0, 0.0]), so3.exp(columns["hand_off_rotation"][0])
     moved = point + so3.rotate(rotation, position - point) + columns["hand_off_translation"][0]
     is_beyond = position[0] > 0.3
@@ -146,7 +146,7 @@ def test_beyond_the_plane_poses_are_turned_and_moved_exactly_before_it_not_at_al
 
 def test_at_the_plane_s_point_a_pose_jumps_by_5_cm_and_2_degrees() -> None:
     sides = np.array([[0.3 - 1e-9, 0.0, 0.0], [0.3 + 1e-9, 0.0, 0.0]])
-    seen, q = as_seen(seam_of(WALL), sides, np.tile(so3.IDENTITY, (2, 1)))
+    seen, q = as_seen(hand_off_of(WALL), sides, np.tile(so3.IDENTITY, (2, 1)))
     assert np.linalg.norm(seen[1] - seen[0]) == pytest.approx(0.05, abs=1e-8)
     assert so3.angle_between(*q) == pytest.approx(np.radians(2.0), abs=1e-8)
 
@@ -154,18 +154,18 @@ def test_at_the_plane_s_point_a_pose_jumps_by_5_cm_and_2_degrees() -> None:
 @given(places, st.tuples(*(st.floats(-1e-3, 1e-3),) * 3).map(np.array))
 def test_off_the_plane_neighbours_are_seen_as_neighbours(position: np.ndarray, step: np.ndarray) -> None:
     """A rotation keeps lengths, and a warp of w over a depth d changes by w/(d √e) a metre at most."""
-    seam = HandOff(WALL.point, WALL.normal, 0.05, 0.03, warp=0.02, warp_depth=0.5)
+    hand_off = HandOff(WALL.point, WALL.normal, 0.05, 0.03, warp=0.02, warp_depth=0.5)
     other = position + step
     if (position[0] > 0.3) == (other[0] > 0.3):
-        seen, _ = as_seen(seam_of(seam), np.array([position, other]), np.tile(so3.IDENTITY, (2, 1)))
+        seen, _ = as_seen(hand_off_of(hand_off), np.array([position, other]), np.tile(so3.IDENTITY, (2, 1)))
         change, limit = np.linalg.norm(seen[1] - seen[0]), np.linalg.norm(step)
         assert abs(change - limit) <= limit * 0.02 / (0.5 * np.sqrt(np.e)) + 1e-14
 
 
 def test_the_warp_is_largest_at_the_plane_and_gone_far_from_it() -> None:
-    seam = HandOff((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), warp=0.02, warp_depth=0.5)
+    hand_off = HandOff((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), warp=0.02, warp_depth=0.5)
     line = np.array([[0.0, y, 0.0] for y in (-5.0, -0.5, 0.0, 0.5, 5.0)])
-    seen, _ = as_seen(seam_of(seam), line, np.tile(so3.IDENTITY, (5, 1)))
+    seen, _ = as_seen(hand_off_of(hand_off), line, np.tile(so3.IDENTITY, (5, 1)))
     sizes = np.linalg.norm(seen - line, axis=1)
     np.testing.assert_allclose(sizes, 0.02 * np.exp([-50.0, -0.5, 0.0, -0.5, -50.0]), atol=1e-12)
 

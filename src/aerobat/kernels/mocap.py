@@ -17,7 +17,7 @@ class PoseSample(NamedTuple):
     is_valid: Scalar  # 1, or 0 for a gap
 
 
-class Seam(NamedTuple):
+class HandOffParameters(NamedTuple):
     """The plane at which the second system takes over, and the misfit there."""
 
     point: Vector  # [m] of the plane
@@ -36,7 +36,7 @@ class MocapParameters(NamedTuple):
     outlier: Scalar  # [-]
     outlier_size: Scalar  # [m]
     outage: tuple[Scalar, Scalar]  # [s] start and end
-    seam: Seam
+    hand_off: HandOffParameters
     first_error: tuple[Vector, Vector]  # [m], [rad] errors of the pose before the flight
 
 
@@ -52,13 +52,13 @@ class MocapInput(NamedTuple):
 
 def first_pose(ops: Ops, parameters: MocapParameters, body: Body) -> Pose:
     """Return the pose known before the flight, with its own error."""
-    seen = as_seen(ops, parameters.seam, Pose(body.position, body.q_world_body))
+    seen = as_seen(ops, parameters.hand_off, Pose(body.position, body.q_world_body))
     return _with_errors(ops, seen, *parameters.first_error)
 
 
 def sample(ops: Ops, parameters: MocapParameters, body: Body, inputs: MocapInput) -> PoseSample:
     """Return the measured pose of a body."""
-    seen = as_seen(ops, parameters.seam, Pose(body.position, body.q_world_body))
+    seen = as_seen(ops, parameters.hand_off, Pose(body.position, body.q_world_body))
     is_outlier = 1.0 - parameters.outlier <= inputs.chance  # gaps are at the other end of the range
     mistaken = ops.select(is_outlier, parameters.outlier_size, 0.0)
     error = add_scaled(scale(parameters.position_noise, inputs.position), mistaken, inputs.outlier)
@@ -69,15 +69,17 @@ def sample(ops: Ops, parameters: MocapParameters, body: Body, inputs: MocapInput
     return PoseSample(pose, ops.select(is_out, 0.0, is_taken))
 
 
-def as_seen(ops: Ops, seam: Seam, pose: Pose) -> Pose:
+def as_seen(ops: Ops, hand_off: HandOffParameters, pose: Pose) -> Pose:
     """Return the noise-free measured pose: of the second system beyond the plane, warped near it."""
-    from_point = subtract(pose.position, seam.point)
-    distance = dot(seam.normal, from_point)
-    moved = add(add(seam.point, rotate(seam.offset.q_world_body, from_point)), seam.offset.position)
-    turned = multiply(seam.offset.q_world_body, pose.q_world_body)
+    from_point = subtract(pose.position, hand_off.point)
+    distance = dot(hand_off.normal, from_point)
+    moved = add(
+        add(hand_off.point, rotate(hand_off.offset.q_world_body, from_point)), hand_off.offset.position
+    )
+    turned = multiply(hand_off.offset.q_world_body, pose.q_world_body)
     seen = select_tree(ops, distance > 0.0, Pose(moved, turned), pose)
-    depths = distance * seam.inverse_depth
-    position = add_scaled(seen.position, ops.exp(-0.5 * depths * depths), seam.warp)
+    depths = distance * hand_off.inverse_depth
+    position = add_scaled(seen.position, ops.exp(-0.5 * depths * depths), hand_off.warp)
     return seen._replace(position=position)
 
 

@@ -13,7 +13,7 @@ from aerobat.arrays import Array
 from aerobat.links.goals import Observed
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan, planned_passages
-from aerobat.simulation.autopilot.loop import KEPT
+from aerobat.simulation.autopilot.loop import COMMAND_HOLD_TIME
 from aerobat.simulation.outcome import length
 from aerobat.simulation.passages import NearestObstacle, Passage, log_rows, nearest_in_log, passages_in_log
 
@@ -48,7 +48,7 @@ class LinkReport:
     @property
     def is_late(self) -> bool:
         """True where a set-point came later than the time for which a vehicle keeps the previous one."""
-        return self.max_lateness_s > KEPT
+        return self.max_lateness_s > COMMAND_HOLD_TIME
 
     def __str__(self) -> str:
         """Return one sentence."""

@@ -106,7 +106,7 @@ def controller_inputs(
     body, reference = signals.observer.body, inputs or signals.reference
     disturbance = signals.find(Disturbance)
     if takes_forces and disturbance is not None:
-        reference = _answering(reference, body, disturbance, takes_moments)
+        reference = _compensated(reference, body, disturbance, takes_moments)
     if not isinstance(parameters.delay, tuple):
         elapsed = signals.clock.elapsed
         body = control.predicted(ops, parameters.model, state, body, elapsed, parameters.delay)
@@ -125,7 +125,7 @@ class Disturbance(NamedTuple):
     has_omega: Scalar  # 1, or 0 before the first step
 
 
-def _answering(
+def _compensated(
     reference: ReferencePoint, body: Body, disturbance: Disturbance, takes_moments: bool
 ) -> ReferencePoint:
     """Return the reference less the linear and angular accelerations of a disturbance in body axes."""
@@ -143,7 +143,7 @@ def _answering(
     )
 
 
-class CommandsOnTheirWay(NamedTuple):
+class DelayedCommands(NamedTuple):
     """Commands of a controller with computation delay: rotor thrusts [N], or a set-point of body rates."""
 
     in_effect: Any
@@ -160,23 +160,23 @@ class ComputationDelay(Component):
 
     def init(
         self, ops: Ops, parameters: tuple[()], takes_effect: Scalar, signals: Signals
-    ) -> CommandsOnTheirWay:
+    ) -> DelayedCommands:
         """See `Component.init`."""
-        sent = _sent(signals.controller)
-        return CommandsOnTheirWay(sent, sent)
+        sent = _sent_commands(signals.controller)
+        return DelayedCommands(sent, sent)
 
     def step(
         self,
         ops: Ops,
         parameters: tuple[()],
-        state: CommandsOnTheirWay,
+        state: DelayedCommands,
         takes_effect: Scalar,
         signals: Signals,
-    ) -> CommandsOnTheirWay:
+    ) -> DelayedCommands:
         """See `Component.step`."""
-        return CommandsOnTheirWay(
+        return DelayedCommands(
             select_tree(ops, takes_effect > 0.5, state.latest, state.in_effect),
-            _sent(signals.controller),
+            _sent_commands(signals.controller),
         )
 
 
@@ -240,7 +240,7 @@ def gyro(signals: Signals) -> Vector:
     return signals.plant.body.omega_body if imu is None else imu.sample.omega
 
 
-def _sent(controller: Any) -> Any:
+def _sent_commands(controller: Any) -> Any:
     """Return the commands that a controller sends at its step: rotor thrusts [N], or a set-point of rates."""
     setpoint = getattr(getattr(controller, "own", None), "setpoint", None)
     return controller.commands.thrusts if setpoint is None else setpoint
@@ -248,8 +248,8 @@ def _sent(controller: Any) -> Any:
 
 def setpoint_in_effect(signals: Signals) -> Any:
     """Return the commands in effect now: rotor thrusts [N], or a set-point of rates."""
-    delayed = signals.find(CommandsOnTheirWay)
-    return _sent(signals.controller) if delayed is None else delayed.in_effect
+    delayed = signals.find(DelayedCommands)
+    return _sent_commands(signals.controller) if delayed is None else delayed.in_effect
 
 
 def rotor_commands(signals: Signals) -> Commands:

@@ -33,7 +33,7 @@ from aerobat.simulation.setup import LoopPart
 
 GYRO, DERIVATIVE = 0.5 / (pi * 250.0), 0.5 / (pi * 150.0)  # [s] of an inner loop's filters: 250 Hz, 150 Hz
 # rate commands already lead the rotors' lag, so the inner loop's output is not lag-compensated again
-_BEHIND_RATES = FeatureFlags(moment_feedforward=True, motor_lag_compensation=False, prioritize_tilt=True)
+_RATE_LAW_FLAGS = FeatureFlags(moment_feedforward=True, motor_lag_compensation=False, prioritize_tilt=True)
 
 
 class LawState(NamedTuple):
@@ -138,7 +138,7 @@ def flown_by(law: ControlLaw | None, settings: Controller) -> Component:
     """
     if law is None:
         return TrackingController(settings.feature_flags)
-    return LawController(law, _BEHIND_RATES if law.GIVES_RATES else settings.feature_flags)
+    return LawController(law, _RATE_LAW_FLAGS if law.GIVES_RATES else settings.feature_flags)
 
 
 def inner_loop(law: ControlLaw | None, model: ControllerModel) -> tuple[LoopPart, ...]:

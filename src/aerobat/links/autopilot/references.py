@@ -13,7 +13,7 @@ from aerobat.engines.pytree import components
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.links.goals import AttitudeGoal, PathPiece, PositionGoal
 from aerobat.simulation.autopilot.braking import point_reference
-from aerobat.simulation.autopilot.loop import KEPT
+from aerobat.simulation.autopilot.loop import COMMAND_HOLD_TIME
 
 _SLOW = 0.5  # [m/s] and [m/s²]: a piece that ends with less motion ends almost at rest
 _SMOOTHING = 0.002  # [s] time constant of the low-pass filter on the change of commanded rates and thrust
@@ -28,7 +28,7 @@ class PointReference(NamedTuple):
     def reference(self, times: Array, gravity: float) -> ReferencePoint:
         """Return references at times [s], leaves (T,)."""
         goal, ones = self.goal, np.ones((len(times), 1))
-        age = np.clip(times - self.arrived, 0.0, KEPT)[:, None]
+        age = np.clip(times - self.arrived, 0.0, COMMAND_HOLD_TIME)[:, None]
         position = goal.position + age * goal.velocity
         velocity, acceleration = ones * goal.velocity, ones * goal.acceleration
         return point_reference(position, velocity, acceleration, 0.0 * ones * velocity, goal.yaw, gravity)
@@ -48,7 +48,7 @@ class PathReference(NamedTuple):
     def reference(self, times: Array, period: float, gravity: float) -> ReferencePoint:
         """Return references at times [s], leaves (T,), for a controller that steps every `period` [s]."""
         begin, end, stamp, duration = self.piece
-        age = np.clip(times - stamp, 0.0, duration + KEPT)[:, None]
+        age = np.clip(times - stamp, 0.0, duration + COMMAND_HOLD_TIME)[:, None]
         snap = (end.jerk - begin.jerk) / duration
         position, velocity, acceleration, jerk, _ = _extrapolated(age, (*begin[:4], snap))
         (omega_body, omega_dot_body), (_, final) = (
@@ -100,7 +100,7 @@ class AttitudeReference(NamedTuple):
     def followed_by(self, goal: AttitudeGoal, sent: float, arrived: float) -> AttitudeReference:
         """Return the reference of the next goal, or this one where the next goal is older (reordered)."""
         elapsed = sent - self.sent
-        if abs(elapsed) > 10.0 * KEPT:
+        if abs(elapsed) > 10.0 * COMMAND_HOLD_TIME:
             return AttitudeReference(goal, sent, arrived)
         if elapsed <= 0.0:
             return self
@@ -117,7 +117,7 @@ class AttitudeReference(NamedTuple):
 
     def reference(self, times: Array, period: float, mass: float) -> ReferencePoint:
         """Return references at times [s], leaves (T,), for a controller's period [s] and a mass [kg]."""
-        age = np.clip(times - self.since, 0.0, KEPT)[:, None]
+        age = np.clip(times - self.since, 0.0, COMMAND_HOLD_TIME)[:, None]
         omega_body = self.goal.omega_body + age * self.omega_dot
         mean_rate = self.goal.omega_body + 0.5 * age * self.omega_dot
         q = so3.multiply(so3.normalize(np.array(self.goal.q_world_body)), so3.exp(age * mean_rate))

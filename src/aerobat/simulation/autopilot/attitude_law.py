@@ -31,7 +31,7 @@ class Authority(NamedTuple):
     lag: Scalar  # [s] lag of the rotors
 
 
-def slope_limited_error(
+def limited_attitude_error(
     ops: Ops, gains: Gains, authority: Authority, body: Body, body_axes: Axes, attitude: AttitudeCommand
 ) -> AttitudeError:
     """Return the error of attitude and body rates, limited to the part that may be answered.
@@ -51,8 +51,8 @@ def slope_limited_error(
     turned = upright > _OPPOSITE
     c = ops.select(turned, w / ops.maximum(upright, _OPPOSITE), 1.0)  # of half the yaw, the cosine
     s = ops.select(turned, z / ops.maximum(upright, _OPPOSITE), 0.0)  # and the sine
-    tilt = _answered(ops, gains, ops.sqrt(x * x + y * y), authority.tilt, authority.lag)
-    yaw = _answered(ops, gains, magnitude(ops, s), authority.yaw, authority.lag)
+    tilt = _limited_fraction(ops, gains, ops.sqrt(x * x + y * y), authority.tilt, authority.lag)
+    yaw = _limited_fraction(ops, gains, magnitude(ops, s), authority.yaw, authority.lag)
     yaw = ops.minimum(yaw, _MAX_YAW_RATE * gains.damping / (gains.stiffness * magnitude(ops, s) + TINY))
     level = ops.maximum(2.0 * upright * upright - 1.0, 0.0)  # the cosine of the tilt; yaw waits for it
     omega = to_body(body_axes, attitude.omega)
@@ -60,7 +60,7 @@ def slope_limited_error(
     return AttitudeError(rotation, subtract(omega, body.omega_body))
 
 
-def _answered(ops: Ops, gains: Gains, half: Scalar, acceleration: Scalar, lag: Scalar) -> Scalar:
+def _limited_fraction(ops: Ops, gains: Gains, half: Scalar, acceleration: Scalar, lag: Scalar) -> Scalar:
     """Return the fraction of an error [-] that the attitude loop may answer.
 
     Args:

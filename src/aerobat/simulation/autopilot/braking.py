@@ -15,10 +15,10 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 MIN_FLOOR = 0.5  # [m] height above the ground below which no hover is aimed at
-_SHORTEST = 0.2  # [s] shortest duration of braking
-_PEAK = 1.5  # [-] peak deceleration times duration over initial speed, of the polynomial
-_BRAKING = 0.8  # [-] fraction used of the deceleration that thrust can give beyond hovering
-_FALLING = 0.7  # [-] fraction of gravity with which a climb is ended
+_MIN_DURATION = 0.2  # [s] shortest duration of braking
+_PEAK_RATIO = 1.5  # [-] peak deceleration times duration over initial speed, of the polynomial
+_BRAKING_FRACTION = 0.8  # [-] fraction used of the deceleration that thrust can give beyond hovering
+_GRAVITY_FRACTION = 0.7  # [-] fraction of gravity with which a climb is ended
 
 
 class Braking(NamedTuple):
@@ -38,10 +38,10 @@ class Braking(NamedTuple):
             gravity: [m/s²].
             floor: the height [m] below which a path must not end.
         """
-        deceleration = _BRAKING * (vehicle.max_specific_thrust - gravity)
+        deceleration = _BRAKING_FRACTION * (vehicle.max_specific_thrust - gravity)
         needed = np.linalg.norm(velocity, axis=-1) / deceleration
-        needed = np.maximum(needed, velocity[..., 2] / (_FALLING * gravity))
-        durations = np.maximum(_PEAK * needed, _SHORTEST)
+        needed = np.maximum(needed, velocity[..., 2] / (_GRAVITY_FRACTION * gravity))
+        durations = np.maximum(_PEAK_RATIO * needed, _MIN_DURATION)
         reach = durations[..., None] * velocity
         raised = np.zeros_like(position)
         raised[..., 2] = np.maximum(floor - (position + 0.5 * reach)[..., 2], 0.0)

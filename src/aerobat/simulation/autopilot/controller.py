@@ -19,7 +19,7 @@ from aerobat.kernels.control_loops import (
 from aerobat.kernels.ops import TINY, Ops, Scalar, Vector, clip, magnitude, select_tree
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.vectors import add, dot, norm, subtract
-from aerobat.simulation.autopilot.attitude_law import Authority, slope_limited_error
+from aerobat.simulation.autopilot.attitude_law import Authority, limited_attitude_error
 from aerobat.simulation.loop import Component, Signals
 
 _MIN_LIFT = 0.2  # [-] of gravity: least upward thrust on the way to a point; keeps the vehicle upright
@@ -77,7 +77,7 @@ class AutopilotController(Component):
         thrust = control.collective(ops, model.airframe.mass_properties.mass, body_axes[2], attitude)
         turning = ops.maximum(thrust, _turning_thrust(ops, model, body_axes[2], towards))
         pursuit = AttitudePursuit(
-            slope_limited_error(ops, model.gains, authority, body, body_axes, attitude),
+            limited_attitude_error(ops, model.gains, authority, body, body_axes, attitude),
             ops.select(commanded, thrust, ops.select(upright, turning, thrust)),
         )
         return control.track_attitude(ops, self.flags, model, state, body_axes, pursuit, reference, elapsed)

@@ -21,7 +21,8 @@ RATE = 500.0  # [1/s] of the controller and the plant
 _FREE_ERROR = 0.3  # [rad] tilt error that must not saturate rotors
 _LAG_COUNTED = 0.6  # [-] fraction of the rotors' lag that counts: the attitude loop's lead covers the rest
 
-KEPT = 0.04  # [s] for which commanded rates are kept without a newer command; then the attitude is held
+# [s] for which commanded rates are kept without a newer command; then the attitude is held
+COMMAND_HOLD_TIME = 0.04
 
 
 def autopilot_setup(start: Body, vehicle: Vehicle, environment: Environment) -> LoopSetup:

@@ -25,7 +25,7 @@ from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading, point_reference
 from aerobat.simulation.autopilot.loop import (
-    KEPT,
+    COMMAND_HOLD_TIME,
     RATE,
     autopilot_inputs,
     autopilot_setup,
@@ -40,9 +40,9 @@ HORIZON = 15.0  # [s] time limit of a recovery; a vehicle that does not hover by
 INSTANTS_RATE = 100.0  # [1/s] rate of instants, where the caller names none
 MOST_INSTANTS = 2000  # largest number of instants; on a longer path they lie further apart
 _CHUNK = 100  # ticks simulated at once, so that their references take little memory
-_HOVERING = 0.5  # [s] time for which all copies must hover before the simulation ends early
+_HOVER_DWELL = 0.5  # [s] time for which all copies must hover before the simulation ends early
 _FEW_SPANS = 3  # number of spans up to which a sentence names each
-_STILL = 0.2  # [m/s] largest speed of a hover
+_HOVER_SPEED = 0.2  # [m/s] largest speed of a hover
 _ALIGNED = 0.2  # [rad] largest angle of a hover between thrust axis and the thrust for rest
 
 
@@ -158,21 +158,21 @@ def recoveries(
         raise UndeterminedAttitude(
             "the path's attitude is undetermined where its thrust vanishes; plan another"
         )
-    flock = _Flock(required.setpoint, required.rotor_thrusts, vehicle, environment)
-    flock.keep(required.setpoint, reaction)
+    batch = _RecoveryBatch(required.setpoint, required.rotor_thrusts, vehicle, environment)
+    batch.keep(required.setpoint, reaction)
     ground = environment.ground if ground is None else ground
-    flock.brake(-inf if ground is None else ground + MIN_FLOOR)
+    batch.brake(-inf if ground is None else ground + MIN_FLOOR)
     return Recoveries(
         times=instants,
         heights=frozen(required.setpoint.flat.position[:, 2], "heights"),
-        lowest=flock.lowest,
-        durations=flock.durations,
+        lowest=batch.lowest,
+        durations=batch.durations,
         reaction=reaction,
         ground=ground,
     )
 
 
-class _Flock:
+class _RecoveryBatch:
     """Copies of a vehicle, one at each instant, that are simulated together."""
 
     def __init__(
@@ -205,14 +205,14 @@ class _Flock:
         """Brake to a hover at or above a floor [m]; the duration is infinite where a copy never hovers."""
         body, gravity = self._carry[2].body, self._environment.gravity
         velocity = from_components(body.velocity)
-        way = Braking.of(from_components(body.position), velocity, self._vehicle, gravity, floor)
+        braking = Braking.of(from_components(body.position), velocity, self._vehicle, gravity, floor)
         since = np.arange(round(HORIZON * RATE)) / RATE
         yaw = nearest_heading(from_components(body.q_world_body))
         begun = self._time
         for begin in range(0, len(since), _CHUNK):
-            parts = way.at(since[begin : begin + _CHUNK])
+            parts = braking.at(since[begin : begin + _CHUNK])
             self._fly(point_reference(*parts, yaw, gravity), False)
-            if self._time > max(begun + way.durations.max(), self.durations.max()) + _HOVERING:
+            if self._time > max(begun + braking.durations.max(), self.durations.max()) + _HOVER_DWELL:
                 break
         self.durations[self.durations >= self._time - _CHUNK / RATE] = inf
         self.lowest.flags.writeable = self.durations.flags.writeable = False
@@ -221,7 +221,7 @@ class _Flock:
         self._carry, body = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude))
         self.lowest = np.fmin(self.lowest, np.fmin.reduce(body.position[2], axis=1))  # NaN: no longer finite
         speed = np.linalg.norm(from_components(body.velocity), axis=-1)
-        moving = ~((speed <= _STILL) & self._holds(from_components(body.q_world_body)))
+        moving = ~((speed <= _HOVER_SPEED) & self._holds(from_components(body.q_world_body)))
         ticks = moving.shape[1]
         latest = ticks - np.argmax(moving[:, ::-1], axis=1)
         self.durations = np.where(moving.any(axis=1), self._time + latest / RATE, self.durations)
@@ -230,9 +230,9 @@ class _Flock:
     def _holds(self, q_world_body: Array) -> NDArray[np.bool_]:
         """True for attitudes (..., 4) whose thrust axis is aligned with weight and drag at rest in wind."""
         carried = self._vehicle.drag_body * so3.unrotate(q_world_body, self._environment.wind)
-        needed = self._vehicle.mass * self._environment.weight - so3.rotate(q_world_body, carried)
-        along = np.sum(so3.thrust_axis(q_world_body) * needed, axis=-1)
-        return np.asarray(along >= np.cos(_ALIGNED) * np.linalg.norm(needed, axis=-1))
+        rest_thrust = self._vehicle.mass * self._environment.weight - so3.rotate(q_world_body, carried)
+        along = np.sum(so3.thrust_axis(q_world_body) * rest_thrust, axis=-1)
+        return np.asarray(along >= np.cos(_ALIGNED) * np.linalg.norm(rest_thrust, axis=-1))
 
 
 def _body(signals: Signals) -> Body:
@@ -243,7 +243,7 @@ def _body(signals: Signals) -> Body:
 
 def _kept(setpoint: Setpoint, since: Array, vehicle: Vehicle) -> ReferencePoint:
     """Return references that keep the commands of instants for times since [s] (T,), leaves (T, instants)."""
-    age = np.minimum(since, KEPT)[:, None, None]
+    age = np.minimum(since, COMMAND_HOLD_TIME)[:, None, None]
     omega_body = np.broadcast_to(setpoint.omega_body, (len(since), *setpoint.omega_body.shape))
     q = so3.multiply(setpoint.q_world_body, so3.exp(age * omega_body))
     thrust = (setpoint.wrench.thrust / vehicle.mass)[:, None] * so3.thrust_axis(q)

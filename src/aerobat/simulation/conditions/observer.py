@@ -61,13 +61,13 @@ class DisturbanceObserver(Component):
             mass_properties, model.environment, observer.body, load.thrust
         )
         bias = observer.own.filter.nominal.accelerometer_bias
-        felt = subtract(signals.of(ImuState).sample.specific_force, bias)
+        measured = subtract(signals.of(ImuState).sample.specific_force, bias)
         omega = observer.body.omega_body
         turned = scale(1.0 / elapsed, subtract(omega, state.omega_body))
         fraction = elapsed / (parameters.time_constant + elapsed)
         angular = subtract(subtract(turned, nominal.omega_body), state.angular_acceleration)
         return Disturbance(
-            low_passed(state.force, subtract(felt, specific_force), parameters.time_constant, elapsed),
+            low_passed(state.force, subtract(measured, specific_force), parameters.time_constant, elapsed),
             add_scaled(state.angular_acceleration, state.has_omega * fraction, angular),
             omega,
             1.0,

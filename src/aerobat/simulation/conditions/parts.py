@@ -23,16 +23,16 @@ from aerobat.environment import (
 from aerobat.errors import SpecError
 from aerobat.kernels.battery import BatteryParameters
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample
-from aerobat.kernels.mocap import MocapParameters, Seam
+from aerobat.kernels.mocap import HandOffParameters, MocapParameters
 from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.wind import GustFilter, GustState, WindParameters
 from aerobat.problem import Gate
 from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.sensors import (
     BatterySag,
-    FeltParameters,
     ImuBias,
     ImuSensor,
+    ImuSensorParameters,
     MotionCaptureSensor,
     Wind,
     imu_source,
@@ -44,11 +44,11 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
-SLOW = 100.0  # [1/s] rate of slow components: sensor biases, battery charge, and wind without fast gusts
-GUSTY = 20.0  # [-] steps of the wind in one time constant of its gusts
+SLOW_RATE = 100.0  # [1/s] rate of slow components: sensor biases, battery charge, and wind without fast gusts
+GUST_STEPS = 20.0  # [-] steps of the wind in one time constant of its gusts
 MAX_QUEUE = 8  # largest number of poses in transit at once
-WHOLE = 1e-6  # [-] relative tolerance of whole numbers of ticks
-_MOVING = 1e-3  # [m/s] a slower path has no direction
+TICK_TOLERANCE = 1e-6  # [-] relative tolerance of whole numbers of ticks
+_MIN_SPEED = 1e-3  # [m/s] a slower path has no direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +73,9 @@ class DispersedFlights:
         """The effectiveness of the rotors [-], (vehicles, n)."""
         return self.draws.columns["effectiveness"]
 
-    def slow_period(self, rate: float = SLOW) -> int:
+    def slow_period(self, rate: float = SLOW_RATE) -> int:
         """Return the ticks per step of a component that steps at `rate` [1/s], or somewhat faster."""
-        return max(1, int(self.rate / rate + WHOLE))
+        return max(1, int(self.rate / rate + TICK_TOLERANCE))
 
 
 def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[LoopPart, ...]:
@@ -98,7 +98,7 @@ def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[
 def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
     """Return the part for mean wind and gusts."""
     time_constant = gusts.length / gusts.airspeed
-    period = flights.slow_period(max(SLOW, GUSTY / time_constant))
+    period = flights.slow_period(max(SLOW_RATE, GUST_STEPS / time_constant))
     mean = flights.environment.wind + flights.draws.columns["mean_wind"]
     speed = np.hypot(mean[:, 0], mean[:, 1])
     heading = flights.draws.columns["gust_heading"]
@@ -157,7 +157,7 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
     )
     period = whole_ticks(flights.rate, imu.rate, "imu.rate")
     noise = np.sqrt(imu.rate)
-    felt = FeltParameters(
+    parameters = ImuSensorParameters(
         airframe_parameters(flights.fleet, flights.effectiveness),
         environment_parameters(flights.environment, len(flights.draws)),
         ImuParameters(
@@ -166,7 +166,7 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
     )
     return (
         LoopPart(ImuBias(), biases, imu_source(flights.draws, "imu_bias", slow, block=32), slow),
-        LoopPart(ImuSensor(), felt, imu_source(flights.draws, "imu", period), period),
+        LoopPart(ImuSensor(), parameters, imu_source(flights.draws, "imu", period), period),
     )
 
 
@@ -189,18 +189,18 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
         outlier=capture.outlier,
         outlier_size=capture.outlier_size,
         outage=(begin, end),
-        seam=_seam(capture.hand_off, flights),
+        hand_off=_hand_off_parameters(capture.hand_off, flights),
         first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
     )
     source = mocap_source(flights.draws, period, flights.rate)
     return LoopPart(MotionCaptureSensor(period, latency), parameters, source, period)
 
 
-def _seam(hand_off: HandOff | None, flights: DispersedFlights) -> Seam:
+def _hand_off_parameters(hand_off: HandOff | None, flights: DispersedFlights) -> HandOffParameters:
     """Return the plane of hand-off; without a hand-off, an arbitrary plane without misfit."""
     point, normal = hand_off_plane(hand_off or HandOff(), flights.trajectory, flights.gates)
     rotation = so3.exp(flights.draws.columns["hand_off_rotation"])
-    return Seam(
+    return HandOffParameters(
         components(point),
         components(normal),
         Pose(flights.each("hand_off_translation"), components(rotation)),
@@ -218,7 +218,7 @@ def hand_off_plane(hand_off: HandOff, path: Trajectory, gates: Sequence[Gate]) -
     point = gates[0].position if gates else path.evaluate(half, 0)
     velocity = path.evaluate(half, 1)
     speed = float(np.linalg.norm(velocity))
-    ahead = velocity / speed if speed > _MOVING else np.array([1.0, 0.0, 0.0])
+    ahead = velocity / speed if speed > _MIN_SPEED else np.array([1.0, 0.0, 0.0])
     normal = gates[0].normal if gates else ahead
     return (
         point if hand_off.point is None else hand_off.point,
@@ -229,7 +229,7 @@ def hand_off_plane(hand_off: HandOff, path: Trajectory, gates: Sequence[Gate]) -
 def whole_ticks(rate: float, sensor_rate: float, field: str) -> int:
     """Return a sensor's period in ticks at `rate` [1/s]. Raises SpecError, naming `field`, for fractions."""
     ticks = rate / sensor_rate
-    if ticks < 1.0 - WHOLE or abs(ticks - round(ticks)) > WHOLE * ticks:
+    if ticks < 1.0 - TICK_TOLERANCE or abs(ticks - round(ticks)) > TICK_TOLERANCE * ticks:
         raise SpecError(
             f"{field} must be the simulation's rate ({rate:g} 1/s) over a whole number, got {sensor_rate:g}"
         )

@@ -86,7 +86,7 @@ class ImuBias(Component):
         return imu.walk(parameters, bias, noise)
 
 
-class FeltParameters(NamedTuple):
+class ImuSensorParameters(NamedTuple):
     """An IMU, and the airframe and environment that determine what the IMU measures."""
 
     airframe: Airframe
@@ -98,20 +98,20 @@ class FeltParameters(NamedTuple):
 class ImuSensor(Component):
     """An IMU at the centre of mass, with the biases of `ImuBias`; its sample ends at the tick of its step."""
 
-    def init(self, ops: Ops, parameters: FeltParameters, noise: ImuSample, signals: Signals) -> ImuState:
+    def init(self, ops: Ops, parameters: ImuSensorParameters, noise: ImuSample, signals: Signals) -> ImuState:
         """See `Component.init`."""
         return imu.init()
 
     def step(
-        self, ops: Ops, parameters: FeltParameters, state: ImuState, noise: ImuSample, signals: Signals
+        self, ops: Ops, parameters: ImuSensorParameters, state: ImuState, noise: ImuSample, signals: Signals
     ) -> ImuState:
         """See `Component.step`."""
         body, thrusts = signals.plant
         thrust = motors.collective_thrust(parameters.airframe.rotors, thrusts)
         environment = with_wind(parameters.environment, signals)
         force = rigid_body.specific_force(parameters.airframe.mass_properties, environment, body, thrust)
-        felt = ImuSample(body.omega_body, force)
-        return imu.step(ops, parameters.errors, state, felt, signals.of(ImuSample), noise)
+        true_sample = ImuSample(body.omega_body, force)
+        return imu.step(ops, parameters.errors, state, true_sample, signals.of(ImuSample), noise)
 
 
 def imu_source(draws: Draws, stream: str, period: int, block: int = 256) -> Source:

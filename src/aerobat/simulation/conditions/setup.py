@@ -19,7 +19,7 @@ from aerobat.simulation.conditions.observer import (
     ObserverParameters,
     observer_source,
 )
-from aerobat.simulation.conditions.parts import WHOLE, DispersedFlights, condition_parts, whole_ticks
+from aerobat.simulation.conditions.parts import TICK_TOLERANCE, DispersedFlights, condition_parts, whole_ticks
 from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.law_controller import flown_by, inner_loop
@@ -32,8 +32,8 @@ from aerobat.vehicle.controller import Controller
 from aerobat.vehicle.fleet import Fleet
 
 MAX_TICKS = 20  # largest number of ticks in a period of the controller, where no IMU sets the rate
-_LEAST_START_VELOCITY = 0.01  # [m/s] smallest initial standard deviation of velocity in the filter
-_SLOWEST_ANSWERED = 0.05  # [s] largest rotor lag with a disturbance observer: slower rotors answer too late
+_MIN_START_VELOCITY = 0.01  # [m/s] smallest initial standard deviation of velocity in the filter
+_MAX_OBSERVER_LAG = 0.05  # [s] largest rotor lag with a disturbance observer: slower rotors answer too late
 
 
 def dispersed_setup(
@@ -95,7 +95,7 @@ def _tick_rate(conditions: Dispersion, control_rate: float) -> float:
     delay, imu = conditions.computation_delay, conditions.imu
     rates = [control_rate * k for k in range(1, MAX_TICKS + 1)] if imu is None else [imu.rate]
     for rate in rates:
-        if abs(delay * rate - round(delay * rate)) < WHOLE:
+        if abs(delay * rate - round(delay * rate)) < TICK_TOLERANCE:
             return rate
     tick = 1.0 / rates[-1]
     lasting = f"which last {tick:g} s or longer" if imu is None else f"which last {tick:g} s by imu.rate"
@@ -110,7 +110,7 @@ def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequ
     if imu is None or capture is None:
         return LoopPart(StateObserver())
     sensor = next(p.component for p in disturbed if isinstance(p.component, MotionCaptureSensor))
-    settings = Ekf.of_sensors(imu, capture, max(conditions.start_velocity, _LEAST_START_VELOCITY))
+    settings = Ekf.of_sensors(imu, capture, max(conditions.start_velocity, _MIN_START_VELOCITY))
     parameters = ekf_parameters(settings, flights.environment.gravity, len(flights.draws))
     return LoopPart(
         EkfObserver(sensor.period, sensor.latency),
@@ -141,7 +141,7 @@ def _controller(
         )
     observer: tuple[LoopPart, ...] = ()
     slowest = max(rotor.lag for rotor in nominal.rotors)
-    if settings.disturbance_filter > 0.0 and conditions.imu is not None and slowest <= _SLOWEST_ANSWERED:
+    if settings.disturbance_filter > 0.0 and conditions.imu is not None and slowest <= _MAX_OBSERVER_LAG:
         # a filter faster than the rotors takes errors of their modelled lag for disturbances: unstable
         times = max(settings.disturbance_filter, slowest), delay / rate
         observer = (LoopPart(DisturbanceObserver(), DisturbanceParameters(model, *times), period=period),)

@@ -23,10 +23,10 @@ from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.simulation.passages.passage import PerFlight
 from aerobat.vehicle import Ellipsoid
 
-STRETCH = 32  # rows that share a bounding box
-AS_NEAR = 1e-5  # [m] tolerance by which the reported clearance may exceed the true minimum
-AT_ONCE = 2**18  # stretches times pieces that are compared at once, which takes 20 MB
-NEVER = np.iinfo(np.intp).max  # row number that stands for no contact
+ROWS_PER_BOX = 32  # rows that share a bounding box
+CLEARANCE_TOLERANCE = 1e-5  # [m] tolerance by which the reported clearance may exceed the true minimum
+MAX_PAIRS = 2**18  # stretches times pieces that are compared at once, which takes 20 MB
+NO_CONTACT_ROW = np.iinfo(np.intp).max  # row number that stands for no contact
 
 
 @by_value
@@ -64,8 +64,8 @@ def nearest_obstacles(pieces: Pieces, flown: FlownBodies) -> NearestObstacle:
         flown: The flights.
     """
     count = len(flown.rows)
-    stretches = -(-len(flown.times) // STRETCH)
-    size = max(1, AT_ONCE // (stretches * len(pieces)))
+    stretches = -(-len(flown.times) // ROWS_PER_BOX)
+    size = max(1, MAX_PAIRS // (stretches * len(pieces)))
     found = [_NearestSearch(pieces, flown, slice(k, k + size)).found() for k in range(0, count, size)]
     piece, clearance, row = (np.concatenate(part) for part in zip(*found, strict=True))
     names = np.array([*(each.name for each in pieces.pieces), ""])  # the last name: none is known
@@ -122,15 +122,15 @@ class _NearestSearch:
         self._piece = np.full(len(last), -1)
         self._clearance = np.full(len(last), inf)
         self._row = np.zeros(len(last), dtype=np.intp)
-        self._touched = np.full(len(last), NEVER)  # first row known to touch an obstacle
+        self._touched = np.full(len(last), NO_CONTACT_ROW)  # first row known to touch an obstacle
 
     def found(self) -> tuple[Indices, Array, Indices]:
         """Return each flight's nearest piece (−1: unknown), its clearance [m] and row, (flights,)."""
         apart = self._apart
         self._look_at(*self._likeliest(apart))
         encounters = _Encounters(*np.nonzero(apart < np.maximum(self._clearance, 0.0)[:, None, None]))
-        encounters = encounters._replace(first=encounters.first * STRETCH)
-        middle = np.full(len(encounters.flight), STRETCH // 2)
+        encounters = encounters._replace(first=encounters.first * ROWS_PER_BOX)
+        middle = np.full(len(encounters.flight), ROWS_PER_BOX // 2)
         bounds, _ = self._separated(encounters, middle, exact_within=-inf)
         rows, ticks = self._best_of_flights(encounters, bounds, *self._nearer(encounters, bounds))
         while len(rows):
@@ -142,16 +142,16 @@ class _NearestSearch:
     def _apart(self) -> Array:
         """Lower bounds by boxes of the distance of bodies from pieces [m] over stretches, (flights, S, P)."""
         flights, rows, _ = self._position.shape
-        padded = np.empty((3, flights, -(-rows // STRETCH) * STRETCH))
+        padded = np.empty((3, flights, -(-rows // ROWS_PER_BOX) * ROWS_PER_BOX))
         padded[..., :rows] = np.moveaxis(self._position, -1, 0)
         for flight in np.flatnonzero(self._last < padded.shape[-1] - 1).tolist():
             last = self._last[flight]
             padded[:, flight, last + 1 :] = padded[:, flight, last, None]
-        stretches = padded.reshape(3, flights, -1, STRETCH)
+        stretches = padded.reshape(3, flights, -1, ROWS_PER_BOX)
         lower, upper = (np.moveaxis(x, 0, -1) for x in (stretches.min(axis=-1), stretches.max(axis=-1)))
         reach = np.linalg.norm(self._centre, axis=-1) + self._semi_axes.max(axis=-1)
-        begin = self._times[::STRETCH]
-        end = self._times[np.minimum(np.arange(1, len(begin) + 1) * STRETCH, len(self._times)) - 1]
+        begin = self._times[::ROWS_PER_BOX]
+        end = self._times[np.minimum(np.arange(1, len(begin) + 1) * ROWS_PER_BOX, len(self._times)) - 1]
         over = np.broadcast_to(begin, lower.shape[:-1]), np.broadcast_to(end, lower.shape[:-1])
         apart = self._pieces.apart(lower, upper, over)
         return np.asarray(apart - reach[:, None, None])
@@ -161,8 +161,8 @@ class _NearestSearch:
         flights, _, pieces = apart.shape
         best = np.argmin(apart.reshape(flights, -1), axis=1)
         known = np.flatnonzero(np.isfinite(apart).all(axis=(1, 2)))
-        encounters = _Encounters(known, best[known] // pieces * STRETCH, best[known] % pieces)
-        return encounters, np.full(len(known), STRETCH // 2)
+        encounters = _Encounters(known, best[known] // pieces * ROWS_PER_BOX, best[known] % pieces)
+        return encounters, np.full(len(known), ROWS_PER_BOX // 2)
 
     def _nearer(self, encounters: _Encounters, bounds: Array) -> tuple[Indices, Indices]:
         """Return the pairs that may be nearer than the best known clearance, and which row of each to check.
@@ -170,10 +170,12 @@ class _NearestSearch:
         Of flights that are known to touch, this is the first earlier row whose bound allows a contact.
         """
         touched = self._touched[encounters.flight]
-        before = encounters.first[:, None] + np.arange(STRETCH) < touched[:, None]
-        least = np.where(touched == NEVER, self._clearance[encounters.flight] - AS_NEAR, 0.0)
+        before = encounters.first[:, None] + np.arange(ROWS_PER_BOX) < touched[:, None]
+        least = np.where(
+            touched == NO_CONTACT_ROW, self._clearance[encounters.flight] - CLEARANCE_TOLERANCE, 0.0
+        )
         may = before & (bounds < least[:, None])
-        ticks = np.where(touched == NEVER, np.argmin(bounds, axis=1), np.argmax(may, axis=1))
+        ticks = np.where(touched == NO_CONTACT_ROW, np.argmin(bounds, axis=1), np.argmax(may, axis=1))
         rows = np.flatnonzero(may.any(axis=1))
         return rows, ticks[rows]
 
@@ -188,7 +190,7 @@ class _NearestSearch:
         return rows[best], ticks[best]
 
     def _look_at(self, encounters: _Encounters, ticks: Indices) -> Array:
-        """Check one row of each pair exactly, note it, and return lower bounds for all rows, (m, STRETCH)."""
+        """Check and note one row of each pair exactly; return lower bounds for all rows, (m, ROWS_PER_BOX)."""
         bounds, gaps = self._separated(encounters, ticks)
         rows = encounters.first + ticks
         bounds[np.arange(len(ticks)), ticks] = np.maximum(bounds[np.arange(len(ticks)), ticks], gaps)
@@ -198,7 +200,7 @@ class _NearestSearch:
         order = np.lexsort((gaps, rows))[::-1]  # the last assignment wins: a flight's earliest row
         self._note(encounters, rows, gaps, order[hit[order]])
         np.minimum.at(self._touched, encounters.flight[hit], rows[hit])
-        nearer = (self._touched[encounters.flight] == NEVER) & lower
+        nearer = (self._touched[encounters.flight] == NO_CONTACT_ROW) & lower
         order = np.argsort(-gaps, kind="stable")
         self._note(encounters, rows, gaps, order[nearer[order]])
         return bounds
@@ -212,7 +214,7 @@ class _NearestSearch:
     def _separated(
         self, encounters: _Encounters, ticks: Indices, exact_within: float = inf
     ) -> tuple[Array, Array]:
-        """Return bounds for all rows by planes that separate at one, (m, STRETCH), and its gaps, (m,)."""
+        """Return bounds for all rows, (m, ROWS_PER_BOX), by planes that separate at one, and its gaps."""
         flight, first, piece = encounters
         semi_axes, centre, last = self._semi_axes[flight], self._centre[flight], self._last[flight]
         row = np.minimum(first + ticks, last)
@@ -220,7 +222,7 @@ class _NearestSearch:
         shapes = so3.axes(q) * semi_axes[:, None]
         centres = self._position[flight, row] + so3.rotate(q, centre)
         found = self._pieces.separated(piece, centres, shapes, exact_within, self._times[row])
-        rows = np.minimum(first[:, None] + np.arange(STRETCH), last[:, None])
+        rows = np.minimum(first[:, None] + np.arange(ROWS_PER_BOX), last[:, None])
         position = self._position[flight[:, None], rows] - self._pieces.moved(piece, self._times[rows])
         normals = so3.unrotate(self._attitude[flight[:, None], rows], found.normals[:, None])
         reach = np.linalg.norm(normals * semi_axes[:, None], axis=-1)

@@ -15,7 +15,7 @@ from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, PerFlight
 
 # [m] excess over the radius that is no miss: time-optimal paths touch the ball, and flights deviate slightly
-GRAZING = 1e-3
+MISS_TOLERANCE = 1e-3
 
 
 @by_value
@@ -36,7 +36,7 @@ class WaypointPassage(PerFlight):
     @property
     def failure(self) -> FlightFailure | None:
         """The failure of one flight at this waypoint; None where nothing is wrong or known."""
-        if np.isnan(self.planned) or self.miss <= self.radius + GRAZING:
+        if np.isnan(self.planned) or self.miss <= self.radius + MISS_TOLERANCE:
             return None
         numbers = {"waypoint": self.waypoint, "miss": self.miss, "radius": self.radius}
         return FlightFailure(self.time, Outcome.MISSED_WAYPOINT, numbers)

@@ -85,7 +85,7 @@ class MujocoRun:
         data.act[:] = np.array(motion.thrusts)[self._lagging]
         self._last_velocity = np.array(body.velocity)  # [m/s] velocity at the previous step
         self._mujoco.mj_forward(self._model, data)
-        self._feel()
+        self._detect_contact()
 
     @property
     def motion(self) -> VehicleState:
@@ -117,14 +117,14 @@ class MujocoRun:
             self._last_velocity = now
             self._mujoco.mj_step(self._model, self._data)
             self._move_obstacles()
-            self._feel()
+            self._detect_contact()
 
     def _move_obstacles(self) -> None:
         """Move the mocap bodies, which are moving obstacles and gates, to their present places."""
         for place, motion in zip(self._data.mocap_pos, self._motions, strict=True):
             place[:] = motion.moved(np.array(self._data.time))
 
-    def _feel(self) -> None:
+    def _detect_contact(self) -> None:
         touched = self._data.contact.geom[: self._data.ncon].ravel().tolist()
         self._contact = max((self._contact, *(self._kinds[geom] for geom in touched)))
 

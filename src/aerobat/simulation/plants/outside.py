@@ -211,7 +211,9 @@ class _Firmware:
         if autopilot is None:
             return row.log, actuation
         inputs: FirmwareInputs = first_numbers(row.firmware)
-        sensed = Sensed(inputs.gyro, inputs.specific_force or self._felt(motion), motion.body.q_world_body)
+        sensed = Sensed(
+            inputs.gyro, inputs.specific_force or self._specific_force(motion), motion.body.q_world_body
+        )
         if self._run is None:
             rates = self._setup.reference.max_rate
             self._run = autopilot.begin(self._setup.reference.vehicle, inputs.setpoint, rates)
@@ -222,7 +224,7 @@ class _Firmware:
         logged = Commands(tuple(np.array([each]) for each in commands), np.array([saturated]))
         return row.log._replace(commands=logged), actuation._replace(commands=commands)
 
-    def _felt(self, motion: VehicleState) -> Vector:
+    def _specific_force(self, motion: VehicleState) -> Vector:
         """Return the specific force in calm air, used where no IMU measures it."""
         properties, rotors = self._scene.airframe
         thrust = motors.collective_thrust(rotors, motion.thrusts)
@@ -236,9 +238,9 @@ def _outside_row(signals: Signals) -> OutsideRow:
 
 def _firmware_row(signals: Signals) -> OutsideRow:
     imu = signals.find(ImuState)
-    felt = () if imu is None else imu.sample.specific_force
+    specific_force = () if imu is None else imu.sample.specific_force
     return _outside_row(signals)._replace(
-        firmware=FirmwareInputs(gyro(signals), felt, setpoint_in_effect(signals))
+        firmware=FirmwareInputs(gyro(signals), specific_force, setpoint_in_effect(signals))
     )
 
 
