@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.studies.passing import Passing, Round, tightening
-from aerobat.studies.passing.causes import standing_in_the_way
+from aerobat.studies.passing.causes import main_failure_cause
 from aerobat.studies.passing.spread import with_more_thrust
 from aerobat.studies.passing.tightening import Tightening
 from aerobat.studies.share import Share
@@ -68,7 +68,7 @@ def test_a_probability_that_is_met_already_costs_nothing():
 def test_the_least_reserve_is_found_wherever_plans_end(need: int, room: int):
     """Without a plan above some reserve, a smaller one that is enough is found all the same."""
     search = object.__new__(Tightening)
-    search.task = SimpleNamespace(is_likely_enough=lambda share: share)
+    search.task = SimpleNamespace(is_likely_proof=lambda share: share)
     most = need + room
     search._round = lambda steps: None if steps > most else SimpleNamespace(share=steps >= need)
     steps, done = search._smallest()
@@ -100,8 +100,8 @@ def test_a_plain_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened():
     tightening = object.__new__(Tightening)
     tightening.task = SimpleNamespace(
         problem="as it is",
-        is_likely_enough=lambda share: True,
-        is_enough=lambda share: share,
+        is_likely_proof=lambda share: True,
+        is_proof=lambda share: share,
         share=lambda plan, fresh: plan == "tightened",
     )
     tightening.training, tightening.proving = range(4), 10
@@ -200,7 +200,7 @@ def test_without_any_one_cause_conditions_can_still_be_flown_in(name: str) -> No
         tried.append(conditions)
         return Share(0, 1)
 
-    standing_in_the_way(ab.load_dispersion(name), 0.95, share)
+    main_failure_cause(ab.load_dispersion(name), 0.95, share)
     plan = ab.plan("line", ab.MinSnap(), "agile-quad")
     for conditions in tried:
         ab.prepare(plan, conditions=conditions)

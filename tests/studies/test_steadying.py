@@ -9,7 +9,7 @@ import pytest
 import aerobat as ab
 from aerobat.planning.result import FLYING_RESERVE
 from aerobat.studies.passing import steadied
-from aerobat.studies.passing.steadying import CHOOSING, LATE, LONGEST
+from aerobat.studies.passing.steadying import MAX_DURATION_RATIO, MAX_LAG_ANGLE, SELECTION_FLIGHTS
 from aerobat.vehicle import load_vehicle
 
 PLANNER = ab.Miqp(reserve=FLYING_RESERVE)
@@ -22,14 +22,14 @@ def succeeded(plan: ab.Plan) -> int:
 
 @pytest.mark.slow
 def test_a_steadied_plan_is_as_fast_turns_slower_and_more_other_flights_succeed():
-    assert not set(FRESH) & set(CHOOSING)
+    assert not set(FRESH) & set(SELECTION_FLIGHTS)
     first = ab.plan("flip-pitch", PLANNER, "agilicious")
     found = steadied(first, PLANNER, ab.load_dispersion("lab"))
     assert found.certified
     assert found.flies
     assert found.keeps(FLYING_RESERVE)
     assert (found.problem, found.vehicle) == (first.problem, first.vehicle)
-    assert found.duration <= LONGEST * first.duration
+    assert found.duration <= MAX_DURATION_RATIO * first.duration
     assert found.assessment.max_body_rate < 0.85 * first.assessment.max_body_rate
     assert succeeded(found) > succeeded(first) + 10
     assert "instead of" in found.rescue
@@ -42,6 +42,8 @@ def test_plans_stay_where_the_lag_turns_little_or_no_reserve_is_asked():
     assert steadied(calm, PLANNER, lab) is calm  # no gate is passed
     fast = ab.plan("half-flip", PLANNER, "crazyflie")
     assert steadied(fast, ab.Miqp(), lab) is fast
-    slow = replace(load_vehicle("crazyflie"), max_body_rate=0.9 * LATE / load_vehicle("crazyflie").lags.max())
+    slow = replace(
+        load_vehicle("crazyflie"), max_body_rate=0.9 * MAX_LAG_ANGLE / load_vehicle("crazyflie").lags.max()
+    )
     flip = ab.plan("half-flip", PLANNER, slow)
     assert steadied(flip, PLANNER, lab) is flip

@@ -229,7 +229,7 @@ def test_a_worker_of_other_versions_refuses_to_work(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.process
 def test_a_scheduler_that_is_not_there_is_said_not_to_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("aerobat.studies.workers._CONNECTING", 0.2)
+    monkeypatch.setattr("aerobat.studies.workers._CONNECT_TIMEOUT", 0.2)
     with pytest.raises(ab.SpecError, match=r"no scheduler answers at dask://127\.0\.0\.1:9; start one"):
         ab.sweep(hop(), SPREAD, 1, workers="dask://127.0.0.1:9")
 

@@ -33,21 +33,21 @@ class KeptParts:
 
     @classmethod
     def of(
-        cls, folder: PathName | None, what: tuple[str, str], asked: Callable[[], Mapping[str, Any]]
+        cls, folder: PathName | None, what: tuple[str, str], inputs_summary: Callable[[], Mapping[str, Any]]
     ) -> KeptParts:
         """Return the folder, which is new or belongs to the same study.
 
         Args:
             folder: Where parts are kept; None to keep none.
             what: The names of the parts and of the study, for messages.
-            asked: Returns a summary of everything that the parts' numbers depend on.
+            inputs_summary: Returns a summary of everything that the parts' numbers depend on.
 
         Raises SpecError, one sentence, for a folder of any other study.
         """
         if folder is None:
             return cls(None)
         folder, (parts, study) = Path(folder), what
-        own = {"format": f"aerobat-{study}-1", **asked(), "versions": installed_versions(LIBRARIES)}
+        own = {"format": f"aerobat-{study}-1", **inputs_summary(), "versions": installed_versions(LIBRARIES)}
         path = folder / FINGERPRINT
         try:
             is_new = not folder.exists() or not any(folder.iterdir())

@@ -39,9 +39,9 @@ MAX_DEATHS = 3  # consecutive deaths of workers, without a finished part, that e
 LIBRARIES = ("aerobat", "numpy", "scipy", "llvmlite", "jax")  # whose versions change numbers
 _QUEUED = 2  # groups of parts per worker: the one in progress and the next
 _QUEUED_ELSEWHERE = 256  # groups, for an executor that does not report its number of workers
-_SHARES = 4  # least number of groups per worker, so that all workers end at about the same time
+_GROUPS_PER_WORKER = 4  # least number of groups per worker, so that all workers end at about the same time
 _WORKERS_ELSEWHERE = 16  # assumed number of workers of an executor that does not report it
-_CONNECTING = 10.0  # [s] time within which a scheduler must answer
+_CONNECT_TIMEOUT = 10.0  # [s] time within which a scheduler must answer
 _MALLOC_THRESHOLDS = (-1, -3)  # glibc's M_TRIM_THRESHOLD and M_MMAP_THRESHOLD
 _KEPT_MEMORY = 32 * 2**20  # [bytes] the largest that glibc takes for both
 _DASK = re.compile(r"dask://([^\s/:]+|\[[0-9a-fA-F:]+\]):(\d{1,5})")
@@ -109,7 +109,7 @@ class Pool:
             part = waiting.popleft()
             yield part, function(task, part)
             compiles = False
-        size = min(max(len(waiting) // (_SHARES * self._count), 1), together)
+        size = min(max(len(waiting) // (_GROUPS_PER_WORKER * self._count), 1), together)
         shared = _Shared(task)
         deaths = 0
         while waiting:
@@ -207,7 +207,9 @@ def _dask_pool(address: str) -> Iterator[Pool]:
     """Give the workers of a scheduler."""
     dask = import_extra("distributed", f"workers {address} need dask.distributed", "aerobat[cluster]")
     try:
-        client = dask.Client(address.replace("dask://", "tcp://"), timeout=_CONNECTING, set_as_default=False)
+        client = dask.Client(
+            address.replace("dask://", "tcp://"), timeout=_CONNECT_TIMEOUT, set_as_default=False
+        )
     except OSError:
         raise SpecError(
             f"workers: no scheduler answers at {address}; start one with `dask scheduler`, and workers with "

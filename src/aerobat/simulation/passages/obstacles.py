@@ -190,7 +190,7 @@ class _NearestSearch:
         return rows[best], ticks[best]
 
     def _look_at(self, encounters: _Encounters, ticks: Indices) -> Array:
-        """Check and note one row of each pair exactly; return lower bounds for all rows, (m, ROWS_PER_BOX)."""
+        """Check one row of each pair exactly; return lower bounds for all rows, (m, ROWS_PER_BOX)."""
         bounds, gaps = self._separated(encounters, ticks)
         rows = encounters.first + ticks
         bounds[np.arange(len(ticks)), ticks] = np.maximum(bounds[np.arange(len(ticks)), ticks], gaps)

@@ -18,7 +18,7 @@ from aerobat.planning import Planner
 from aerobat.studies.lens import lens
 
 OFFSET, TURN = 0.05, radians(2.0)  # [m], [rad] of the second camera system, as by an old calibration
-SLOWER = 1.5  # factor by which the loops of the detuned controller are slower than tuned
+DETUNING = 1.5  # factor by which the loops of the detuned controller are slower than tuned
 
 
 def _read_only(changes: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -95,11 +95,11 @@ def four_causes(conditions: Dispersion, controller: Controller) -> tuple[Cause, 
         Cause(
             "gains not tuned",
             {
-                "controller.position_gain": controller.position_gain / SLOWER**2,
-                "controller.velocity_gain": controller.velocity_gain / SLOWER,
-                "controller.integral_gain": controller.integral_gain / SLOWER**3,
-                "controller.attitude_frequency": controller.attitude_frequency / SLOWER,
-                "controller.attitude_integral_gain": controller.attitude_integral_gain / SLOWER**3,
+                "controller.position_gain": controller.position_gain / DETUNING**2,
+                "controller.velocity_gain": controller.velocity_gain / DETUNING,
+                "controller.integral_gain": controller.integral_gain / DETUNING**3,
+                "controller.attitude_frequency": controller.attitude_frequency / DETUNING,
+                "controller.attitude_integral_gain": controller.attitude_integral_gain / DETUNING**3,
             },
         ),
     )

@@ -237,7 +237,7 @@ def feasibility_map(
     fields = _fields(axes, scenario)
     task = ProbedTask(scenario, fields, time_limit, range(flights), seed)
     places = list(product(*(axis.values for axis in axes)))
-    kept = KeptParts.of(keep, ("cells", "map"), lambda: _asked(axes, task))
+    kept = KeptParts.of(keep, ("cells", "map"), lambda: _inputs_summary(axes, task))
     known = {place: Cell.of(place, kept.read(_name(place))) for place in places}
     cells = {place: cell for place, cell in known.items() if cell is not None}
     missing = [place for place in places if place not in cells]
@@ -261,7 +261,7 @@ def _name(values: tuple[float, ...]) -> str:
     return "-".join(["cell", *map(str, values)])
 
 
-def _asked(axes: Sequence[Axis], task: ProbedTask) -> dict[str, Any]:
+def _inputs_summary(axes: Sequence[Axis], task: ProbedTask) -> dict[str, Any]:
     """Return a summary of everything, beside their values, that the results of cells depend on."""
     parts = vars(task.scenario).items()  # the problem, the vehicle and so on
     return {

@@ -17,7 +17,7 @@ from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.problem.limits import UNITS
 from aerobat.studies.lens import Scenario
 
-AS_NEAR = 0.01  # of a limit's size, tolerance within which limits bind equally
+BINDING_TOLERANCE = 0.01  # of a limit's size, tolerance within which limits bind equally
 TIME_LIMIT = 30.0  # [s] default time limit of planning: most scenarios take 1 s
 
 
@@ -120,7 +120,7 @@ def binding_limits(plan: Plan) -> tuple[str, ...]:
             margin = finding.margin / _size(finding, plan)
             nearest[finding.field] = min(nearest.get(finding.field, inf), margin)
     least = min(nearest.values(), default=inf)
-    return tuple(sorted(name for name, margin in nearest.items() if margin <= least + AS_NEAR))
+    return tuple(sorted(name for name, margin in nearest.items() if margin <= least + BINDING_TOLERANCE))
 
 
 def least_reserve(plan: Plan) -> float | None:

@@ -23,7 +23,7 @@ class NeededQuantity(ABC):
     name: ClassVar[str]
     unit: ClassVar[str] = ""
     least_size: ClassVar[float] = 0.0  # above the floor; steps and tolerances treat smaller sizes as this
-    unasked: ClassVar[bool] = True  # whether it is searched by default
+    by_default: ClassVar[bool] = True  # whether it is searched by default
 
     @abstractmethod
     def own(self, scenario: Scenario) -> float:
@@ -105,7 +105,7 @@ class GateHeight(GateSize):
 
     name = "gate-height"
     unit = "of its height"
-    unasked = False
+    by_default = False
 
     def set(self, whole: Scenario, value: float) -> Scenario:
         """Return the scenario with heights of openings scaled by this fraction, circles as a whole."""
@@ -121,7 +121,7 @@ QUANTITIES: dict[str, NeededQuantity] = {
 def named_quantities(names: Sequence[str] | None, problem: Problem) -> tuple[NeededQuantity, ...]:
     """Return the quantities of these names, by default all of a problem. Raises SpecError for others."""
     if names is None:
-        usual = (each for each in QUANTITIES.values() if each.unasked)
+        usual = (each for each in QUANTITIES.values() if each.by_default)
         return tuple(each for each in usual if problem.gates or not isinstance(each, GateSize))
     for i, name in enumerate(names):
         if name not in QUANTITIES:

@@ -11,7 +11,7 @@ from aerobat.errors import SpecError
 from aerobat.simulation import Flight
 from aerobat.trajectory import Trajectory
 
-MISFIT = 0.01  # [m] RMS distance of set-points from the plan's path above which the plan is another one
+MAX_MISFIT = 0.01  # [m] RMS distance of set-points from the plan's path above which the plan is another one
 _ROWS = 60  # rows of the log that are compared in the search for the time shift
 _SHIFTS = 201  # time shifts of the initial grid
 
@@ -55,7 +55,7 @@ def aligned(flight: Flight, trajectory: Trajectory) -> Alignment:
         options={"xatol": 1e-7},
     )
     alignment = min(at(best), at(float(found.x)), key=lambda one: one.misfit)
-    if alignment.misfit > MISFIT:
+    if alignment.misfit > MAX_MISFIT:
         off = f"{100 * alignment.misfit:.1f} cm"
         raise SpecError(
             f"plan: its path lies {off} from the flight's set-points at best; give the flight's own plan"

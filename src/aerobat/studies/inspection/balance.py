@@ -13,8 +13,10 @@ from aerobat.simulation import Flight
 from aerobat.studies.inspection.result import Fault
 from aerobat.vehicle import Vehicle
 
-_OFF = 0.05  # of the longest arm, smallest offset that is a fault: four times that of uneven rotors
-_EXPLAINED = 0.5  # [-] least part of the unexplained roll and pitch moment (mean square) due to the offset
+_MIN_OFFSET = 0.05  # of the longest arm, smallest offset that is a fault: four times that of uneven rotors
+_MIN_EXPLAINED = (
+    0.5  # [-] least part of the unexplained roll and pitch moment (mean square) due to the offset
+)
 
 
 def balance_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
@@ -27,7 +29,7 @@ def balance_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
     place = missing @ collective / np.sum(collective**2)
     rest = np.sum((missing - place[:, None] * collective) ** 2)
     arm = max(np.hypot(*rotor.position_body[:2]) for rotor in vehicle.rotors)
-    if np.hypot(*place) < _OFF * arm or rest > (1.0 - _EXPLAINED) * np.sum(missing**2):
+    if np.hypot(*place) < _MIN_OFFSET * arm or rest > (1.0 - _MIN_EXPLAINED) * np.sum(missing**2):
         return None
     ahead, left = (1e3 * each for each in place)
     return Fault("balance", f"the centre of mass is off by {ahead:.1f} mm in x and {left:.1f} mm in y")

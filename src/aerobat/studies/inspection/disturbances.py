@@ -63,8 +63,8 @@ class ShortfallCause(IntEnum):
     """The reason for an acceleration that was commanded but not delivered between two rows."""
 
     UNSATURATED = 0
-    ASKED_BY_PLAN = 1  # saturation, since the set-points themselves exceed the rotors' limits
-    LED_TO = 2  # saturation by feedback to an earlier error, with feasible set-points
+    BY_PLAN = 1  # saturation, since the set-points themselves exceed the rotors' limits
+    BY_FEEDBACK = 2  # saturation by feedback to an earlier error, with feasible set-points
 
 
 @dataclass(frozen=True)
@@ -149,25 +149,25 @@ def _lift(flight: Flight, vehicle: Vehicle) -> Array:
 def _kinds(flight: Flight, vehicle: Vehicle, recovery: float) -> Array:
     """Return the ShortfallCause between rows; a saturation counts for `recovery` [s] after it, (T − 1,)."""
     begin = flight.times[:-1]
-    beyond = flight.saturated & _asked_too_much(flight, vehicle)
-    saturated, asked = (
+    beyond = flight.saturated & _infeasible_setpoints(flight, vehicle)
+    saturated, by_plan = (
         begin - np.maximum.accumulate(np.where(rows[:-1], begin, -np.inf)) <= recovery + _CLOCK
         for rows in (flight.saturated, beyond)
     )
     return np.where(
-        asked,
-        ShortfallCause.ASKED_BY_PLAN,
-        np.where(saturated, ShortfallCause.LED_TO, ShortfallCause.UNSATURATED),
+        by_plan,
+        ShortfallCause.BY_PLAN,
+        np.where(saturated, ShortfallCause.BY_FEEDBACK, ShortfallCause.UNSATURATED),
     )
 
 
-def _asked_too_much(flight: Flight, vehicle: Vehicle) -> Array:
+def _infeasible_setpoints(flight: Flight, vehicle: Vehicle) -> Array:
     """Return True where set-points need thrust, with lag compensation or without, beyond limits, (T,)."""
-    asked = rotor_thrusts(vehicle, flight.setpoint.wrench)
+    required = rotor_thrusts(vehicle, flight.setpoint.wrench)
     slack = _SLACK * (flight.max_thrusts - flight.min_thrusts)
-    led = asked + vehicle.lags * np.gradient(asked, flight.times, axis=0)
-    outside = (np.minimum(asked, led) < flight.min_thrusts - slack) | (
-        np.maximum(asked, led) > flight.max_thrusts + slack
+    commands = required + vehicle.lags * np.gradient(required, flight.times, axis=0)
+    outside = (np.minimum(required, commands) < flight.min_thrusts - slack) | (
+        np.maximum(required, commands) > flight.max_thrusts + slack
     )
     return np.asarray(outside.any(axis=-1))
 

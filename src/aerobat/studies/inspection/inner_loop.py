@@ -29,13 +29,13 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
 _SMOOTHED = 0.008  # [s] of each of two low-pass lags, which suppress noise and the effect of filters
-_OTHER_ORDER = 0.6  # [-] misfit with permuted rotors over that without, at most, for a fault of order
-_OTHER_RATES = 0.5  # [-] residual with scaled rates over that without, at most, for a fault of rates
-_RATES_OFF = 0.15  # [-] smallest deviation of the rate scale from 1 that is a fault
-_GAIN_OFF = 0.4  # [-] smallest deviation of a gain that is a fault: rounding, filters and delays cause 0.2
-_ERRORS = 4.0  # standard errors of a gain that are added to _GAIN_OFF
-_EXCITED = 0.05  # [rad/s] RMS rate error from which a gain can be identified
-_FEWEST = 20  # rows without saturation from which a gain can be identified
+_ORDER_MISFIT = 0.6  # [-] misfit with permuted rotors over that without, at most, for a fault of order
+_RATES_RESIDUAL = 0.5  # [-] residual with scaled rates over that without, at most, for a fault of rates
+_RATE_ERROR = 0.15  # [-] smallest deviation of the rate scale from 1 that is a fault
+_GAIN_ERROR = 0.4  # [-] smallest deviation of a gain that is a fault: rounding, filters and delays cause 0.2
+_STANDARD_ERRORS = 4.0  # standard errors of a gain that are added to _GAIN_ERROR
+_MIN_EXCITATION = 0.05  # [rad/s] RMS rate error from which a gain can be identified
+_MIN_ROWS = 20  # rows without saturation from which a gain can be identified
 _AXES = ("roll", "pitch", "yaw")
 
 
@@ -65,8 +65,8 @@ class _InnerLoopLog:
     @classmethod
     def of(cls, flight: Flight, vehicle: Vehicle) -> _InnerLoopLog:
         period = float(np.median(np.diff(flight.times)))
-        felt = np.ones(max(1, round(4.0 * _SMOOTHED / period)))
-        free = lfilter(felt, [1.0], flight.saturated.astype(np.float64)) < 0.5
+        window = np.ones(max(1, round(4.0 * _SMOOTHED / period)))
+        free = lfilter(window, [1.0], flight.saturated.astype(np.float64)) < 0.5
         return cls(flight, vehicle, Fleet.of([vehicle]), period, free)
 
     def order(self) -> Fault | None:
@@ -74,7 +74,7 @@ class _InnerLoopLog:
         expected = self._model_commands()
         misfit = np.mean((self.flight.commands[:, :, None] - expected[:, None, :]) ** 2, axis=0)
         rotors, meant = linear_sum_assignment(misfit)
-        if misfit[rotors, meant].sum() > _OTHER_ORDER**2 * np.trace(misfit) or (rotors == meant).all():
+        if misfit[rotors, meant].sum() > _ORDER_MISFIT**2 * np.trace(misfit) or (rotors == meant).all():
             return None
         swapped = (
             f"rotor {k} obeys what rotor {m} should" for k, m in zip(rotors, meant, strict=True) if k != m
@@ -83,21 +83,21 @@ class _InnerLoopLog:
 
     def rates(self) -> Fault | None:
         """Return a fault if the commands fit a multiple of the commanded rates."""
-        asked, rest = self._asked, self._commanded + self._model_feedback
+        setpoint, rest = self._setpoint_term, self._commanded + self._model_feedback
         factors, unexplained, before = [], 0.0, 0.0
         for axis in range(len(_AXES)):
-            columns = np.stack([asked[:, axis], np.ones(len(asked))], axis=1)[self.free]
+            columns = np.stack([setpoint[:, axis], np.ones(len(setpoint))], axis=1)[self.free]
             goal = rest[self.free, axis]
-            if len(goal) < _FEWEST:
+            if len(goal) < _MIN_ROWS:
                 return None
             found = np.linalg.lstsq(columns, goal, rcond=None)[0]
             factors.append(float(found[0]))
             unexplained += float(np.sum((goal - columns @ found) ** 2))
             off = goal - columns[:, 0]
             before += float(np.sum((off - off.mean()) ** 2))
-        strongest = int(np.argmax(np.std(asked[self.free], axis=0)))
+        strongest = int(np.argmax(np.std(setpoint[self.free], axis=0)))
         factor = factors[strongest]
-        if unexplained > _OTHER_RATES**2 * before or abs(factor - 1.0) < _RATES_OFF:
+        if unexplained > _RATES_RESIDUAL**2 * before or abs(factor - 1.0) < _RATE_ERROR:
             return None
         axis_name = _AXES[strongest]
         return Fault("rates", f"the inner loop turns at {factor:.2f} of the rates asked in {axis_name}")
@@ -107,7 +107,7 @@ class _InnerLoopLog:
         off = [
             f"{factor:.1f} times as large in {axis}"
             for axis, (factor, error) in zip(_AXES, self._gain_factors(), strict=False)
-            if abs(factor - 1.0) > _GAIN_OFF + _ERRORS * error
+            if abs(factor - 1.0) > _GAIN_ERROR + _STANDARD_ERRORS * error
         ]
         return Fault("rate gains", f"the inner loop's gain is {', '.join(off)}") if off else None
 
@@ -120,11 +120,11 @@ class _InnerLoopLog:
         correlated = 8.0 * _SMOOTHED / self.period  # rows per independent sample
         for axis, gain in enumerate(self._gains.proportional):
             *columns, goal = (term[self.free, axis] for term in smoothed)
-            if len(goal) < max(_FEWEST, 2.0 * correlated):
+            if len(goal) < max(_MIN_ROWS, 2.0 * correlated):
                 return
             matrix = np.stack([*columns, np.ones(len(goal))], axis=1)
             found = np.linalg.lstsq(matrix, goal, rcond=None)[0]
-            if np.std(columns[0]) < _EXCITED:
+            if np.std(columns[0]) < _MIN_EXCITATION:
                 yield 1.0, np.inf
                 continue
             spread = float(np.var(goal - matrix @ found)) * correlated
@@ -142,7 +142,7 @@ class _InnerLoopLog:
         return np.asarray(moment @ np.linalg.inv(self.fleet.inertia[0]).T)
 
     @property
-    def _asked(self) -> Array:
+    def _setpoint_term(self) -> Array:
         """The part of the model's commands from the rate set-points [rad/s²], (T, 3)."""
         return self._proportional_integral(self.flight.rate_setpoint)
 

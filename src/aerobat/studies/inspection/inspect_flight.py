@@ -29,10 +29,10 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
 
 _DIGITS = 9  # decimals of a row's duration [s], so that equal rows share a step
-_ANSWERED = 1e-3  # [m/s²] feedback below this is rounding
+_MIN_FEEDBACK = 1e-3  # [m/s²] feedback below this is rounding
 NAMES = ("start", "hand-off", "vehicle", "saturation", "delay", "gains")  # causes in every flight
-FEWEST = 10  # fewest rows of a log that can be inspected
-NOTICED = 0.002  # [s] smallest delay beyond the uncertainty of the rotors' lags
+MIN_ROWS = 10  # fewest rows of a log that can be inspected
+MIN_DELAY = 0.002  # [s] smallest delay beyond the uncertainty of the rotors' lags
 
 
 def responses(
@@ -64,17 +64,17 @@ def responses(
     durations = np.round(np.diff(times), _DIGITS)
     steps = {float(h): _step(float(h), loop) for h in np.unique(durations)}
     usual = names.index(fault or unsaturated)
-    answered, before = usual, ShortfallCause.UNSATURATED
+    responsible, before = usual, ShortfallCause.UNSATURATED
     for row, h in enumerate(durations):
         kind = ShortfallCause(found.kinds[row])
         if kind is not before:
-            is_faults = fault is not None and kind is ShortfallCause.LED_TO
-            answered = usual if is_faults else _cause(kind, state, loop, usual)
+            is_faults = fault is not None and kind is ShortfallCause.BY_FEEDBACK
+            responsible = usual if is_faults else _cause(kind, state, loop, usual)
         before = kind
         push = np.zeros((len(names), 3))
         push[names.index("hand-off")] = found.observer[row]
         push[names.index("vehicle")] = found.vehicle[row]
-        push[answered] += found.missing[row]
+        push[responsible] += found.missing[row]
         forward, gain = steps[float(h)]
         state = np.einsum("ij,jck->ick", forward, state) + gain[:, None, None] * push
         errors.append(state[0])
@@ -84,13 +84,13 @@ def responses(
 
 def _cause(kind: ShortfallCause, state: Array, loop: PositionLoop, unsaturated: int) -> int:
     """Return the index of the cause of the acceleration missing from now on."""
-    if kind is ShortfallCause.ASKED_BY_PLAN:
+    if kind is ShortfallCause.BY_PLAN:
         return NAMES.index("saturation")
     if kind is ShortfallCause.UNSATURATED:
         return unsaturated
     off, rate = np.linalg.norm(state[:2], axis=-1)
     sizes = loop.position * off + loop.velocity * rate
-    return int(np.argmax(sizes)) if sizes.max() > _ANSWERED else unsaturated
+    return int(np.argmax(sizes)) if sizes.max() > _MIN_FEEDBACK else unsaturated
 
 
 def _step(h: float, loop: PositionLoop) -> tuple[Array, Array]:
@@ -126,9 +126,9 @@ def inspect_flight(
     """
     if flight.is_batch:
         raise SpecError("flight: inspect takes one flight at a time; of a batch, inspect flight[k]")
-    if len(flight.times) < FEWEST:
+    if len(flight.times) < MIN_ROWS:
         raise SpecError(
-            f"flight: it has {len(flight.times)} rows; a log needs at least {FEWEST} to be inspected"
+            f"flight: it has {len(flight.times)} rows; a log needs at least {MIN_ROWS} to be inspected"
         )
     nominal = vehicle_of(plan, vehicle)
     if len(nominal.rotors) != flight.thrusts.shape[-1]:
@@ -142,7 +142,7 @@ def inspect_flight(
     causes = disturbances(flight, nominal, loop)
     error = flight.position - flight.setpoint_position
     rate = flight.velocity - flight.setpoint_velocity
-    unsaturated = "delay" if delay.time > NOTICED else "gains"
+    unsaturated = "delay" if delay.time > MIN_DELAY else "gains"
     fault = (
         inner_loop_fault(flight, nominal)
         or rotor_fault(flight, nominal, delay)

@@ -157,9 +157,9 @@ class Inspection:
 
     def _share(self, cause: str, series: Array) -> ErrorShare:
         size = np.linalg.norm(series, axis=1)
-        felt = self.times[size >= 0.5 * size.max()]
+        large = self.times[size >= 0.5 * size.max()]
         error = float(series[self._worst] @ self.direction)
-        return ErrorShare(cause, error, float(felt[0]), float(felt[-1]))
+        return ErrorShare(cause, error, float(large[0]), float(large[-1]))
 
     @property
     def remarks(self) -> tuple[str, ...]:

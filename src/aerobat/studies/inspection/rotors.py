@@ -15,14 +15,14 @@ from aerobat.studies.inspection.disturbances import CommandDelay
 from aerobat.studies.inspection.result import Fault
 from aerobat.vehicle import Vehicle
 
-_LAG_OFF = 0.4  # [-] excess of lag over the nominal that is a fault: twice the spread of four rotors in a lab
-_EXCITED = 0.005  # of a rotor's range, RMS of command less thrust from which a lag can be identified
-_SHORT = 0.1  # of a rotor's range, shortfall of thrust that is a fault
-_WHILE = 0.06  # [s] for which the command must have lasted: longer than delays
-_STILL = 0.2  # of the expected rise within a row, below which thrust counts as constant
-_FEWEST_STILL = 0.02  # fraction of the rows that must show the shortfall
+_EXCESS_LAG = 0.4  # [-] excess over the nominal lag that is a fault: twice the spread of four rotors in a lab
+_MIN_EXCITATION = 0.005  # of a rotor's range, RMS of command less thrust from which a lag can be identified
+_MIN_SHORTFALL = 0.1  # of a rotor's range, shortfall of thrust that is a fault
+_COMMAND_DURATION = 0.06  # [s] for which the command must have lasted: longer than delays
+_STEADY_CHANGE = 0.2  # of the expected rise within a row, below which thrust counts as constant
+_MIN_STEADY = 0.02  # fraction of the rows that must show the shortfall
 _DIGITS = 3  # decimals of a shown thrust [N]
-_BETTER = 0.5  # largest residual of a lag over that of a delay for which the lag is the fault
+_RESIDUAL_RATIO = 0.5  # largest residual of a lag over that of a delay for which the lag is the fault
 
 
 def rotor_fault(flight: Flight, vehicle: Vehicle, delay: CommandDelay) -> Fault | None:
@@ -33,10 +33,10 @@ def rotor_fault(flight: Flight, vehicle: Vehicle, delay: CommandDelay) -> Fault 
         vehicle: The nominal vehicle.
         delay: Of its commands, an alternative explanation of late rotors.
     """
-    weak = _weak(flight, vehicle)
+    weak = _weak_rotor(flight, vehicle)
     missing, change = _missing_and_change(flight)
     unexplained = float(np.mean((change - _shares(missing, change) * missing) ** 2))
-    if weak is not None or unexplained > _BETTER * delay.unexplained:
+    if weak is not None or unexplained > _RESIDUAL_RATIO * delay.unexplained:
         return weak
     return lag_fault(flight, vehicle)
 
@@ -46,8 +46,8 @@ def lag_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
     missing, change = _missing_and_change(flight)
     period = float(np.median(np.diff(flight.times)))
     lags = -period / np.log(np.clip(1.0 - _shares(missing, change), 1e-9, 1.0 - 1e-9))
-    tells = np.sqrt(np.mean(missing**2, axis=0)) > _EXCITED * vehicle.thrust_ranges
-    late = tells & (lags > (1.0 + _LAG_OFF) * np.maximum(vehicle.lags, period))
+    is_excited = np.sqrt(np.mean(missing**2, axis=0)) > _MIN_EXCITATION * vehicle.thrust_ranges
+    late = is_excited & (lags > (1.0 + _EXCESS_LAG) * np.maximum(vehicle.lags, period))
     if not late.any():
         return None
     rotor = int(np.argmax(np.where(late, lags, 0.0)))
@@ -55,24 +55,24 @@ def lag_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
     return Fault("lag", f"rotor {rotor} takes {lag} to follow, not {planned}")
 
 
-def _weak(flight: Flight, vehicle: Vehicle) -> Fault | None:
+def _weak_rotor(flight: Flight, vehicle: Vehicle) -> Fault | None:
     """Return a fault if rotors stay constant below commands that have lasted for a while."""
     period = float(np.median(np.diff(flight.times)))
-    rows = round(_WHILE / period) + 1
+    rows = round(_COMMAND_DURATION / period) + 1
     if rows >= len(flight.times):
         return None
     lasting = np.lib.stride_tricks.sliding_window_view(flight.commands, rows, axis=0).min(axis=-1)[:-1]
-    given, change = flight.thrusts[rows - 1 : -1], np.diff(flight.thrusts[rows - 1 :], axis=0)
-    missing = lasting - given
+    thrusts, change = flight.thrusts[rows - 1 : -1], np.diff(flight.thrusts[rows - 1 :], axis=0)
+    missing = lasting - thrusts
     expected = missing * -np.expm1(-period / np.maximum(vehicle.lags, 1e-9))
-    still = (missing > _SHORT * vehicle.thrust_ranges) & (change < _STILL * expected)
-    if still.mean() < _FEWEST_STILL:
+    steady = (missing > _MIN_SHORTFALL * vehicle.thrust_ranges) & (change < _STEADY_CHANGE * expected)
+    if steady.mean() < _MIN_STEADY:
         return None
-    rotor = int(np.argmax(still.sum(axis=0)))
-    short, asked = (
-        round(float(np.median(each[:, rotor][still[:, rotor]])), _DIGITS) for each in (given, lasting)
+    rotor = int(np.argmax(steady.sum(axis=0)))
+    short, commanded = (
+        round(float(np.median(each[:, rotor][steady[:, rotor]])), _DIGITS) for each in (thrusts, lasting)
     )
-    return Fault("thrust", f"rotor {rotor} gives {short:.2g} N where {asked:.2g} N are commanded")
+    return Fault("thrust", f"rotor {rotor} gives {short:.2g} N where {commanded:.2g} N are commanded")
 
 
 def _missing_and_change(flight: Flight) -> tuple[Array, Array]:

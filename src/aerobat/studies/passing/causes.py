@@ -28,7 +28,7 @@ SWITCHED_OFF: Mapping[str, Mapping[str, Any]] = MappingProxyType(  # conditions 
 )
 
 
-def standing_in_the_way(
+def main_failure_cause(
     conditions: Dispersion, probability: float, share: Callable[[Dispersion], Share]
 ) -> str:
     """Return a sentence on the cause without which most flights pass; empty where nothing varies.

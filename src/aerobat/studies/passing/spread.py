@@ -22,7 +22,7 @@ ROWS_RATE = 100.0  # [1/s] largest rate of a tube's rows
 SAMPLED = 200  # flights of which every row is used: 50 MB
 MIN_TOLERANCE = 0.1  # least fraction of a gate's attitude tolerance that is left to the plan
 MIN_OPENING = 0.8  # least fraction of a gate's opening that is left to the plan
-AIM = 0.8  # fraction of an attitude tolerance that flights should keep to after thrust is raised
+TOLERANCE_FRACTION = 0.8  # of an attitude tolerance: flights should keep to it after thrust is raised
 MAX_THRUST = 0.75  # fraction of the maximum specific thrust that thrust is raised to: turning needs the rest
 
 
@@ -60,13 +60,16 @@ def with_narrower_gates(problem: Problem, vehicle: Vehicle, scores: Score) -> Pr
         vehicle: The vehicle.
         scores: Of the flights of its plan.
     """
-    pointed = replace(problem, gates=tuple(_pointed(gate, scores) for gate in problem.gates))
-    smaller = replace(pointed, gates=tuple(_smaller(gate, scores) for gate in pointed.gates))
+    tighter = replace(problem, gates=tuple(_with_smaller_tolerance(gate, scores) for gate in problem.gates))
+    narrower = replace(
+        tighter,
+        gates=tuple(_with_smaller_opening(gate, scores) for gate in tighter.gates),
+    )
     try:
-        require_openings(smaller, vehicle)
+        require_openings(narrower, vehicle)
     except SpecError:
-        return pointed
-    return smaller
+        return tighter
+    return narrower
 
 
 def with_more_thrust(
@@ -89,7 +92,8 @@ def with_more_thrust(
     strays += [(stage.angle_deg / stage.tolerance_deg, stage.planned) for stage in scores.attitudes]
     planned = [_planned_thrust(plan, np.asarray(times)) for _, times in strays]
     needed = [
-        _excess(np.asarray(each), fraction) * f / AIM for (each, _), f in zip(strays, planned, strict=True)
+        _excess(np.asarray(each), fraction) * f / TOLERANCE_FRACTION
+        for (each, _), f in zip(strays, planned, strict=True)
     ]
     thrust = min(max(needed, default=0.0), MAX_THRUST * vehicle.max_specific_thrust)
     if thrust <= min(planned, default=0.0):
@@ -112,14 +116,14 @@ def _planned_thrust(plan: Plan, times: Array) -> float:
     return float(np.linalg.norm(acceleration + plan.problem.environment.weight))
 
 
-def _pointed(gate: Gate, scores: Score) -> Gate:
+def _with_smaller_tolerance(gate: Gate, scores: Score) -> Gate:
     """Return the gate with its attitude tolerance reduced by the attitude error of flights."""
     strays = radians(_quantile(gate, scores, "attitude_error_deg"))
     left = max(gate.attitude_tolerance - strays, MIN_TOLERANCE * gate.attitude_tolerance)
     return replace(gate, attitude_tolerance=left)
 
 
-def _smaller(gate: Gate, scores: Score) -> Gate:
+def _with_smaller_opening(gate: Gate, scores: Score) -> Gate:
     """Return the gate with its opening reduced by the offsets of flights on both sides."""
     across, up = (
         max(1.0 - 2.0 * _quantile(gate, scores, offset) / side, MIN_OPENING)

@@ -16,17 +16,17 @@ from aerobat.errors import Infeasible, SpecError
 from aerobat.planning import Attempt, Plan, Planner, as_planner
 from aerobat.studies.flights import passed
 from aerobat.studies.passing.spread import with_narrower_gates
-from aerobat.studies.passing.task import PassingTask, Variant, going_on
+from aerobat.studies.passing.task import PassingTask, Variant, warm_started_refinement
 from aerobat.studies.share import Trials
 from aerobat.studies.workers import pool
 
-LATE = radians(15.0)  # [rad] turned within the rotors' lag: above this, some flights are too late
-CALMS = (0.65, 0.5, 0.8)  # of the largest body rate (benchmarks/steadying.py)
-LONGEST = 1.01  # longest duration, over that of the first plan
-CHOOSING = range(10**6, 10**6 + 200)  # flights that select the plan; other flights judge it
-ENOUGH = 0.975  # fraction of these flights: most plans with as many successes are proven for 95 %
-WORTH = 0.4  # fraction of these flights: with fewer successes, turning slower has not helped
-TRYING_TIME = 10.0  # [s] processor time limit of each plan, which takes 0.3 to 3: the limit decides nothing
+MAX_LAG_ANGLE = radians(15.0)  # [rad] turned within the rotors' lag: above this, some flights are too late
+BODY_RATE_FRACTIONS = (0.65, 0.5, 0.8)  # of the largest body rate (benchmarks/steadying.py)
+MAX_DURATION_RATIO = 1.01  # longest duration, over that of the first plan
+SELECTION_FLIGHTS = range(10**6, 10**6 + 200)  # flights that select the plan; other flights judge it
+SUFFICIENT_SUCCESS = 0.975  # fraction of these flights: most plans with as many successes are proven for 95 %
+MIN_SUCCESS = 0.4  # fraction of these flights: with fewer successes, turning slower has not helped
+PLANNING_TIME = 10.0  # [s] processor time limit of each plan, which takes 0.3 to 3: the limit decides nothing
 
 
 @validated
@@ -55,13 +55,13 @@ def steadied(
     vehicle, reserve = plan.vehicle, getattr(planner, "reserve", 0.0)
     if vehicle is None or plan.assessment is None or not (reserve and plan.problem.gates and plan.flies):
         return plan
-    if float(vehicle.lags.max()) * (plan.assessment.max_body_rate or 0.0) <= LATE:
+    if float(vehicle.lags.max()) * (plan.assessment.max_body_rate or 0.0) <= MAX_LAG_ANGLE:
         return plan
     kept = reserve if plan.keeps(reserve) else 0.0
     with pool(1, None, 1) as flying:
         task = PassingTask(
             problem=plan.problem,
-            planner=going_on(planner, plan, kept),
+            planner=warm_started_refinement(planner, plan, kept),
             vehicle=vehicle,
             conditions=as_dispersion(conditions),
             seed=seed,
@@ -70,28 +70,28 @@ def steadied(
             progress=progress,
             flying=flying,
         )
-        return _calmest(task, plan, kept)
+        return _slower_turning(task, plan, kept)
 
 
-def _calmest(task: PassingTask, plan: Plan, reserve: float) -> Plan:
+def _slower_turning(task: PassingTask, plan: Plan, reserve: float) -> Plan:
     """Return the plan, or a slower-turning one, hardly longer, if more flights succeed."""
-    scores = task.scores(plan, CHOOSING)
+    scores = task.scores(plan, SELECTION_FLIGHTS)
     first = best = passed(scores)
     found = plan
     problem = with_narrower_gates(plan.problem, task.vehicle, scores)
-    for calm in CALMS if first.fraction >= WORTH else ():
-        if best.fraction >= ENOUGH:
+    for rate in BODY_RATE_FRACTIONS if first.fraction >= MIN_SUCCESS else ():
+        if best.fraction >= SUFFICIENT_SUCCESS:
             break
         try:
-            other = task.tightened(plan, reserve, Variant(calm, True), problem, TRYING_TIME)
+            other = task.tightened(plan, reserve, Variant(rate, True), problem, PLANNING_TIME)
         except (Infeasible, SpecError):  # no plan, or gates too narrow for one
             continue
-        if other.duration > LONGEST * plan.duration or not (other.certified and other.flies):
+        if other.duration > MAX_DURATION_RATIO * plan.duration or not (other.certified and other.flies):
             continue
-        share = passed(task.scores(other, CHOOSING))
+        share = passed(task.scores(other, SELECTION_FLIGHTS))
         if share.count > best.count:
             why = (
-                f"goes on from {plan.planner}'s {plan.duration:.3f} s, turning at most {100 * calm:g} % as "
+                f"goes on from {plan.planner}'s {plan.duration:.3f} s, turning at most {100 * rate:g} % as "
                 f"fast: {share.count} of {share.of} flights succeed instead of {first.count}"
             )
             attempts = (*plan.attempts, *other.attempts)

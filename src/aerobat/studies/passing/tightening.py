@@ -12,7 +12,7 @@ from aerobat.optimization.deadline import processor
 from aerobat.planning.tube import Tube
 from aerobat.problem import Problem
 from aerobat.studies.flights import passed
-from aerobat.studies.passing.causes import standing_in_the_way
+from aerobat.studies.passing.causes import main_failure_cause
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, tube_series, with_more_thrust, with_narrower_gates
 from aerobat.studies.passing.task import VARIANTS, PassingTask, Variant
@@ -24,7 +24,8 @@ MAX_STEPS = 20  # a reserve of 0.4 at either end leaves a fifth of the range for
 # proofs are attempted on separate flights: each errs with probability 2.5 % at most, both together 5 %
 PROOFS = 2
 KEPT_VARIANTS = 3  # variants that remain after a round in which too few flights pass
-DEAR = 1.15  # times a round's shortest plan: longer ones are poor optima, and a larger reserve costs less
+# times a round's shortest plan: longer ones are poor optima, and a larger reserve costs less
+ROUND_DURATION_RATIO = 1.15
 # [s] least processor time limit of a tightened plan (else the plain plan's time): plans found take 0.3 to 3
 TIGHTENING_TIME = 5.0
 
@@ -54,13 +55,13 @@ class Tightening:
         plain, scores = self._plain()
         self._problem = self.task.problem
         steps, done = 0, plain
-        if not self.task.is_likely_enough(plain.share):
+        if not self.task.is_likely_proof(plain.share):
             self._problem = with_narrower_gates(self.task.problem, self.task.vehicle, scores)
             steps, done = self._smallest()
         for attempt in range(PROOFS):
             fresh = self._fresh(attempt)
             share = self.task.share(done.plan, fresh)
-            if self.task.is_enough(share):
+            if self.task.is_proof(share):
                 return self._proven(done, share, fresh)
             self._variants = VARIANTS
             following = self._round(steps + STRIDE) if attempt + 1 < PROOFS else None
@@ -74,8 +75,8 @@ class Tightening:
         found = self.task.plain()
         took = 0.0 if found.rescue else processor() - began
         self._limit = max(took, TIGHTENING_TIME)
-        asked = self.task.planner.reserve
-        self._least = asked if found.keeps(asked) else 0.0  # a rescued plan gives the reserve up
+        reserve = self.task.planner.reserve
+        self._least = reserve if found.keeps(reserve) else 0.0  # a rescued plan gives the reserve up
         scores = self.task.training(found, self.training)
         return self._noted(Round(self._least, found, passed(scores))), scores
 
@@ -86,7 +87,7 @@ class Tightening:
             done = self._round(steps)
             if done is None:
                 high = steps
-            elif self.task.is_likely_enough(done.share):
+            elif self.task.is_likely_proof(done.share):
                 return self._refined(low, steps, done)
             else:
                 low = steps
@@ -101,7 +102,7 @@ class Tightening:
         while high - low > 1:
             middle = (low + high) // 2
             done = self._round(middle)
-            if done is not None and self.task.is_likely_enough(done.share):
+            if done is not None and self.task.is_likely_proof(done.share):
                 high, best = middle, done
             else:
                 low = middle
@@ -117,11 +118,11 @@ class Tightening:
         """
         tried: list[_Flown] = []
         for variant in self._variants:
-            longest = DEAR * min((each.round.plan.duration for each in tried), default=inf)
+            longest = ROUND_DURATION_RATIO * min((each.round.plan.duration for each in tried), default=inf)
             found = self._planned(steps, variant, self._problem, longest)
             if found is not None:
                 tried.append(found)
-            if found is not None and self.task.is_likely_enough(found.round.share):
+            if found is not None and self.task.is_likely_proof(found.round.share):
                 self._variants = (variant,)
                 return found.round
         if not tried:
@@ -133,11 +134,11 @@ class Tightening:
     def _with_more_thrust(self, steps: int, best: _Flown) -> Round:
         """Return the round planned again with more thrust in gates if more flights pass, else the round."""
         kept = 0.5 * (1.0 + self.task.probability)  # half of the flights that may fail
-        firm = with_more_thrust(self._problem, self.task.vehicle, best.round.plan, best.scores, kept)
-        again = None if firm == self._problem else self._planned(steps, best.variant, firm)
+        raised = with_more_thrust(self._problem, self.task.vehicle, best.round.plan, best.scores, kept)
+        again = None if raised == self._problem else self._planned(steps, best.variant, raised)
         if again is None or _fraction(again.round) <= _fraction(best.round):
             return best.round
-        self._problem = firm
+        self._problem = raised
         return again.round
 
     def _planned(self, steps: int, variant: Variant, problem: Problem, longest: float = inf) -> _Flown | None:
@@ -189,7 +190,7 @@ class Tightening:
     def _unreachable(self, best: Round, flights: range) -> Infeasible:
         """Return the error with the best share of passing flights and the main cause of failures."""
         task, share = self.task, self.task.share(best.plan, flights)
-        why = standing_in_the_way(
+        why = main_failure_cause(
             task.conditions, task.probability, lambda without: task.share(best.plan, flights, without)
         )
         return Infeasible(

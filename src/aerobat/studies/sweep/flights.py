@@ -21,7 +21,7 @@ SAMPLED = 4 * CHUNK  # number of flights, from the first, whose errors over time
 STRIDE = 10  # ticks between the instants of errors over time
 PASSED, NOT_REACHED = "passed", "not_reached"  # outcomes of a passage beside failures
 NEAREST, CLEARANCE = "nearest", "clearance_m"  # columns where there are obstacles
-AGAIN = "#"  # separates a gate's name and the number of its passage, from the second on
+REPEAT_SEPARATOR = "#"  # separates a gate's name and the number of its passage, from the second on
 
 Columns = dict[str, NDArray[Any]]
 
@@ -144,4 +144,4 @@ def passage_names(passages: Sequence[Passage]) -> Iterator[str]:
     turns: Counter[str] = Counter()
     for passage in passages:
         turns[passage.gate] += 1
-        yield passage.gate + (f"{AGAIN}{turns[passage.gate]}" if turns[passage.gate] > 1 else "")
+        yield passage.gate + (f"{REPEAT_SEPARATOR}{turns[passage.gate]}" if turns[passage.gate] > 1 else "")

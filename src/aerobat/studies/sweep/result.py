@@ -21,7 +21,7 @@ from aerobat.problem import Gate
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
 from aerobat.studies.share import Share
-from aerobat.studies.sweep.flights import AGAIN, PASSED
+from aerobat.studies.sweep.flights import PASSED, REPEAT_SEPARATOR
 from aerobat.vehicle import Vehicle
 
 Level = Annotated[float, Field(ge=0, le=1, description="number from 0 to 1")]
@@ -101,7 +101,7 @@ class Sweep:
     def passages(self) -> Mapping[str, Gate]:
         """The gates in the order of passage, by the prefixes of their columns."""
         names = [name.removesuffix(_LATERAL) for name in self.table if name.endswith(_LATERAL)]
-        return {name: self.plan.problem.gate(name.partition(AGAIN)[0]) for name in names}
+        return {name: self.plan.problem.gate(name.partition(REPEAT_SEPARATOR)[0]) for name in names}
 
     @validated
     def passed(self, passage: Label) -> Share:

@@ -17,7 +17,7 @@ from aerobat.environment import Dispersion, as_dispersion
 from aerobat.flatness import vehicle_of
 from aerobat.planning import Plan
 from aerobat.simulation import Outcome
-from aerobat.studies.flights import CHUNK, TOGETHER, FlightTask, cut
+from aerobat.studies.flights import CHUNK, CHUNKS_PER_GROUP, FlightTask, cut
 from aerobat.studies.kept import KeptParts, fingerprint, names_of_parts
 from aerobat.studies.sweep.flights import SAMPLED, STRIDE, Chunk, fly_chunk
 from aerobat.studies.sweep.result import Sweep
@@ -28,7 +28,7 @@ from aerobat.vehicle import Vehicle
 Runs = Annotated[int, Field(ge=1, le=10**7, description="whole number from 1 to ten million")]
 Batch = Annotated[int, Field(ge=1, le=CHUNK, description=f"whole number from 1 to {CHUNK}")]
 
-_WELL = tuple(outcome.name.lower() for outcome in Outcome if outcome.is_success)
+_SUCCESSES = tuple(outcome.name.lower() for outcome in Outcome if outcome.is_success)
 
 
 @validated
@@ -74,7 +74,7 @@ def sweep(
     if isinstance(controller, str):
         controller = named_controller(controller, vehicle.controller)
     task = FlightTask(plan, vehicle, conditions, seed, controller or vehicle.controller, engine, batch)
-    kept = KeptParts.of(keep, ("flights", "sweep"), lambda: _asked(task))
+    kept = KeptParts.of(keep, ("flights", "sweep"), lambda: _inputs_summary(task))
     spans = cut(range(runs))
     chunks: dict[range, Chunk] = {}
     done = well = 0
@@ -83,7 +83,7 @@ def sweep(
         nonlocal done, well
         chunks[flights] = chunk
         done += len(flights)
-        well += int(np.isin(chunk.columns["outcome"], _WELL).sum())
+        well += int(np.isin(chunk.columns["outcome"], _SUCCESSES).sum())
         if progress is not None:
             progress(done, well)
 
@@ -93,7 +93,7 @@ def sweep(
             take(flights, found)
     missing = [flights for flights in spans if flights not in chunks]
     with pool(workers, executor, len(missing)) as flying:
-        flown = flying.results(fly_chunk, task, missing, together=TOGETHER, compiles=True)
+        flown = flying.results(fly_chunk, task, missing, together=CHUNKS_PER_GROUP, compiles=True)
         for flights, chunk in flown:
             kept.write(_name(flights), chunk.arrays)
             take(flights, chunk)
@@ -110,7 +110,7 @@ def _name(flights: range) -> str:
     return f"flights-{flights.start}-{flights.stop}"
 
 
-def _asked(task: FlightTask) -> dict[str, Any]:
+def _inputs_summary(task: FlightTask) -> dict[str, Any]:
     """Return a summary of everything that the numbers of flights depend on, without the batch size."""
     plan = {
         "problem": to_table(task.plan.problem),
