@@ -14,7 +14,7 @@ import aerobat as ab
 from aerobat import so3
 from aerobat.errors import SpecError
 from aerobat.problem import Figure, Quantity, Stage
-from aerobat.problem.condition import FIRM_THRUST
+from aerobat.problem.condition import MIN_ATTITUDE_THRUST
 
 PLACE = (1.0, 2.0, 3.0)
 FIGURES = (
@@ -197,7 +197,7 @@ def test_strong_vehicles_keep_attitudes_of_figures_firmly_and_weak_ones_as_they_
     asked = {
         stage.attitude.min_thrust for stage in figure.stage_sequence((), thrust).stages if stage.attitude
     }
-    assert asked == {FIRM_THRUST if thrust - 9.81 >= FIRM_THRUST else 0.2 * thrust}
+    assert asked == {MIN_ATTITUDE_THRUST if thrust - 9.81 >= MIN_ATTITUDE_THRUST else 0.2 * thrust}
     firm = figure.with_stage_thrust((), 11.0)
     assert {s.attitude.min_thrust for s in firm.stage_sequence((), thrust).stages if s.attitude} == {11.0}
 

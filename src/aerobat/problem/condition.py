@@ -173,16 +173,17 @@ class Condition:
 THRUST_FRACTION = 0.2  # of the maximum specific thrust: the default minimum along an attitude
 # [m/s²] specific thrust that keeps attitudes at speed. Disturbances and feedback against them reach 4 m/s²
 # across in 95 % of flights under `lab`, and tilt this thrust by 10°, the usual tolerance.
-FIRM_THRUST = 22.5
+MIN_ATTITUDE_THRUST = 22.5
 
 
-def firm_thrust(max_specific_thrust: float) -> float:
+def min_attitude_thrust(max_specific_thrust: float) -> float:
     """Return the least specific thrust [m/s²] along an attitude that is kept at speed.
 
-    This is FIRM_THRUST for a vehicle with that much thrust beyond its weight, else a fraction of its maximum.
+    This is MIN_ATTITUDE_THRUST for a vehicle with that much thrust beyond its weight, else a fraction of its
+    maximum.
     """
-    is_strong = max_specific_thrust - STANDARD_GRAVITY >= FIRM_THRUST
-    return FIRM_THRUST if is_strong else THRUST_FRACTION * max_specific_thrust
+    is_strong = max_specific_thrust - STANDARD_GRAVITY >= MIN_ATTITUDE_THRUST
+    return MIN_ATTITUDE_THRUST if is_strong else THRUST_FRACTION * max_specific_thrust
 
 
 @declared

@@ -38,7 +38,7 @@ from aerobat.problem.wall import Wall
 
 DEFAULT_SIZE = (1.0, 0.6)  # [m] width and height of a rectangular opening
 MAX_ROWS = 64  # of a path: a flight checks all of them at every tick
-TOUCHING = 1e-6  # [m] tolerance within which frames touch, so that neither intersects the other's opening
+CONTACT_TOLERANCE = 1e-6  # [m] within which frames touch, so that neither intersects the other's opening
 
 
 @declared
@@ -192,8 +192,8 @@ class Gate:
         crosses = np.minimum(height, last_height) * np.maximum(height, last_height) < 0.0
         rise = np.where(crosses, height - last_height, 1.0)
         crossings = np.where(crosses, last - last_height / rise * (points - last), points)
-        in_opening = other.opening.depth(crossings[:, :2]) > TOUCHING
-        return bool((in_opening & (np.abs(crossings[:, 2]) < TOUCHING)).any())
+        in_opening = other.opening.depth(crossings[:, :2]) > CONTACT_TOLERANCE
+        return bool((in_opening & (np.abs(crossings[:, 2]) < CONTACT_TOLERANCE)).any())
 
     @property
     def angles(self) -> tuple[float, float, float]:

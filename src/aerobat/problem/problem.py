@@ -111,11 +111,11 @@ class Problem:
                 raise SpecError("gate and gates are both given; give all gates as tables [[gates]]")
             with within_field("gate"):
                 table["gates"] = (from_table(Gate, table.pop("gate")),)
-        asked = table.get("heading")
-        if "heading_deg" in table and isinstance(asked, Mapping):
-            if "start" in asked:
+        heading = table.get("heading")
+        if "heading_deg" in table and isinstance(heading, Mapping):
+            if "start" in heading:
                 raise FieldError("heading_deg", "stands beside heading.start; drop either")
-            table["heading"] = {**asked, "start": radians(number(table.pop("heading_deg"), "heading_deg"))}
+            table["heading"] = {**heading, "start": radians(number(table.pop("heading_deg"), "heading_deg"))}
         return table
 
     def abbreviate(self, table: dict[str, Any]) -> dict[str, Any]:

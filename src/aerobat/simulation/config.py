@@ -108,8 +108,8 @@ class FlightConfig:
     @property
     def control_rate(self) -> float:
         """The rate of the controller [1/s]."""
-        asked = None if self.conditions is None else self.conditions.control_rate
-        return asked or self.rate
+        requested = None if self.conditions is None else self.conditions.control_rate
+        return requested or self.rate
 
     def changed(self, changes: FlightChanges) -> FlightConfig:
         """Return the settings with some of them replaced. Raises SpecError for unknown ones."""
@@ -119,8 +119,8 @@ class FlightConfig:
     @property
     def law(self) -> ControlLaw | None:
         """The control law requested in place of the tracking controller; None for the tracking controller."""
-        asked = self.controller if self.controller is not None or self.autopilot is None else "rates"
-        found = named_controller(asked) if isinstance(asked, str) else asked
+        requested = self.controller if self.controller is not None or self.autopilot is None else "rates"
+        found = named_controller(requested) if isinstance(requested, str) else requested
         return found if isinstance(found, ControlLaw) else None
 
     def controller_of(self, nominal: Sequence[Vehicle]) -> Controller:

@@ -23,7 +23,7 @@ from aerobat.vehicle.rotor import Rotor
 # [-] half the height over half the width: Bitcraze's Crazyflie 2.x has 29 mm of 139 mm, the Iris of PX4's
 # models 11 cm of 77 cm
 FLATNESS = 0.2
-ENCLOSING = 1e-3  # [-] tolerance, relative to the semi-axes, of enclosed propellers: the rounding of files
+ENCLOSING_TOLERANCE = 1e-3  # [-] relative to the semi-axes, of enclosed propellers: the rounding of files
 _CORNERS = 96  # of the polygon about a propeller's disc, which is 0.05 % of the radius too large
 
 
@@ -59,7 +59,7 @@ class Ellipsoid:
         x, y, up = self.centre.tolist()
         return Revolved(float(self.semi_axes[:2].max()), float(self.semi_axes[2]), up, hypot(x, y))
 
-    def sticking_out(self, rotor: Rotor) -> float:
+    def enclosing_scale(self, rotor: Rotor) -> float:
         """Return the factor [-] on the semi-axes with which the ellipsoid encloses a rotor's propeller."""
         with np.errstate(over="ignore"):  # infinite for a flat ellipsoid
             return float(np.linalg.norm((_rim(rotor) - self.centre) / self.semi_axes, axis=-1).max())

@@ -10,7 +10,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.states import STANDARD_GRAVITY
-from aerobat.vehicle.hover import mixing_matrix, relieved
+from aerobat.vehicle.hover import mixing_matrix, strength_weighted
 from aerobat.vehicle.vehicle import Vehicle
 
 _SLACK = 1e-12  # [-] a rotor with a smaller fraction of the collective thrust counts as unloaded
@@ -84,7 +84,7 @@ class Fleet:
             _, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
         inverses = mixing_matrix(self.allocation[first], self.min_thrusts[first], self.max_thrusts[first])
         rotors = self.allocation, self.min_thrusts, self.max_thrusts
-        return relieved(inverses[place.reshape(-1)], *rotors, self.mass * STANDARD_GRAVITY)
+        return strength_weighted(inverses[place.reshape(-1)], *rotors, self.mass * STANDARD_GRAVITY)
 
     @cached_property
     def collective_range(self) -> Array:

@@ -41,7 +41,7 @@ def mixing_matrix(allocation: Array, min_thrusts: Array, max_thrusts: Array) -> 
     return inverses
 
 
-def relieved(
+def strength_weighted(
     inverses: Array, allocation: Array, min_thrusts: Array, max_thrusts: Array, weights: Array
 ) -> Array:
     """Return mixing matrices that leave all rotors `MIN_ROOM` in hover, where the given ones do not.

@@ -28,8 +28,8 @@ from aerobat.declaration import (
 from aerobat.errors import Reason, SpecError
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle.controller import Controller
-from aerobat.vehicle.ellipsoid import ENCLOSING, Ellipsoid, about_rotors
-from aerobat.vehicle.hover import mixing_matrix, outside, overloaded, relieved, why_no_hover
+from aerobat.vehicle.ellipsoid import ENCLOSING_TOLERANCE, Ellipsoid, about_rotors
+from aerobat.vehicle.hover import mixing_matrix, outside, overloaded, strength_weighted, why_no_hover
 from aerobat.vehicle.rotor import Rotor, rotor_table
 
 _ROUNDING = 1e-9  # [-] relative tolerance: files write inertias with a few digits
@@ -153,7 +153,7 @@ class Vehicle:
         """The mixing matrix, an inverse of the allocation from loads to rotor thrusts, (n, 4)."""
         rotors = self.allocation, self.min_thrusts, self.max_thrusts
         weight = np.array(self.mass * STANDARD_GRAVITY)
-        return frozen(relieved(mixing_matrix(*rotors), *rotors, weight), "mixer")
+        return frozen(strength_weighted(mixing_matrix(*rotors), *rotors, weight), "mixer")
 
     @cached_property
     def bounding_ellipsoid(self) -> Ellipsoid:
@@ -297,8 +297,8 @@ def _about(centre: Array, rotor: Any) -> Any:
 def _check_enclosed(body: Ellipsoid, rotors: Sequence[Rotor]) -> None:
     """Raise FieldError for a body that a propeller extends beyond."""
     for i, rotor in enumerate(rotors):
-        scale = body.sticking_out(rotor)
-        if scale > 1.0 + ENCLOSING:
+        scale = body.enclosing_scale(rotor)
+        if scale > 1.0 + ENCLOSING_TOLERANCE:
             raise FieldError(
                 "body",
                 f"must enclose rotors[{i}] with its propeller; {scale:.3g} times its semi_axes would, or "

@@ -82,8 +82,8 @@ class Hold(Maneuver):
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return one stage."""
         still = fixed(Quantity.VELOCITY, np.zeros(3))
-        there = fixed(Quantity.POSITION, self.position)
-        return StageSequence((Stage(self.kind, (*there, *still), hold=self.time),))
+        position = fixed(Quantity.POSITION, self.position)
+        return StageSequence((Stage(self.kind, (*position, *still), hold=self.time),))
 
     def in_words(self, gates: Sequence[Gate]) -> str:
         """Return the duration of the hold in words."""

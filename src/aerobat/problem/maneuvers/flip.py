@@ -149,11 +149,11 @@ class Flip(Maneuver):
 
     def _stage(self, angle_deg: float, is_free: bool, max_specific_thrust: float) -> Stage:
         """Return the stage at an angle of the turns; without a gate, the one upside down has the position."""
-        asked = self._in_plane(angle_deg, self._min_thrust(angle_deg, max_specific_thrust))
+        thrust = self._in_plane(angle_deg, self._min_thrust(angle_deg, max_specific_thrust))
         if self.signed and _is_inverted(angle_deg):
-            asked += leaning_at_most(-UP, self.turn_axis, np.deg2rad(self.INVERTED_WITHIN_DEG))
-        there = fixed(Quantity.POSITION, self.position) if is_free and angle_deg == 180.0 else ()
-        return Stage(f"{angle_deg:g}°", (*there, *asked))
+            thrust += leaning_at_most(-UP, self.turn_axis, np.deg2rad(self.INVERTED_WITHIN_DEG))
+        position = fixed(Quantity.POSITION, self.position) if is_free and angle_deg == 180.0 else ()
+        return Stage(f"{angle_deg:g}°", (*position, *thrust))
 
     def _in_plane(self, angle_deg: float, minimum: float) -> tuple[Condition, ...]:
         """Return thrust conditions at an angle of the turn; unless `signed`, of free sign on diagonals."""
@@ -164,8 +164,8 @@ class Flip(Maneuver):
 
     def _min_thrust(self, angle_deg: float, max_specific_thrust: float) -> float:
         """Return the minimum specific thrust [m/s²] at an angle of the turn: upside down, or sideways."""
-        asked = self.min_inverted_thrust if _is_inverted(angle_deg) else self.min_lateral_thrust
-        return asked or THRUST_FRACTION * max_specific_thrust
+        thrust = self.min_inverted_thrust if _is_inverted(angle_deg) else self.min_lateral_thrust
+        return thrust or THRUST_FRACTION * max_specific_thrust
 
 
 def _is_inverted(angle_deg: float) -> bool:

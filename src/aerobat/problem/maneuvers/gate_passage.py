@@ -51,18 +51,18 @@ class GatePassage:
             conditions: replace the gate's attitude if the passage is not upright.
             min_thrust: least specific thrust [m/s²] along the gate's upright; None: no attitude is required.
         """
-        asked: list[Condition] = []
+        required: list[Condition] = []
         if self.perpendicular:
-            asked = [Condition(Quantity.VELOCITY, gate.normal, lower=self.speed)]
-            asked += [Condition(Quantity.VELOCITY, axis, 0.0, 0.0) for axis in (gate.lateral, gate.up)]
+            required = [Condition(Quantity.VELOCITY, gate.normal, lower=self.speed)]
+            required += [Condition(Quantity.VELOCITY, axis, 0.0, 0.0) for axis in (gate.lateral, gate.up)]
         if not self.upright:
-            asked += conditions
+            required += conditions
             min_thrust = None
         offset = 0 if self.centred else 1
         # the conditions contain the speed, or leave it free
         return Stage(
             gate.name,
-            tuple(asked),
+            tuple(required),
             self.at,
             offset,
             gate.name,

@@ -10,14 +10,20 @@ import numpy as np
 
 from aerobat.declaration import Angle, Positive, validated
 from aerobat.errors import SpecError
-from aerobat.problem.condition import THRUST_FRACTION, Condition, Quantity, firm_thrust, thrust_in_plane
+from aerobat.problem.condition import (
+    THRUST_FRACTION,
+    Condition,
+    Quantity,
+    min_attitude_thrust,
+    thrust_in_plane,
+)
 from aerobat.problem.gate import Gate, passed_gate
 from aerobat.problem.maneuvers.gate_passage import PAPER_LATERAL, PAPER_PASSAGE, GatePassage
 from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
 from aerobat.problem.stage import StageSequence
 from aerobat.so3 import UP
 
-SLOWER = 0.85  # fraction of FIRM_THRUST: half-flips are slower than figures
+HALF_FLIP_FRACTION = 0.85  # fraction of MIN_ATTITUDE_THRUST: half-flips are slower than figures
 _UPRIGHT = 1e-9  # [-] horizontal component of a gate's upright, below which the gate is upright
 
 
@@ -72,7 +78,8 @@ class HalfFlip(Maneuver):
         across = float(np.hypot(gate.up[0], gate.up[1]))
         if self.min_lateral_thrust is None:
             return max(
-                THRUST_FRACTION * max_specific_thrust, across * SLOWER * firm_thrust(max_specific_thrust)
+                THRUST_FRACTION * max_specific_thrust,
+                across * HALF_FLIP_FRACTION * min_attitude_thrust(max_specific_thrust),
             )
         if across < _UPRIGHT:
             raise SpecError(

@@ -88,7 +88,7 @@ class Circle(OpeningShape):
         """See `OpeningShape`."""
         return self.radius * outward
 
-    def needed(self, reach: Array) -> Array:
+    def needed_size(self, reach: Array) -> Array:
         """See `OpeningShape`."""
         return np.repeat(2.0 * reach.max(axis=-1)[..., None], 2, axis=-1)
 

@@ -74,7 +74,7 @@ class Polygon(OpeningShape):
         """The radius of the largest circle inside [m]."""
         return self._largest_inset(np.zeros(len(self.corners)))[0]
 
-    def needed(self, reach: Array) -> Array:
+    def needed_size(self, reach: Array) -> Array:
         """See `OpeningShape`."""
         return np.asarray((reach / self.sides[1]).max(axis=-1)[..., None] * self.size)
 
@@ -160,7 +160,7 @@ class Rectangle(Polygon):
         """The radius of the largest circle inside [m]."""
         return min(self.width, self.height) / 2.0
 
-    def needed(self, reach: Array) -> Array:
+    def needed_size(self, reach: Array) -> Array:
         """See `OpeningShape`; width and height are independent."""
         return 2.0 * reach
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 
-SHARPEST = 4.0  # ratio of a frame corner's distance to the bars' thickness, at most
+MITRE_LIMIT = 4.0  # ratio of a frame corner's distance to the bars' thickness, at most
 
 
 class EdgeProbe(NamedTuple):
@@ -98,7 +98,7 @@ class OpeningShape(ABC):
         """Return the points on the edges with those outward normals that are nearest to points, (..., 2)."""
 
     @abstractmethod
-    def needed(self, reach: Array) -> Array:
+    def needed_size(self, reach: Array) -> Array:
         """Return width and height [m] of the smallest similar opening about the same place, (..., 2).
 
         Args:
@@ -128,7 +128,7 @@ class OpeningShape(ABC):
         normal = np.column_stack([along[:, 1], -along[:, 0]])
         last = np.roll(normal, 1, axis=0)
         mitre = (normal + last) / (1.0 + np.sum(normal * last, axis=1))[:, None]
-        far = np.maximum(np.linalg.norm(mitre, axis=1) / SHARPEST, 1.0)[:, None]
+        far = np.maximum(np.linalg.norm(mitre, axis=1) / MITRE_LIMIT, 1.0)[:, None]
         return np.asarray(points + thickness * mitre / far)
 
 

@@ -53,8 +53,8 @@ class DisturbanceObserver(Component):
         model, elapsed = parameters.model, signals.clock.elapsed
         mass_properties, rotors = model.airframe
         observer, controller = signals.observer, signals.controller
-        left = motors.decay_factors(ops, rotors, ops.maximum(elapsed - parameters.delay, 0.0))
-        thrusts = motors.first_order_response(controller.thrusts, controller.commands.thrusts, left)
+        decay = motors.decay_factors(ops, rotors, ops.maximum(elapsed - parameters.delay, 0.0))
+        thrusts = motors.first_order_response(controller.thrusts, controller.commands.thrusts, decay)
         load = motors.wrench(rotors, thrusts)
         nominal = rigid_body.derivative(mass_properties, model.environment, observer.body, load)
         specific_force = rigid_body.specific_force(

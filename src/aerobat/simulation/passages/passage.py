@@ -174,24 +174,24 @@ def _closest(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, 
     times, reach = (np.stack(part, axis=-1) for part in zip(*(each[:2] for each in swath), strict=True))
     limits = np.array([probe.limit for probe in opening.probes])
     known = crossed & np.isfinite(times).all(axis=-1)
-    left = np.where(known[:, None], limits - reach, 0.0)
-    nearest = np.argmin(left, axis=-1)
+    clearances = np.where(known[:, None], limits - reach, 0.0)
+    nearest = np.argmin(clearances, axis=-1)
     points = np.stack([_in_opening(*pair) for pair in zip(opening.probes, swath, strict=True)])
     outward = np.stack([opening.outward(k, each) for k, each in enumerate(points)])
     rows = np.arange(len(nearest))
     outward = outward[nearest, rows]
     edge = opening.nearest_on_edge(outward, points[nearest, rows])
-    needed = opening.needed(np.where(known[:, None], reach, 0.0))
+    needed_size = opening.needed_size(np.where(known[:, None], reach, 0.0))
     numbers = {
-        "clearance": left[rows, nearest],
+        "clearance": clearances[rows, nearest],
         "closest_time": times[rows, nearest],
         "closest_lateral": edge[:, 0],
         "closest_up": edge[:, 1],
-        "needed_width": needed[..., 0],
-        "needed_height": needed[..., 1],
+        "needed_width": needed_size[..., 0],
+        "needed_height": needed_size[..., 1],
     }
     places = {name: np.where(known, values, np.nan) for name, values in numbers.items()}
-    names = [edge_name(normal) if there else "" for normal, there in zip(outward, known, strict=True)]
+    names = [edge_name(normal) if is_known else "" for normal, is_known in zip(outward, known, strict=True)]
     return places | {"closest_edge": np.array(names)}
 
 

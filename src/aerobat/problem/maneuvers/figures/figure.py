@@ -20,7 +20,7 @@ from aerobat.declaration import (
     unit,
     validated,
 )
-from aerobat.problem.condition import Attitude, Condition, ConeAngle, Quantity, firm_thrust, within
+from aerobat.problem.condition import Attitude, Condition, ConeAngle, Quantity, min_attitude_thrust, within
 from aerobat.problem.gate import Gate, named_gate
 from aerobat.problem.maneuvers.maneuver import Maneuver
 from aerobat.problem.stage import Stage
@@ -121,6 +121,6 @@ class Figure(Maneuver):
             np.asarray(position),
             np.array([forward, left, UP]),
             self.gate,
-            self.min_thrust or firm_thrust(max_specific_thrust),
+            self.min_thrust or min_attitude_thrust(max_specific_thrust),
             self.tolerance,
         )

@@ -49,9 +49,9 @@ class Loop:
         point = (self.radius * (sine - place_sine), 0.0, self.radius * (place_cosine - cosine))
         along = self.place.heads((self.direction * cosine, 0.0, self.direction * sine), speed)
         at_gate = angle_deg == self.place_deg and not name and self.place.gate is not None
-        there = () if at_gate else self.place.near(point, MARGIN * self.radius)
+        position = () if at_gate else self.place.near(point, MARGIN * self.radius)
         inward = (-sine, 0.0, cosine)
-        return self.place.stage(name or self.NAMES[angle_deg], inward, *there, along, at_gate=at_gate)
+        return self.place.stage(name or self.NAMES[angle_deg], inward, *position, along, at_gate=at_gate)
 
     @staticmethod
     def _at(angle_deg: int) -> tuple[float, float]:

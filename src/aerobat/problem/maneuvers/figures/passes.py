@@ -22,9 +22,9 @@ class AttitudePass(Figure):
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return one stage."""
         place = self.place(gates, max_specific_thrust)
-        there = () if place.gate else place.near((0.0, 0.0, 0.0), 0.0)
+        position = () if place.gate else place.near((0.0, 0.0, 0.0), 0.0)
         forward = place.heads((1.0, 0.0, 0.0), self.speed)
-        return StageSequence((place.stage(self.NAME, self.UP, *there, forward, at_gate=True),))
+        return StageSequence((place.stage(self.NAME, self.UP, *position, forward, at_gate=True),))
 
 
 @maneuver("knife-edge-pass")

@@ -23,8 +23,8 @@ class BarrelRoll(Figure):
         """Return the entry, upright, and the quarters of every roll."""
         place = self.place(gates, max_specific_thrust)
         forward = place.heads((1.0, 0.0, 0.0), self.speed)
-        there = () if place.gate else place.near((0.0, 0.0, 0.0), 0.0)
-        stages = [place.stage("entry", (0.0, 0.0, 1.0), *there, forward, at_gate=True)]
+        position = () if place.gate else place.near((0.0, 0.0, 0.0), 0.0)
+        stages = [place.stage("entry", (0.0, 0.0, 1.0), *position, forward, at_gate=True)]
         for angle_deg in range(90, 360 * self.count + 1, 90):
             up = (0.0, -sin(radians(angle_deg)), cos(radians(angle_deg)))
             stages.append(place.stage(f"{angle_deg}°", up, forward))
@@ -48,8 +48,8 @@ class Corkscrew(Figure):
         for angle_deg in range(0, 360 * self.count + 1, 90):
             sine, cosine = sin(radians(angle_deg)), cos(radians(angle_deg))
             point = (self.lead * angle_deg / 360.0, self.radius * sine, self.radius * (1.0 - cosine))
-            there = () if angle_deg == 0 and place.gate else place.near(point, self.MARGIN * self.radius)
+            position = () if angle_deg == 0 and place.gate else place.near(point, self.MARGIN * self.radius)
             forward = place.heads((1.0, 0.0, 0.0), 0.0 if angle_deg else self.speed)
             name = f"{angle_deg}°" if angle_deg else "entry"
-            stages.append(place.stage(name, (0.0, -sine, cosine), *there, forward, at_gate=angle_deg == 0))
+            stages.append(place.stage(name, (0.0, -sine, cosine), *position, forward, at_gate=angle_deg == 0))
         return StageSequence(tuple(stages))
