@@ -276,5 +276,5 @@ def test_a_port_that_another_program_takes_meanwhile_costs_a_second_start(
         taken.listen()
         ports = [taken.getsockname()[1]]
         monkeypatch.setattr(process, "_free_port", lambda: ports.pop() if ports else free())
-        monkeypatch.setattr(process, "_PATIENCE", 2.0)
+        monkeypatch.setattr(process, "_ANSWER_TIMEOUT", 2.0)
         assert process.configured.__wrapped__(betaflight_settings(QUAD, 20.0, simulated=True))

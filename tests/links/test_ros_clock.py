@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from aerobat.errors import SpecError
 from aerobat.links.ros import middleware
-from aerobat.links.ros.middleware import Calls, PacedClock, require_time
+from aerobat.links.ros.middleware import CallQueue, PacedClock, require_time
 from aerobat.links.ros.run import run
 
 SECOND = 10**9  # [ns]
@@ -94,7 +94,7 @@ def test_a_few_ticks_that_were_missed_are_made_up_for_and_of_many_the_last() -> 
 
 def test_calls_are_done_for_no_longer_than_patience_where_time_stands_still() -> None:
     done: list[str] = []
-    calls = Calls()
+    calls = CallQueue()
     calls.put(lambda: done.append("what waited"))
     calls.work_until(1, lambda: 0, patience=0.02)
     assert done == ["what waited"]
@@ -105,7 +105,7 @@ def test_a_clock_that_waits_tells_its_time_again_and_one_that_runs_does_not() ->
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(middleware, "time", wall)
         clock = PacedClock(1.0)
-        clock.tell_again = lambda: told.append(wall.now)
+        clock.resend = lambda: told.append(wall.now)
         clock.wait_at(5 * SECOND + SECOND)
         for _ in range(150):  # a second until it waits, and half a second of waiting
             wall.now += 0.01
@@ -115,7 +115,7 @@ def test_a_clock_that_waits_tells_its_time_again_and_one_that_runs_does_not() ->
 
 
 def test_whoever_still_waits_is_answered_when_the_node_ends() -> None:
-    calls, answers = Calls(), []
+    calls, answers = CallQueue(), []
     asking = Thread(target=lambda: answers.append(calls.answer(lambda answer: None)))
     asking.start()
     clock = SimpleNamespace(now=0)

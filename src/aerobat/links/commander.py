@@ -22,14 +22,14 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
 
 _STANDING = 1.0  # [s] for which goals stay on the ground after a landing
-_BEHIND = 0.25  # [m] distance from its goal above which a vehicle does not climb or land as ordered
-_PATIENCE = 10.0  # [s] beyond the duration of a climb or landing, after which the vehicle is left to itself
-_SPINNING_UP = 1.5  # [s] for which goals stay on the ground before a climb, while the rotors spin up
-_ASTRAY = 1.5  # [m] distance from its goal above which a vehicle does not follow its goals
-_STILL = 0.15  # [m/s] largest speed of a hover
-_ALOFT = 0.3  # [m] above the ground, from which a vehicle at rest counts as hovering
-_RECENT = 0.5  # [s] for which an observed state counts as present
-_LONG = 1.0  # [s] without a state, after which the vehicle is left to itself
+_RESTART_DISTANCE = 0.25  # [m] distance from its goal above which a vehicle does not climb or land as ordered
+_ROUTE_TIMEOUT = 10.0  # [s] beyond a climb's or landing's duration; then the vehicle is left to itself
+_SPIN_UP_TIME = 1.5  # [s] for which goals stay on the ground before a climb, while the rotors spin up
+_MAX_GOAL_DISTANCE = 1.5  # [m] distance from its goal above which a vehicle does not follow its goals
+_HOVER_SPEED = 0.15  # [m/s] largest speed of a hover
+_HOVER_HEIGHT = 0.3  # [m] above the ground, from which a vehicle at rest counts as hovering
+_MAX_STATE_AGE = 0.5  # [s] for which an observed state counts as present
+_MAX_SILENCE = 1.0  # [s] without a state, after which the vehicle is left to itself
 
 
 class Doing(StrEnum):
@@ -67,8 +67,8 @@ class Commander:
         self.log: list[Observed] = []  # of the last plan that was flown, times since its start
         self.mission: Mission[PathGoal] | None = None  # the last one
         self._vehicle, self._gravity, self._period, self._say = vehicle, gravity, period, say
-        self._there_by = 0.0  # [s] time limit for reaching the top of a climb, or the ground
-        self._leapt = False  # the observed position has jumped since a climb or landing began
+        self._deadline = 0.0  # [s] time limit for reaching the top of a climb, or the ground
+        self._jumped = False  # the observed position has jumped since a climb or landing began
 
     def observe(self, observed: Observed) -> None:
         """Process an observed state."""
@@ -76,21 +76,21 @@ class Commander:
             if observed.time <= self.observed.time:
                 return
             moved = dist(observed.body.position, self.observed.body.position)
-            self._leapt |= moved > _ASTRAY and observed.time - self.observed.time < _RECENT
+            self._jumped |= moved > _MAX_GOAL_DISTANCE and observed.time - self.observed.time < _MAX_STATE_AGE
         self.observed = observed
         if self.mission is not None and self.mission.phase is Phase.MANEUVER:
             self.log.append(observed._replace(time=observed.time - self.mission.maneuver_began))
 
     def take_off(self, now: float, height: float) -> None:
         """Climb by `height` [m] from the ground. Raises SpecError for a vehicle that is not on the ground."""
-        observed = self._recent(now)
+        observed = self._recent_state(now)
         if self.doing is not Doing.NOTHING:
             raise SpecError(f"the vehicle is {self.doing} already")
         here = np.array(observed.body.position)
         self.ground = float(here[2])
         up = rest_to_rest(here, here + height * so3.UP)
-        self._there_by, self._leapt = now + _SPINNING_UP + up.duration + _PATIENCE, False
-        self._go(Doing.CLIMBING, now + _SPINNING_UP, up, yaw_of(observed.body.q_world_body))
+        self._deadline, self._jumped = now + _SPIN_UP_TIME + up.duration + _ROUTE_TIMEOUT, False
+        self._go(Doing.CLIMBING, now + _SPIN_UP_TIME, up, yaw_of(observed.body.q_world_body))
 
     def hover(self, now: float) -> None:
         """Come to a hover from any activity. Raises SpecError for a vehicle that is left to itself."""
@@ -98,7 +98,7 @@ class Commander:
             raise SpecError("the vehicle is left to itself; have it take off first")
         if self.doing is Doing.MANEUVERING and self.mission is not None:
             self.mission.abort(now, "hold was called")
-        self._brake(now, self._recent(now))
+        self._brake(now, self._recent_state(now))
 
     def land(self, now: float) -> None:
         """Land from a hover. Raises SpecError where the vehicle does not hover."""
@@ -107,18 +107,18 @@ class Commander:
         if self.route is not None:  # from its end, where it hovers
             here, yaw = self.route.end, self.route.yaw
         down = straight_down(here, self.ground)
-        self._there_by, self._leapt = now + down.duration + _PATIENCE, False
+        self._deadline, self._jumped = now + down.duration + _ROUTE_TIMEOUT, False
         self._go(Doing.LANDING, now, down, yaw)
 
     def require_hover(self, now: float) -> Observed:
         """Return the state of a vehicle that hovers, also one left to itself. Raises SpecError otherwise."""
-        observed = self._recent(now)
+        observed = self._recent_state(now)
         speed, height = hypot(*observed.body.velocity), observed.body.position[2] - self.ground
-        if self.doing is Doing.HOVERING and speed <= _STILL:
+        if self.doing is Doing.HOVERING and speed <= _HOVER_SPEED:
             return observed
-        if self.doing is Doing.NOTHING and speed <= _STILL and height >= _ALOFT:
+        if self.doing is Doing.NOTHING and speed <= _HOVER_SPEED and height >= _HOVER_HEIGHT:
             return observed
-        if self.doing is Doing.NOTHING and height < _ALOFT:
+        if self.doing is Doing.NOTHING and height < _HOVER_HEIGHT:
             raise SpecError("the vehicle stands on the ground; have it take off first")
         doing = self.doing if self.doing is not Doing.HOVERING else f"moving at {speed:.1f} m/s"
         raise SpecError(f"the vehicle is {doing}; wait until it hovers")
@@ -139,9 +139,9 @@ class Commander:
             return PathGoal.upright(goal, self._gravity) if isinstance(goal, PositionGoal) else goal
         if self.route is None or self._leave_silent(now):
             return None
-        if self._is_behind and not self._begin_anew(now):
+        if self._is_behind and not self._restart_route(now):
             return None
-        if (off := self._off()) > _ASTRAY:
+        if (off := self._goal_distance()) > _MAX_GOAL_DISTANCE:
             self._leave(f"the vehicle is {length(off)} off its goal")
             return None
         since = now + self._period - self.route.began
@@ -166,7 +166,8 @@ class Commander:
             return self._goal_on_route(now)
         if self.mission.phase is Phase.ABORTED:
             off = self.mission.error(self._last_state) if phase is Phase.MANEUVER else 0.0
-            if off > self.mission.settings.max_error + _ASTRAY:  # its position jumps, and goals would too
+            # its position jumps, and goals would too
+            if off > self.mission.settings.max_error + _MAX_GOAL_DISTANCE:
                 self._leave(f"the vehicle is {length(off)} off its goal")
                 return None
             self._brake(now, self._last_state)
@@ -180,7 +181,7 @@ class Commander:
         path = Braking.of(*motion, self._vehicle, self._gravity, floor).trajectory
         self._go(Doing.BRAKING, now, path, float(nearest_heading(np.array(body.q_world_body))))
 
-    def _leave_silent(self, now: float, allowed: float = _LONG) -> bool:
+    def _leave_silent(self, now: float, allowed: float = _MAX_SILENCE) -> bool:
         """Return True, with the vehicle left to itself, if no state was received for `allowed` [s]."""
         silence = now - self._last_state.time
         if silence <= allowed:
@@ -195,19 +196,19 @@ class Commander:
         It may have received goals late, or hovered without goals, and does not accept goals that are far
         away.
         """
-        if self.doing not in (Doing.CLIMBING, Doing.LANDING) or self._off() <= _BEHIND:
+        if self.doing not in (Doing.CLIMBING, Doing.LANDING) or self._goal_distance() <= _RESTART_DISTANCE:
             return False
-        return self.doing is Doing.CLIMBING or self._last_state.body.position[2] > self.ground + _ALOFT
+        return self.doing is Doing.CLIMBING or self._last_state.body.position[2] > self.ground + _HOVER_HEIGHT
 
-    def _begin_anew(self, now: float) -> bool:
+    def _restart_route(self, now: float) -> bool:
         """Restart the route from where the vehicle is, and return True.
 
         The vehicle is left to itself, and False returned, where the order has taken too long, or where the
         observed position has jumped, since goals would jump too.
         """
-        if self._leapt or now > self._there_by:
+        if self._jumped or now > self._deadline:
             order = "climb" if self.doing is Doing.CLIMBING else "land"
-            why = ", it is seen to leap" if self._leapt else ""
+            why = ", it is seen to leap" if self._jumped else ""
             self._leave(f"the vehicle does not {order} as it is told{why}")
             return False
         end, here = self._present_route.end, np.array(self._last_state.body.position)
@@ -229,13 +230,13 @@ class Commander:
         assert self.route is not None, "it is on a route"
         return self.route
 
-    def _off(self) -> float:
+    def _goal_distance(self) -> float:
         """Return the distance of the vehicle from its route [m] at its last observation."""
         goal = self._present_route.goal(self._last_state.time).position
         return float(np.linalg.norm(np.array(self._last_state.body.position) - goal))
 
-    def _recent(self, now: float) -> Observed:
-        if self.observed is None or now - self.observed.time > _RECENT:
+    def _recent_state(self, now: float) -> Observed:
+        if self.observed is None or now - self.observed.time > _MAX_STATE_AGE:
             raise SpecError("nothing was heard of the vehicle lately; see that its odometry comes")
         return self.observed
 

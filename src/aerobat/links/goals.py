@@ -23,10 +23,10 @@ class Mode(StrEnum):
     OFFBOARD = "offboard"
 
 
-_LARGEST = 1e6  # [m], [m/s] and [rad/s] largest plausible values
-_UNIT = 1e-2  # [-] tolerance of the norm of a quaternion, which may be sent with few decimals
-_STILL: Array = np.zeros(3)
-_STILL.flags.writeable = False
+_MAX_VALUE = 1e6  # [m], [m/s] and [rad/s] largest plausible values
+_NORM_TOLERANCE = 1e-2  # [-] tolerance of the norm of a quaternion, which may be sent with few decimals
+_ZERO: Array = np.zeros(3)
+_ZERO.flags.writeable = False
 
 
 class PositionGoal(NamedTuple):
@@ -36,12 +36,12 @@ class PositionGoal(NamedTuple):
     velocity: Array  # [m/s], (3,)
     acceleration: Array  # [m/s²], (3,)
     yaw: float  # [rad] of the body's x axis about the vertical, from east
-    jerk: Array = _STILL  # [m/s³], (3,)
+    jerk: Array = _ZERO  # [m/s³], (3,)
 
     @classmethod
     def hover(cls, position: Array, yaw: float) -> PositionGoal:
         """Return the goal of a hover at a position [m], (3,), and a yaw [rad]."""
-        return cls(position, _STILL, _STILL, yaw)
+        return cls(position, _ZERO, _ZERO, yaw)
 
 
 class PathGoal(NamedTuple):
@@ -63,7 +63,7 @@ class PathGoal(NamedTuple):
         heading = so3.about_axis(so3.UP, goal.yaw)
         q = so3.multiply(so3.smallest_rotation(so3.UP, thrust / size), heading)
         omega = so3.cross(thrust, goal.jerk) / size**2
-        return cls(goal.position, goal.velocity, goal.acceleration, goal.jerk, q, omega, _STILL)
+        return cls(goal.position, goal.velocity, goal.acceleration, goal.jerk, q, omega, _ZERO)
 
 
 class PathPiece(NamedTuple):
@@ -106,7 +106,7 @@ def observed(
     """
     numbers = np.array([*position, *velocity_body, *omega_body])
     norm = hypot(*q_world_body)
-    if not (np.abs(numbers).max() <= _LARGEST and abs(norm - 1.0) <= _UNIT):  # false for NaN, too
+    if not (np.abs(numbers).max() <= _MAX_VALUE and abs(norm - 1.0) <= _NORM_TOLERANCE):  # false for NaN, too
         return None
     velocity = so3.rotate(np.array(q_world_body) / norm, np.array(velocity_body))
     w, x, y, z = (part / norm for part in q_world_body)

@@ -22,8 +22,8 @@ from aerobat.simulation.autopilot.braking import Braking
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 
-_NEAR = 0.1  # [m] distance from the start within which a vehicle has reached it
-_SLOW = 0.15  # [m/s] speed below which a vehicle has reached the start
+_START_TOLERANCE = 0.1  # [m] distance from the start within which a vehicle has reached it
+_START_SPEED = 0.15  # [m/s] speed below which a vehicle has reached the start
 _AT_REST = 1e-3  # [m/s], [m/s²] largest motion of a plan's start and end at a hover
 _CLIMB = 1.0  # [m] least vertical climb before the approach
 
@@ -92,7 +92,7 @@ class Mission(Generic[GoalT_co]):
         first, last = self.stream.flat(0.0), self.stream.flat(self.stream.duration)
         for end, state in (("begins", first), ("ends", last)):
             speed = float(np.linalg.norm(state.velocity))
-            if speed > _SLOW:
+            if speed > _START_SPEED:
                 raise SpecError(
                     f"the plan {end} at {speed:.2f} m/s, a mission at rest; plan it from and to rest"
                 )
@@ -205,7 +205,7 @@ class Mission(Generic[GoalT_co]):
         """Begin the plan once the vehicle has been at rest at its start for long enough, or abort."""
         body = observed.body
         off = float(np.linalg.norm(np.array(body.position) - self._start))
-        if off > _NEAR or hypot(*body.velocity) > _SLOW:
+        if off > _START_TOLERANCE or hypot(*body.velocity) > _START_SPEED:
             self._rested_since = np.nan
         elif np.isnan(self._rested_since):
             self._rested_since = now

@@ -15,7 +15,7 @@ from aerobat.trajectory import Trajectory, minimum_effort
 
 SPEED = 2.0  # [m/s] on the way from hover to hover
 DESCENT_SPEED = 1.0  # [m/s] of a landing
-_SHORTEST = 0.2  # [s] shortest duration of a route
+_MIN_DURATION = 0.2  # [s] shortest duration of a route
 _PEAK_SPEED = 15.0 / 8.0  # [-] peak speed of the quintic from rest to rest, over its mean speed
 _PEAK_ACCELERATION = 10.0 / sqrt(3.0)  # [-] its peak acceleration, times duration squared over length
 
@@ -60,7 +60,7 @@ def rest_to_rest(
     by_acceleration = sqrt(_PEAK_ACCELERATION * length / max_acceleration)
     ends = np.zeros((2, 3, 3))
     ends[0, 0], ends[1, 0] = start, goal
-    return minimum_effort(ends, [max(by_speed, by_acceleration, _SHORTEST)])
+    return minimum_effort(ends, [max(by_speed, by_acceleration, _MIN_DURATION)])
 
 
 def straight_down(start: Array, ground: float) -> Trajectory:

@@ -23,7 +23,7 @@ from aerobat.simulation.components import log_row
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
 
-_LONG = 10**6  # ticks, an arbitrary large number, since the length of a live flight is unknown
+_MAX_TICKS = 10**6  # ticks, an arbitrary large number, since the length of a live flight is unknown
 
 
 class LiveBody:
@@ -37,7 +37,7 @@ class LiveBody:
         _, model, _ = setup.parameters.own
         self._gains: tuple[Gains, Gains] = first_numbers((model.tracking.gains, model.upright))
         first = first_row(autopilot_inputs(_hovering(environment.gravity), False))
-        self._loop = setup.compile_for(choose("auto", 1, _LONG), first, log_row)
+        self._loop = setup.compile_for(choose("auto", 1, _MAX_TICKS), first, log_row)
         self._carry: Tree = self._loop.init(first)
         self.stop_rotors()
 

@@ -15,7 +15,7 @@ from aerobat.links.goals import AttitudeGoal, PathPiece, PositionGoal
 from aerobat.simulation.autopilot.braking import point_reference
 from aerobat.simulation.autopilot.loop import COMMAND_HOLD_TIME
 
-_SLOW = 0.5  # [m/s] and [m/s²]: a piece that ends with less motion ends almost at rest
+_REST_THRESHOLD = 0.5  # [m/s] and [m/s²]: a piece that ends with less motion ends almost at rest
 _SMOOTHING = 0.002  # [s] time constant of the low-pass filter on the change of commanded rates and thrust
 
 
@@ -40,10 +40,13 @@ class PathReference(NamedTuple):
     piece: PathPiece
 
     @property
-    def leads_away(self) -> bool:
+    def ends_in_motion(self) -> bool:
         """True unless the piece ends almost at rest."""
         end = self.piece.end
-        return float(np.linalg.norm(end.velocity)) > _SLOW or float(np.linalg.norm(end.acceleration)) > _SLOW
+        return (
+            float(np.linalg.norm(end.velocity)) > _REST_THRESHOLD
+            or float(np.linalg.norm(end.acceleration)) > _REST_THRESHOLD
+        )
 
     def reference(self, times: Array, period: float, gravity: float) -> ReferencePoint:
         """Return references at times [s], leaves (T,), for a controller that steps every `period` [s]."""

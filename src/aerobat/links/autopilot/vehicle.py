@@ -52,7 +52,7 @@ class SimulatedVehicle:
         self._route = Route(rest_to_rest(np.zeros(3), np.zeros(3)), self.time, 0.0)
         self._then: tuple[Array, float | None] | None = None  # [m], [rad] where to go after the hover
         self._goal: PointReference | PathReference | AttitudeReference | None = None
-        self._heard = -np.inf  # [s] time of the last goal
+        self._last_goal_time = -np.inf  # [s] time of the last goal
 
     @property
     def state(self) -> BodyState:
@@ -110,7 +110,7 @@ class SimulatedVehicle:
 
     def go_offboard(self) -> bool:
         """Follow a client's streamed goals; return False where none came recently."""
-        if self._goal is None or self.time - self._heard > POINT_TIMEOUT:
+        if self._goal is None or self.time - self._last_goal_time > POINT_TIMEOUT:
             return False
         self.mode, self._then = Mode.OFFBOARD, None
         self._restart_position_loop()
@@ -126,7 +126,7 @@ class SimulatedVehicle:
 
     def follow_attitude(self, goal: AttitudeGoal, sent: float) -> None:
         """Accept an attitude goal of the time `sent` [s] by the client's clock, for the mode offboard."""
-        known, self._heard = self._goal, self.time
+        known, self._last_goal_time = self._goal, self.time
         if isinstance(known, AttitudeReference):
             self._goal = known.followed_by(goal, sent, self.time)
         else:
@@ -145,7 +145,7 @@ class SimulatedVehicle:
 
     def _follow(self, goal: PointReference | PathReference) -> None:
         is_another_kind = type(goal) is not type(self._goal)
-        self._goal, self._heard = goal, self.time
+        self._goal, self._last_goal_time = goal, self.time
         if is_another_kind:
             self._restart_position_loop()
 
@@ -200,9 +200,9 @@ class SimulatedVehicle:
         """Come to a hover where a client that is obeyed has fallen silent."""
         if self.mode is not Mode.OFFBOARD:
             return
-        silence = self.time - self._heard
+        silence = self.time - self._last_goal_time
         stays = isinstance(self._goal, PointReference)
-        stays = stays or (isinstance(self._goal, PathReference) and not self._goal.leads_away)
+        stays = stays or (isinstance(self._goal, PathReference) and not self._goal.ends_in_motion)
         allowed = POINT_TIMEOUT if stays else ATTITUDE_TIMEOUT
         if silence > allowed + 1e-9:
             self.notices.append(f"no set-points for {silence:.2f} s: holding")

@@ -18,7 +18,7 @@ from aerobat.vehicle import Vehicle
 
 _STEP = 0.02  # [s] between packets while the vehicle stands
 _GRACE = 5.0  # [s] after its start, in which the firmware does not arm
-_STILL = Sensed((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), (1.0, 0.0, 0.0, 0.0))
+_AT_REST = Sensed((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), (1.0, 0.0, 0.0, 0.0))
 _THROTTLE = 0.05  # [-] throttle from which motors turn
 _BLACKBOX = (
     "set blackbox_device = VIRTUAL",
@@ -26,7 +26,7 @@ _BLACKBOX = (
     "set blackbox_sample_rate = 1/4",  # 2 kHz
     "set blackbox_high_resolution = ON",
 )
-_LOST = 0.02  # [s] of motors at rest under throttle, after which the firmware counts as disarmed
+_DISARM_TIME = 0.02  # [s] of motors at rest under throttle, after which the firmware counts as disarmed
 
 
 class Betaflight(Autopilot):
@@ -96,7 +96,7 @@ class BetaflightRun:
         self._firmware.step(1.0)
         self._stand(_GRACE, self._sticks.idle(armed=False))
         self._stand(0.5, self._sticks.idle(armed=True))
-        turning = Sticks(1.0).packet(_STILL.omega, throttle_of(self._vehicle, thrust))
+        turning = Sticks(1.0).packet(_AT_REST.omega, throttle_of(self._vehicle, thrust))
         commands = self._stand(0.1, turning)
         if not any(commands):
             raise SpecError(f"autopilot: Betaflight refuses to arm: {self._flags}")
@@ -109,7 +109,7 @@ class BetaflightRun:
     def _stand(self, duration: float, sticks: bytes) -> tuple[float, ...]:
         commands: tuple[float, ...] = ()
         for _ in range(round(duration / _STEP)):
-            commands = self._firmware.step(_STEP, state_packet(_STILL), sticks).commands
+            commands = self._firmware.step(_STEP, state_packet(_AT_REST), sticks).commands
         return commands
 
     def step(self, sensed: Sensed, setpoint: RateSetpoint, duration: float) -> PerRotor:
@@ -119,7 +119,7 @@ class BetaflightRun:
         motors = self._firmware.step(duration, state_packet(sensed), sticks)
         self._time += duration
         self._at_rest = self._at_rest + duration if throttle > _THROTTLE and not any(motors.commands) else 0.0
-        if self._at_rest > _LOST:
+        if self._at_rest > _DISARM_TIME:
             raise SpecError(
                 f"autopilot: Betaflight disarmed {self._time:.2f} s into the flight: {self._flags}"
             )

@@ -26,9 +26,9 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
 PROTOCOLS = {"msp": MSP, "crsf": CRSF}
-_LIFT = 0.01  # [m] height of a goal above the ground that means take-off
-_DOWN = 0.05  # [m] height above the ground within which a goal below the ground ends the flight
-_ALOFT = 0.3  # [m] height above the ground from which motors are not stopped: the failsafe decides
+_TAKEOFF_THRESHOLD = 0.01  # [m] height of a goal above the ground that means take-off
+_LANDED_HEIGHT = 0.05  # [m] height above the ground within which a goal below the ground ends the flight
+_AIRBORNE_HEIGHT = 0.3  # [m] height above the ground from which motors are not stopped: the failsafe decides
 _PAUSE = 0.1  # [s] without goals, after which the outer loop is reset
 
 
@@ -113,15 +113,15 @@ class Board:
         """
         height = 0.0 if observed is None or self._ground is None else observed.body.position[2] - self._ground
         if piece is None or observed is None:
-            if height < _ALOFT:
+            if height < _AIRBORNE_HEIGHT:
                 self._stop()
             return
         if self._ground is None:
             self._ground = observed.body.position[2]
         above = float(piece.end.position[2]) - self._ground
-        if above < 0.0 and height < _DOWN:
+        if above < 0.0 and height < _LANDED_HEIGHT:
             self._stop()
-        elif self._state is None and above < _LIFT:
+        elif self._state is None and above < _TAKEOFF_THRESHOLD:
             self._line.send(self._sticks.idle(armed=True))
         else:
             self._line.send(self._flown(piece, observed, now))

@@ -21,9 +21,9 @@ from aerobat.errors import BackendMissing, SpecError
 
 _ORDER = struct.Struct("<QII144s40s")
 _ANSWER = struct.Struct("<QI4f4x")
-_PATIENCE = 20.0  # [s] of wall time, limit for an answer
+_ANSWER_TIMEOUT = 20.0  # [s] of wall time, limit for an answer
 _STEP = 0.01  # [s] of firmware time between polls of its serial line
-_LOOK = 0.002  # [s] of wall time for each poll
+_POLL_TIMEOUT = 0.002  # [s] of wall time for each poll
 _PROMPT = b"\n# "
 _LINES_AT_ONCE = 20  # capacity of its input buffer
 _PREFIX = "aerobat-betaflight-"  # prefix of temporary folders
@@ -93,7 +93,7 @@ class Firmware:
         if saved is not None:
             self._saved.write_bytes(saved)
         self._orders, theirs = socket.socketpair()
-        self._orders.settimeout(_PATIENCE)
+        self._orders.settimeout(_ANSWER_TIMEOUT)
         self._serial: socket.socket | None = None
         self._port = _free_port()
         environment = {
@@ -171,9 +171,9 @@ class Firmware:
             try:
                 line = socket.create_connection(("127.0.0.1", self._port), 1.0)
             except OSError:
-                time.sleep(_LOOK)
+                time.sleep(_POLL_TIMEOUT)
                 continue
-            line.settimeout(_LOOK)
+            line.settimeout(_POLL_TIMEOUT)
             return line
         raise FirmwareEnded(f"autopilot: Betaflight does not listen on port {self._port}; run it again")
 
@@ -196,7 +196,7 @@ class Firmware:
         try:
             for _ in _looks():
                 self.step(_STEP)
-                time.sleep(_LOOK)
+                time.sleep(_POLL_TIMEOUT)
         except FirmwareEnded:
             return self._saved.read_bytes()
         raise FirmwareEnded("autopilot: Betaflight does not save its settings; run it again")
@@ -221,7 +221,7 @@ class Firmware:
 
 def _looks() -> Iterator[None]:
     """Yield until the time limit for an answer is over."""
-    last = time.monotonic() + _PATIENCE
+    last = time.monotonic() + _ANSWER_TIMEOUT
     while time.monotonic() < last:
         yield
 

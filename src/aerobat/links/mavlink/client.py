@@ -23,14 +23,14 @@ from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan
 
 _HOVER_TOLERANCE = 0.1  # [-] largest relative difference of hover thrust from the plan's vehicle
-_STREAMED = 1.2  # [s] of streamed set-points that PX4 requires before the mode offboard
-_LIFT = 1.0  # [m] height of take-off for vehicles that set-points cannot lift off the ground
-_LIFTED = 0.2  # [m] height error within which take-off is complete
-_PATIENCE = 8.0  # [s] time limit for a vehicle to obey an order
-_HOVERING = 3.0  # [s] of hover after an abort, before landing
-_STILL = 0.3  # [m/s] largest speed of a hover
-_SILENCE = 10.0  # [s] without news after an abort, after which the vehicle is ordered to land, or is given up
-_RECOVERY = 60.0  # [s] time limit for coming to a hover, and for a landing beside the descent
+_STREAM_TIME = 1.2  # [s] of streamed set-points that PX4 requires before the mode offboard
+_TAKEOFF_HEIGHT = 1.0  # [m] height of take-off for vehicles that set-points cannot lift off the ground
+_TAKEOFF_TOLERANCE = 0.2  # [m] height error within which take-off is complete
+_ORDER_TIMEOUT = 8.0  # [s] time limit for a vehicle to obey an order
+_HOVER_DWELL = 3.0  # [s] of hover after an abort, before landing
+_HOVER_SPEED = 0.3  # [m/s] largest speed of a hover
+_MAX_SILENCE = 10.0  # [s] without news after an abort; then the vehicle is ordered to land, or given up
+_RECOVERY_TIMEOUT = 60.0  # [s] time limit for coming to a hover, and for a landing beside the descent
 _SLOWEST_DESCENT = 0.2  # [m/s] slowest descent of a landing
 
 
@@ -226,7 +226,7 @@ class Client:
         """Stream the vehicle's position, as PX4 requires before offboard; then set the mode, then arm."""
         assert self._ground is not None, "its state is known"
         self.link.follow(self._ground, self._max_thrust)
-        if self._elapsed <= _STREAMED:
+        if self._elapsed <= _STREAM_TIME:
             self._require_one_system()
         else:
             self.link.set_mode(Mode.OFFBOARD)
@@ -236,7 +236,7 @@ class Client:
             self._say("armed")
             self._enter(ClientStage.TAKING_OFF)
             self._while_taking_off()
-        elif self._elapsed > _PATIENCE:
+        elif self._elapsed > _ORDER_TIMEOUT:
             # a vehicle that was ordered to arm may be armed, and is ordered to land
             has_mode = self.link.mode is Mode.OFFBOARD
             self._refuse("arm" if has_mode else "take the mode offboard", lands=has_mode)
@@ -245,13 +245,13 @@ class Client:
         """Order a take-off for vehicles that set-points cannot lift off the ground; then begin to fly."""
         assert self._ground is not None, "its state is known"
         height = self._observed.body.position[2] - self._ground.position[2]
-        if self.link.dialect.leads_off or abs(height - _LIFT) < _LIFTED:
+        if self.link.dialect.offboard_takeoff or abs(height - _TAKEOFF_HEIGHT) < _TAKEOFF_TOLERANCE:
             self.mission.begin(self._now, self._observed)
             self._enter(ClientStage.FLYING)
-        elif self._elapsed > _PATIENCE:
+        elif self._elapsed > _ORDER_TIMEOUT:
             self._refuse("take off")
         elif not self._yields():
-            self.link.take_off(_LIFT)
+            self.link.take_off(_TAKEOFF_HEIGHT)
 
     def _refuse(self, what: str, lands: bool = True) -> None:
         """Land, if necessary, then raise SpecError with the vehicle's own complaints."""
@@ -296,15 +296,15 @@ class Client:
             return
         self.link.set_mode(Mode.HOLD)
         silence = self._now - self._observed.time
-        is_still = hypot(*self._observed.body.velocity) < _STILL
+        is_still = hypot(*self._observed.body.velocity) < _HOVER_SPEED
         is_seen = silence < self.mission.settings.max_silence_outside
         hovers = is_still and is_seen and self.link.mode is Mode.HOLD
         self._hovering_since = min(self._hovering_since, self._now) if hovers else inf
-        if silence > _SILENCE:
+        if silence > _MAX_SILENCE:
             self._land("no news of the vehicle")
-        elif self._now - self._hovering_since > _HOVERING or self._is_down:
+        elif self._now - self._hovering_since > _HOVER_DWELL or self._is_down:
             self._land()
-        elif self._elapsed > _RECOVERY:
+        elif self._elapsed > _RECOVERY_TIMEOUT:
             self._land("the vehicle does not come to a hover")
 
     def _land(self, reason: str = "") -> None:
@@ -324,9 +324,9 @@ class Client:
             self._say("landed")
         elif not self._yields():
             self.link.set_mode(Mode.LAND)
-            if self._now - max(self.link.heard, self._began) > _SILENCE:
+            if self._now - max(self.link.heard, self._began) > _MAX_SILENCE:
                 self._lose("no news of the vehicle")
-            elif self._elapsed > _RECOVERY + height / _SLOWEST_DESCENT:
+            elif self._elapsed > _RECOVERY_TIMEOUT + height / _SLOWEST_DESCENT:
                 self._lose("the vehicle does not land as it is told")
 
     @property

@@ -19,7 +19,7 @@ from aerobat.errors import BackendMissing, SpecError
 from aerobat.links.clock import Clock
 
 _KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
-_PATIENCE = 1.0  # [s] of wall time, limit for reopening a broken link, and pause between attempts
+_REOPEN_TIMEOUT = 1.0  # [s] of wall time, limit for reopening a broken link, and pause between attempts
 
 MavlinkMessage: TypeAlias = Any  # of pymavlink's classes
 
@@ -127,7 +127,7 @@ class _PymavlinkConnection:
             # at most a thousand messages, so that other work is not delayed
             while len(messages) < 1000 and (message := self._link.recv_msg()) is not None:
                 messages.append(message)
-            self._let_go_of_client()
+            self._drop_closed_client()
         except OSError:
             self.close()
         return [message for message in messages if message.get_type() != "BAD_DATA"]
@@ -149,9 +149,9 @@ class _PymavlinkConnection:
 
     def _is_open(self) -> bool:
         """Return True for a working link; a broken link is reopened first, if the pause is over."""
-        if self._link is None and time.monotonic() - self._broke > _PATIENCE:
+        if self._link is None and time.monotonic() - self._broke > _REOPEN_TIMEOUT:
             patience = socket.getdefaulttimeout()
-            socket.setdefaulttimeout(_PATIENCE)
+            socket.setdefaulttimeout(_REOPEN_TIMEOUT)
             try:
                 self._open()
             except OSError:
@@ -164,7 +164,7 @@ class _PymavlinkConnection:
         self._link = self._open_link()
         self._link.handle_eof = self._link.handle_disconnect = _end_of_link  # of TCP
 
-    def _let_go_of_client(self) -> None:
+    def _drop_closed_client(self) -> None:
         """Close the connection of a client that has hung up, so that a TCP server accepts the next one."""
         port = getattr(self._link, "listen", None) and self._link.port
         if port:

@@ -32,7 +32,7 @@ class Dialect:
     silence: str  # the parameter of the time [s] after which a silent client counts as lost
     states: Mapping[str, int]  # messages to request, and their interval in states
     settings: Mapping[str, RequiredBits]  # parameters that must have certain bits
-    leads_off: bool  # whether set-points lift it off the ground; else a take-off order does
+    offboard_takeoff: bool  # whether set-points lift it off the ground; else a take-off order does
     refused: int  # MAV_RESULT of a refused order
     refusal: str  # beginning of its sentences on a refused arming
 
@@ -55,7 +55,7 @@ PX4 = Dialect(
     silence="COM_OF_LOSS_T",
     states={"ODOMETRY": 1},
     settings={},
-    leads_off=True,
+    offboard_takeoff=True,
     refused=2,  # denied
     refusal="Arming denied",
 )
@@ -73,7 +73,7 @@ ARDUPILOT = Dialect(
             1, 0, "thrust is changed with the tilt, and none is left upside down"
         ),
     },
-    leads_off=False,
+    offboard_takeoff=False,
     refused=4,  # failed
     refusal="Arm",
 )

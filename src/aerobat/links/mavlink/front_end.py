@@ -226,7 +226,7 @@ class FrontEnd:
 
     def _arm(self) -> bool:
         """Arm; if that is impossible, send the reason and return False."""
-        if not self.dialect.leads_off and not self._guided:
+        if not self.dialect.offboard_takeoff and not self._guided:
             reason = f"{self._mode.name} mode not armable"
         elif self.vehicle.arm():
             return True
@@ -240,19 +240,21 @@ class FrontEnd:
             Mode.TAKEOFF: self._take_off,
             Mode.HOLD: self.vehicle.hold,
             Mode.LAND: self.vehicle.land,
-            Mode.OFFBOARD: self.vehicle.go_offboard if self.dialect.leads_off else self.vehicle.hold,
+            Mode.OFFBOARD: self.vehicle.go_offboard if self.dialect.offboard_takeoff else self.vehicle.hold,
         }
         wanted = next((mode for mode, numbers in self.dialect.modes.items() if numbers == (main, sub)), None)
         if wanted is None or not ((wanted is Mode.OFFBOARD and self._guided) or orders[wanted]()):
             return False
-        self._guided = wanted is Mode.OFFBOARD and not self.dialect.leads_off
+        self._guided = wanted is Mode.OFFBOARD and not self.dialect.offboard_takeoff
         return True
 
     def _take_off(self, height: float = 0.0) -> bool:
         """Take off: PX4 by the height of its own parameter, others by the order's height [m] if guided."""
-        if self.dialect.leads_off:
+        if self.dialect.offboard_takeoff:
             height = self.parameters[_TAKEOFF_HEIGHT]
-        return height > 0.0 and (self.dialect.leads_off or self._guided) and self.vehicle.take_off(height)
+        return (
+            height > 0.0 and (self.dialect.offboard_takeoff or self._guided) and self.vehicle.take_off(height)
+        )
 
     def _reposition(self, place: tuple[float, float, float], yaw: float) -> bool:
         latitude, longitude, altitude = place

@@ -31,7 +31,7 @@ SERVICES = {
     "start_trajectory": "crazyflie_interfaces/srv/StartTrajectory",
     "notify_setpoints_stop": "crazyflie_interfaces/srv/NotifySetpointsStop",
 }
-_SHORTEST = 0.5  # [s] shortest duration of a route
+_MIN_DURATION = 0.5  # [s] shortest duration of a route
 _TRAJECTORY = 1  # number of the uploaded trajectory
 
 
@@ -62,7 +62,7 @@ class Crazyflie:
         own = tick.flown is not None and tick.flown.pieces is not None
         if tick.route is None and tick.doing is Doing.NOTHING:
             if enters and self._streams:  # in the air: the firmware stops rotors when full states end
-                self._order("go_to", relative=True, duration=self._duration(_SHORTEST))
+                self._order("go_to", relative=True, duration=self._duration(_MIN_DURATION))
         elif tick.route is not None and tick.doing is not Doing.BRAKING:
             if enters:
                 self._go(tick)
@@ -81,7 +81,7 @@ class Crazyflie:
         """Order the route that begins."""
         assert tick.route is not None, "it is on a route"
         end, remaining = tick.route.end, tick.route.began + tick.route.path.duration - tick.now
-        duration = self._duration(max(remaining, _SHORTEST))
+        duration = self._duration(max(remaining, _MIN_DURATION))
         if tick.doing is Doing.CLIMBING:
             self._order("takeoff", height=float(end[2]), duration=duration)
         elif tick.doing is Doing.LANDING:

@@ -18,9 +18,9 @@ Answer: TypeAlias = Callable[[bool, str], None]  # arguments: success, and a sen
 QUEUE = 1000  # messages that may wait for a slow receiver: ten seconds of goals
 NEWEST = 5  # messages that may wait if only the newest matter
 
-_PATIENCE = 5.0  # [s] of wall time, longest wait of a clock
-_FIRST_TIME = 20.0  # [s] of wall time, longest wait for simulated time to begin
-_TOLD_AGAIN = 0.1  # [s] of wall time, after which a waiting clock sends its time again
+_WAIT_TIMEOUT = 5.0  # [s] of wall time, longest wait of a clock
+_START_TIMEOUT = 20.0  # [s] of wall time, longest wait for simulated time to begin
+_RESEND_INTERVAL = 0.1  # [s] of wall time, after which a waiting clock sends its time again
 _MAX_STEP = 0.01  # [s] largest step of a waiting clock between two reads, delays of its own process included
 _MAX_WAIT, _MIN_WAIT = 0.005, 0.0002  # [s] between reads of a clock that may not run at wall time
 
@@ -45,30 +45,30 @@ class PacedClock:
     """
 
     def __init__(self, speed: float) -> None:
-        self.tell_again: Callable[[], None] = lambda: None  # sends the last time to other nodes
+        self.resend: Callable[[], None] = lambda: None  # sends the last time to other nodes
         self._speed = speed
         self._began = time.time_ns()
         self._elapsed = 0.0  # [ns] of this clock
-        self._looked = self._asked = self._told = time.monotonic()
+        self._last_read = self._wait_began = self._last_sent = time.monotonic()
         self._end = inf  # [ns] value of `_elapsed` at which the clock waits
 
     def time(self) -> int:
         """Return the time [ns]."""
         wall = time.monotonic()
-        passed = min(self._speed * (wall - self._looked), _MAX_STEP)
+        passed = min(self._speed * (wall - self._last_read), _MAX_STEP)
         further = self._elapsed + NANOSECONDS * passed
-        waits = wall - self._asked < _PATIENCE
+        waits = wall - self._wait_began < _WAIT_TIMEOUT
         self._elapsed = min(further, max(self._end, self._elapsed)) if waits else further
-        self._looked = wall
-        if self._elapsed < further and wall - self._told > _TOLD_AGAIN:
-            self._told = wall
-            self.tell_again()
+        self._last_read = wall
+        if self._elapsed < further and wall - self._last_sent > _RESEND_INTERVAL:
+            self._last_sent = wall
+            self.resend()
         return self._began + round(self._elapsed)
 
     def wait_at(self, instant: int) -> None:
-        """Stop the clock at a time [ns] until the next call, or for _PATIENCE at most."""
+        """Stop the clock at a time [ns] until the next call, or for _WAIT_TIMEOUT at most."""
         self.time()
-        self._end, self._asked = float(instant - self._began), self._looked
+        self._end, self._wait_began = float(instant - self._began), self._last_read
 
 
 class Middleware(Protocol):
@@ -98,14 +98,14 @@ class Middleware(Protocol):
 
 def require_time(clock: Callable[[], int]) -> None:
     """Wait for simulated time to begin. Raises SpecError where no node publishes it."""
-    end = time.monotonic() + _FIRST_TIME
+    end = time.monotonic() + _START_TIMEOUT
     while clock() == 0:
         if time.monotonic() > end:
             raise SpecError("ROS time is simulated, but nobody tells it on /clock; start the simulator first")
         time.sleep(_MAX_WAIT)
 
 
-class Calls:
+class CallQueue:
     """Calls requested by threads of ROS and executed by the thread that runs `work_until`."""
 
     def __init__(self) -> None:

@@ -13,7 +13,7 @@ from aerobat.links.ros.middleware import (
     NEWEST,
     QUEUE,
     Answer,
-    Calls,
+    CallQueue,
     PacedClock,
     interface_class,
     require_time,
@@ -43,7 +43,7 @@ class RclpyMiddleware:
         # message
         self._waiting = rclpy.create_node(f"{name}_services")
         self._clock = clock
-        self._calls = Calls()
+        self._calls = CallQueue()
         self._services = ReentrantCallbackGroup()
         # at most four services wait for their answers, each in a thread
         self._executors = SingleThreadedExecutor(), MultiThreadedExecutor(4)

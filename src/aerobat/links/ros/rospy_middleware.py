@@ -12,7 +12,7 @@ from aerobat.links.ros.middleware import (
     NEWEST,
     QUEUE,
     Answer,
-    Calls,
+    CallQueue,
     PacedClock,
     interface_class,
     require_time,
@@ -40,7 +40,7 @@ class RospyMiddleware:
             raise SpecError(f"no ROS master answers at {rosgraph.get_master_uri()}; start roscore first")
         rospy.init_node(name, disable_signals=True)
         self._clock = clock
-        self._calls = Calls()
+        self._calls = CallQueue()
         if clock is not None:
             rospy.set_param(_SIM_TIME, True)
         require_time(self.time)

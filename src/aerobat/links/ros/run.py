@@ -15,8 +15,8 @@ RVIZ = {
     "RospyMiddleware": f"rviz -d {_FOLDER / 'ros1.rviz'}",
     "RclpyMiddleware": f"rviz2 -d {_FOLDER / 'ros2.rviz'}",
 }
-_MADE_UP_FOR = 5  # largest number of missed ticks that are made up for at once
-_CATCHING_UP = 0.005  # [s] after more, for processing messages that a tick would count as lost;
+_MAX_MISSED_TICKS = 5  # largest number of missed ticks that are made up for at once
+_CATCH_UP_TIME = 0.005  # [s] after more, for processing messages that a tick would count as lost;
 # limited by wall time too, since a clock may stand still until this node goes on
 
 
@@ -43,8 +43,8 @@ def run(node: Node, ros: Middleware, rate: float, seconds: float = inf) -> None:
         ros.work_until(node.origin + tick * period)
         node.tick(tick * period / NANOSECONDS)
         present = (ros.time() - node.origin) // period
-        if present - tick > _MADE_UP_FOR:
-            ros.work_until(ros.time() + round(_CATCHING_UP * NANOSECONDS), _CATCHING_UP)
+        if present - tick > _MAX_MISSED_TICKS:
+            ros.work_until(ros.time() + round(_CATCH_UP_TIME * NANOSECONDS), _CATCH_UP_TIME)
             tick = present
         else:
             tick += 1

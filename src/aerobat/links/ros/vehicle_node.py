@@ -12,11 +12,11 @@ from aerobat.links.goals import Mode, PathGoal
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Middleware, PacedClock
 
-_NEAR = 0.5  # [m] largest distance of the first goal from the vehicle
-_SLOW = 1.0  # [m/s] largest difference of velocity of the first goal from the vehicle
-_LIFT = 0.01  # [m] height of a goal above the ground that means take-off
+_MAX_GOAL_DISTANCE = 0.5  # [m] largest distance of the first goal from the vehicle
+_MAX_VELOCITY_ERROR = 1.0  # [m/s] largest difference of velocity of the first goal from the vehicle
+_TAKEOFF_THRESHOLD = 0.01  # [m] height of a goal above the ground that means take-off
 _OVERLAP = 0.004  # [s] of a tick, added to the time at which the clock waits for the next goal
-_STALE = 0.5  # [s] age from which a goal is rejected
+_MAX_GOAL_AGE = 0.5  # [s] age from which a goal is rejected
 
 
 class VehicleNode:
@@ -58,7 +58,7 @@ class VehicleNode:
         self._published = self.origin  # [ns] the last published time
         if clock is not None:
             self._send_clock = ros.publisher(topics.CLOCK, topics.KIND_OF_CLOCK)
-            clock.tell_again = self._tell_time
+            clock.resend = self._tell_time
         self._refused = ""  # the last reason, so that it is reported once
         ros.subscribe(goal, topics.KIND_OF_GOAL, self._take_goal)
 
@@ -92,7 +92,7 @@ class VehicleNode:
             self._clock.wait_at(self._stamp(piece.stamp + piece.duration + self._period + _OVERLAP))
         # until then the previous goal holds: goals delayed by a pause of this process each get their time
         self.vehicle.advance(min(piece.stamp, (self._ros.time() - self.origin) / NANOSECONDS))
-        if self.vehicle.time - piece.stamp > _STALE:
+        if self.vehicle.time - piece.stamp > _MAX_GOAL_AGE:
             self._refuse("a goal is from long ago by its stamp; set the clocks alike")
         elif self.vehicle.mode is Mode.OFFBOARD:
             self.vehicle.follow_path(piece)
@@ -110,11 +110,11 @@ class VehicleNode:
     def _begins_here(self, goal: PathGoal) -> bool:
         """Return True for a goal with which a vehicle may begin to follow."""
         state = self.vehicle.state
-        if self.vehicle.landed and goal.position[2] < _LIFT:
+        if self.vehicle.landed and goal.position[2] < _TAKEOFF_THRESHOLD:
             return False
         off = float(np.linalg.norm(goal.position - state.position))
         speed = float(np.linalg.norm(goal.velocity - state.velocity))
-        if off > _NEAR or speed > _SLOW:
+        if off > _MAX_GOAL_DISTANCE or speed > _MAX_VELOCITY_ERROR:
             self._refuse(f"a goal is {off:.1f} m and {speed:.1f} m/s off; goals begin where the vehicle is")
             return False
         return not self.vehicle.crashed
