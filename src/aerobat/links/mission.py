@@ -114,14 +114,14 @@ class Mission(Generic[GoalT_co]):
         above = np.array([here[0], here[1], max(self._start[2], here[2] + _CLIMB)])
         limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
         self._routes = [rest_to_rest(here, above, *limits), rest_to_rest(above, self._start, *limits)]
-        self._turn = self._turn_from(observed)
+        self._turn = self._yaw_and_turn(observed)
         self._enter(Phase.CLIMB, now)
 
     def join(self, now: float, observed: Observed) -> None:
         """Fly to the plan's start from the hover that `observed` is."""
         limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
         self._routes = [rest_to_rest(np.array(observed.body.position), self._start, *limits)]
-        self._turn = self._turn_from(observed)
+        self._turn = self._yaw_and_turn(observed)
         self._enter(Phase.APPROACH, now)
 
     def step(
@@ -138,9 +138,9 @@ class Mission(Generic[GoalT_co]):
         self._watch(now, observed, late)
         self._last_tick = now
         if self.phase is Phase.CLIMB:
-            return self._along(now, Phase.APPROACH)
+            return self._route_goal(now, Phase.APPROACH)
         if self.phase is Phase.APPROACH:
-            return self._along(now, Phase.SETTLE)
+            return self._route_goal(now, Phase.SETTLE)
         if self.phase is Phase.SETTLE:
             self._settle(now, observed)
         if self.phase is Phase.MANEUVER:
@@ -165,7 +165,7 @@ class Mission(Generic[GoalT_co]):
         expected = self.stream.flat(observed.time - self.maneuver_began).position
         return float(np.linalg.norm(np.array(observed.body.position) - expected))
 
-    def _turn_from(self, observed: Observed) -> tuple[float, float]:
+    def _yaw_and_turn(self, observed: Observed) -> tuple[float, float]:
         """Return the yaw of a vehicle [rad], and the turn to the plan's heading [rad]."""
         yaw = yaw_of(observed.body.q_world_body)
         return yaw, (self._heading - yaw + pi) % (2 * pi) - pi
@@ -190,7 +190,7 @@ class Mission(Generic[GoalT_co]):
         elif flying and (error := self.error(observed)) > self.settings.max_error:
             self.abort(now, f"the vehicle is {length(error)} off its path")
 
-    def _along(self, now: float, following: Phase) -> PositionGoal:
+    def _route_goal(self, now: float, following: Phase) -> PositionGoal:
         """Return the goal on the present route, and enter the next phase at its end."""
         route = self._routes[0]
         since = min(now - self.began, route.duration)

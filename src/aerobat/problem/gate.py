@@ -101,7 +101,7 @@ class Gate:
         if "diameter" in table:
             if "radius" in table:
                 raise FieldError("diameter", "stands beside radius; give one or the other")
-            table["radius"] = _half(table.pop("diameter"))
+            table["radius"] = _radius_of(table.pop("diameter"))
         angles = {key: table.pop(key) for key in cls.ANGLES if key in table}
         if "normal" not in table and "up" not in table:
             attitude = [radians(number(angles.get(key, 0.0), key)) for key in cls.ANGLES]
@@ -319,7 +319,7 @@ def _around(gate: Gate, wall: Wall, name: str, heights: Array) -> tuple[ConvexPi
     )
 
 
-def _half(diameter: Any) -> float:
+def _radius_of(diameter: Any) -> float:
     """Return the radius for a diameter [m]. Raises FieldError for an invalid diameter."""
     whole = number(diameter, "diameter")
     if whole <= 0.0:

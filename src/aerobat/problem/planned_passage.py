@@ -29,7 +29,7 @@ class PlannedPassage:
     @classmethod
     def of(cls, stage: Stage, gate: Gate, time: float) -> PlannedPassage:
         """Return the passage that a stage of `Problem.stages` requires, placed at a time [s]."""
-        min_speed = 0.0 if any(_keeps_from(gate, each) for each in stage.conditions) else CROSSING_SPEED
+        min_speed = 0.0 if any(_forbids_passage(gate, each) for each in stage.conditions) else CROSSING_SPEED
         up, tolerance = gate.up, np.inf
         if stage.attitude is not None:
             up, tolerance = stage.attitude.up, gate.attitude_tolerance
@@ -46,7 +46,7 @@ class PlannedWaypoint:
     lap: Count = 1  # of a course
 
 
-def _keeps_from(gate: Gate, condition: Condition) -> bool:
+def _forbids_passage(gate: Gate, condition: Condition) -> bool:
     """Return True if a condition forbids motion in the gate's direction."""
     along = float(condition.direction @ gate.normal)
     forward = condition.upper if along > 0 else -condition.lower

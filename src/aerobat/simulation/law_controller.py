@@ -61,7 +61,7 @@ class LawController(Component):
         with _compiled(ops, self.law.init):
             own = self.law.init(ops, parameters.model, Seen(body, first.thrusts, reference))
         if any(isinstance(leaf, str) for leaf in tree_leaves(own)):
-            raise _wrong(self.law.init, f"returned {shown(own)}, not a tree of tuples of numbers")
+            raise _law_error(self.law.init, f"returned {shown(own)}, not a tree of tuples of numbers")
         return LawState(own, first.thrusts, first.commands)
 
     def step(
@@ -83,7 +83,7 @@ class LawController(Component):
             answer: Any = self.law.step(ops, model, state.own, Seen(body, thrusts, reference), elapsed)
         own, load = self._checked(answer)
         if len(tree_leaves(own)) != len(tree_leaves(state.own)):
-            raise _wrong(self.law.step, f"returned the state {shown(own)}, of another shape than before")
+            raise _law_error(self.law.step, f"returned the state {shown(own)}, of another shape than before")
         mass_properties = model.airframe.mass_properties
         _, change = moment_and_change(mass_properties.inertia, axes(body.q_world_body), reference)
         loads = load, RotorWrench(mass_properties.mass * reference.ahead.thrust_change, change)
@@ -97,7 +97,7 @@ class LawController(Component):
                 hasattr(each, "__truediv__") for each in (thrust, x, y, z)
             ):
                 return own, RotorWrench(thrust, (x, y, z))
-        raise _wrong(
+        raise _law_error(
             self.law.step, f"returned {shown(answer)}, not the state and a RotorWrench of four numbers"
         )
 
@@ -111,7 +111,7 @@ def _compiled(ops: Ops, method: Any) -> Iterator[None]:
         lines = [frame for frame in extract_tb(error.__traceback__) if frame.filename == getfile(method)]
         if ops is FloatOps or not lines:
             raise
-        complaint = _complaint(
+        complaint = _law_message(
             method,
             f"cannot be compiled for `{lines[-1].line}`; write this line in + - * /, comparisons and ops "
             "(ops.select for if, ops.maximum(x, -x) for abs), or fly the law by the engine floats "
@@ -120,16 +120,16 @@ def _compiled(ops: Ops, method: Any) -> Iterator[None]:
         raise SpecError(f"{lines[-1].filename}:{lines[-1].lineno}: {complaint}") from error
 
 
-def _wrong(method: Any, complaint: str) -> SpecError:
+def _law_error(method: Any, complaint: str) -> SpecError:
     """Return the error of a law's method, with its file and line."""
-    return placed(SpecError(_complaint(method, complaint)), method)
+    return placed(SpecError(_law_message(method, complaint)), method)
 
 
-def _complaint(method: Any, complaint: str) -> str:
+def _law_message(method: Any, complaint: str) -> str:
     return f"controller '{method.__self__.kind}': {method.__name__}() {complaint}"
 
 
-def flown_by(law: ControlLaw | None, settings: Controller) -> Component:
+def controller_component(law: ControlLaw | None, settings: Controller) -> Component:
     """Return the controller's component: of a control law, or the tracking controller.
 
     Args:

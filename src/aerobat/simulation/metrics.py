@@ -128,8 +128,8 @@ def metrics_of_log(flight: Flight, criteria: Criteria, body: Ellipsoid | None) -
         flying=float(flight.outcome is Outcome.COMPLETE),
         is_finite=float(flight.outcome is not Outcome.STATE_NOT_FINITE),
         stop=flight.series["ends"],
-        ground_time=_first(times, states.position[:, 2] < lowest),
-        off_path_time=_first(times, flight.position_error > criteria.path_radius),
+        ground_time=_first_time(times, states.position[:, 2] < lowest),
+        off_path_time=_first_time(times, flight.position_error > criteria.path_radius),
         ticks=float(len(times)),
         max_square=square.max(),
         sum_square=square.sum(),
@@ -155,6 +155,6 @@ def _ground(environment: Environment) -> Ground:
     return Ground(height - TOUCHDOWN, height - LANDING_DEPTH, LANDING_SPEED**2)
 
 
-def _first(times: Array, happens: NDArray[np.bool_]) -> float:
+def _first_time(times: Array, happens: NDArray[np.bool_]) -> float:
     """Return the first of the times at which something happens, infinite if it never does."""
     return float(times[int(np.argmax(happens))]) if happens.any() else inf

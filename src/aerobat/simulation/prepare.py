@@ -17,7 +17,7 @@ from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.components import ControllerParameters, StateObserver
 from aerobat.simulation.config import FlightChanges, FlightConfig
-from aerobat.simulation.law_controller import flown_by, inner_loop
+from aerobat.simulation.law_controller import controller_component, inner_loop
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, LoopPart, controller_model, plant_part
 from aerobat.states import BodyState
@@ -90,7 +90,7 @@ def setup_of(
         start=_start(config.start, reference, len(fleet)),
         parts=(
             LoopPart(StateObserver()),
-            LoopPart(flown_by(config.law, controller), ControllerParameters(model, ())),
+            LoopPart(controller_component(config.law, controller), ControllerParameters(model, ())),
             *inner_loop(config.law, model),
             plant_part(fleet, environment, config.rate),
         ),

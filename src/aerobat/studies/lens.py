@@ -85,7 +85,7 @@ class Lens:
         field contradicts the value.
         """
         if self._is_angle:
-            return _with(whole, PROBLEM, _tilted(_inner(whole, PROBLEM), value))  # type: ignore[no-any-return]
+            return _with_field(whole, PROBLEM, _tilted(_inner(whole, PROBLEM), value))  # type: ignore[no-any-return]
         try:
             return _changed(whole, self.keys, value)  # type: ignore[no-any-return]
         except FieldError as error:
@@ -256,10 +256,10 @@ def _changed(value: Any, keys: Sequence[Key], new: Any) -> Any:
     if isinstance(key, int):
         changed = [*value[:key], inner, *value[key + 1 :]]
         return np.array(changed) if isinstance(value, np.ndarray) else tuple(changed)
-    return _with(value, key, inner)
+    return _with_field(value, key, inner)
 
 
-def _with(value: Any, name: str, inner: Any) -> Any:
+def _with_field(value: Any, name: str, inner: Any) -> Any:
     """Return a copy of the declared value with one of its `_names` changed. Raises FieldError."""
     if name == THRUST_TO_WEIGHT:
         if inner <= 0:
@@ -276,7 +276,7 @@ def _with(value: Any, name: str, inner: Any) -> Any:
     if name not in table:
         name, inner = name.removesuffix(DEGREES), radians(inner)
         if isinstance(table[name], Heading) and table[name].mode is not HeadingMode.FREE:
-            inner = _with(table[name], "start", inner)
+            inner = _with_field(table[name], "start", inner)
     return from_table(type(value), table | {name: inner})
 
 
@@ -285,4 +285,4 @@ def _tilted(problem: Problem, angle: float) -> Problem:
     if not abs(angle) <= MAX_ANGLE:
         raise FieldError(ANGLE, f"must be from {-MAX_ANGLE:g} to {MAX_ANGLE:g} degrees, got {angle:g}")
     gates = problem.maneuver.with_gate_tilt(problem.gates, radians(angle))
-    return _with(problem, "gates", gates)  # type: ignore[no-any-return]
+    return _with_field(problem, "gates", gates)  # type: ignore[no-any-return]

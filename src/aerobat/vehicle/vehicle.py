@@ -240,7 +240,7 @@ class Vehicle:
         sizes = np.abs(allocation).max(axis=1, keepdims=True)  # rows have different units
         return int(np.linalg.matrix_rank(allocation / np.where(sizes > 0, sizes, 1.0)))
 
-    def _what_is_not_controlled(self) -> str:
+    def _control_complaint(self) -> str:
         """Return the message for rotors that cannot control thrust, roll, pitch and yaw independently."""
         must = "must give thrust, roll, pitch and yaw independently"
         axes = {"roll": self.allocation[1], "pitch": self.allocation[2]}
@@ -265,7 +265,7 @@ class Vehicle:
         limits = self.min_thrusts, self.max_thrusts
         rank = self._rank()
         if rank < 4 and not self.dead_rotors:
-            raise FieldError("rotors", self._what_is_not_controlled())
+            raise FieldError("rotors", self._control_complaint())
         if rank < 4 or overloaded(self.mixer[:, 0], *limits).any():
             raise FieldError("rotors", why_no_hover(self.allocation, *limits))
 

@@ -155,7 +155,7 @@ class Firmware:
             self._serial = self._connected()
         self._serial.sendall(data)
         answer = b""
-        for _ in _looks():
+        for _ in _polls():
             self.step(_STEP)
             try:
                 answer += self._serial.recv(4096)
@@ -166,7 +166,7 @@ class Firmware:
         raise FirmwareEnded("autopilot: Betaflight does not answer on its serial line; run it again")
 
     def _connected(self) -> socket.socket:
-        for _ in _looks():
+        for _ in _polls():
             self.step(_STEP)
             try:
                 line = socket.create_connection(("127.0.0.1", self._port), 1.0)
@@ -194,7 +194,7 @@ class Firmware:
         assert self._serial is not None, "it was spoken to"
         self._serial.sendall(b"save\n")
         try:
-            for _ in _looks():
+            for _ in _polls():
                 self.step(_STEP)
                 time.sleep(_POLL_TIMEOUT)
         except FirmwareEnded:
@@ -219,7 +219,7 @@ class Firmware:
         self._folder.cleanup()
 
 
-def _looks() -> Iterator[None]:
+def _polls() -> Iterator[None]:
     """Yield until the time limit for an answer is over."""
     last = time.monotonic() + _ANSWER_TIMEOUT
     while time.monotonic() < last:

@@ -84,10 +84,10 @@ class AutopilotLink:
             take = getattr(self, f"_take_{message.get_type().lower()}", None)
             if take is not None:
                 take(message)
-        if self._again("heartbeat", 0.5):
+        if self._is_due("heartbeat", 0.5):
             self._send("heartbeat", 18, _GROUND_STATION, 0, 0, 4, 3)
         if self.is_known:
-            if self._again("time", 0.1):
+            if self._is_due("time", 0.1):
                 self._ask_time()
             if self.observed is None or now - self.observed.time > 1.0:
                 for name, every in self.dialect.states.items():
@@ -96,7 +96,7 @@ class AutopilotLink:
 
     def ask_parameter(self, name: str) -> None:
         """Request a parameter, repeatedly until it is received."""
-        if name not in self.parameters and self._again(name):
+        if name not in self.parameters and self._is_due(name):
             self._send("param_request_read", self._system, _AUTOPILOT, name.encode(), -1)
 
     def set_mode(self, mode: Mode) -> None:
@@ -115,7 +115,7 @@ class AutopilotLink:
 
     def command(self, number: int, *parameters: float) -> None:
         """Send an order, unless the same order was sent just now."""
-        if self._again((number, parameters)):
+        if self._is_due((number, parameters)):
             padded = (*parameters, *(0.0,) * (7 - len(parameters)))
             self._send("command_long", self._system, _AUTOPILOT, number, 0, *padded)
 
@@ -153,7 +153,7 @@ class AutopilotLink:
                 self._system, self.dialect = system, dialect_of(message.autopilot)
         return system == self._system
 
-    def _again(self, order: object, every: float = 0.3) -> bool:
+    def _is_due(self, order: object, every: float = 0.3) -> bool:
         """Return True if an order was not sent for `every` [s]; the order then counts as sent now."""
         if self._now - self._sent.get(order, -inf) < every - 1e-9:
             return False
@@ -214,17 +214,17 @@ class AutopilotLink:
                 return []
             state = _of_position(message, self._attitude, age, offset)
         if state is None:
-            self._leave_out("not finite, or their attitude is no unit quaternion")
+            self._report_ignored("not finite, or their attitude is no unit quaternion")
             return []
         if state.time > self._now + self.delay + _MAX_AHEAD:
-            self._leave_out("stamped later than now")
+            self._report_ignored("stamped later than now")
             return []
         if self.observed is not None and state.time <= self.observed.time:
             return []  # a late message, or a copy
         self.observed = state
         return [state]
 
-    def _leave_out(self, reason: str) -> None:
+    def _report_ignored(self, reason: str) -> None:
         """Report once that states of a kind are ignored."""
         if reason not in self._left_out:
             self._left_out.add(reason)

@@ -250,7 +250,7 @@ class Client:
             self._enter(ClientStage.FLYING)
         elif self._elapsed > _ORDER_TIMEOUT:
             self._refuse("take off")
-        elif not self._yields():
+        elif not self._yields_to_pilot():
             self.link.take_off(_TAKEOFF_HEIGHT)
 
     def _refuse(self, what: str, lands: bool = True) -> None:
@@ -292,7 +292,7 @@ class Client:
 
     def _while_recovering(self) -> None:
         """Order a hover; once the vehicle has hovered for a while, or is not seen to, order it to land."""
-        if self._yields():
+        if self._yields_to_pilot():
             return
         self.link.set_mode(Mode.HOLD)
         silence = self._now - self._observed.time
@@ -322,7 +322,7 @@ class Client:
         if self._is_down:
             self._enter(ClientStage.LANDED)
             self._say("landed")
-        elif not self._yields():
+        elif not self._yields_to_pilot():
             self.link.set_mode(Mode.LAND)
             if self._now - max(self.link.heard, self._began) > _MAX_SILENCE:
                 self._lose("no news of the vehicle")
@@ -334,7 +334,7 @@ class Client:
         """True for a vehicle that reports, after the last order, that it is landed and disarmed."""
         return bool(self.link.landed) and not self.link.armed and self.link.beat > self._began
 
-    def _yields(self) -> bool:
+    def _yields_to_pilot(self) -> bool:
         """Return True where a pilot has taken over; the vehicle is then left to the pilot."""
         if self.link.mode is not None:
             return False

@@ -183,29 +183,29 @@ class FrontEnd:
             self._send("timesync", round(1e9 * (self.vehicle.time - self._began)), message.ts1)
 
     def _take_param_request_read(self, message: MavlinkMessage) -> None:
-        self._give_parameter(str(message.param_id))
+        self._send_parameter(str(message.param_id))
 
     def _take_param_request_list(self, message: MavlinkMessage) -> None:
         for name in self.parameters:
-            self._give_parameter(name)
+            self._send_parameter(name)
 
     def _take_param_set(self, message: MavlinkMessage) -> None:
         if message.param_id == _TAKEOFF_HEIGHT and 0.5 <= message.param_value <= 100.0:
             self.parameters[message.param_id] = float(message.param_value)
-        self._give_parameter(str(message.param_id))
+        self._send_parameter(str(message.param_id))
 
-    def _give_parameter(self, name: str) -> None:
+    def _send_parameter(self, name: str) -> None:
         if name in self.parameters:
             index = list(self.parameters).index(name)
             self._send("param_value", name.encode(), self.parameters[name], 9, len(self.parameters), index)
 
     def _take_command_long(self, message: MavlinkMessage) -> None:
-        self._obey(message, (1e7 * message.param5, 1e7 * message.param6, message.param7))
+        self._execute(message, (1e7 * message.param5, 1e7 * message.param6, message.param7))
 
     def _take_command_int(self, message: MavlinkMessage) -> None:
-        self._obey(message, (message.x, message.y, message.z))
+        self._execute(message, (message.x, message.y, message.z))
 
-    def _obey(self, message: MavlinkMessage, place: tuple[float, float, float]) -> None:
+    def _execute(self, message: MavlinkMessage, place: tuple[float, float, float]) -> None:
         """Execute a command and acknowledge it: accepted, denied, or unknown.
 
         `place`: latitude and longitude [1e-7 °] and altitude [m].
@@ -217,7 +217,7 @@ class FrontEnd:
             21: self.vehicle.land,
             192: lambda: self._reposition(place, message.param4),
             511: lambda: self._set_interval(_whole(message.param1), message.param2),
-            512: lambda: self._give_message(_whole(message.param1)),
+            512: lambda: self._send_requested(_whole(message.param1)),
         }
         act = known.get(message.command)
         result = 3 if act is None else 0 if act() else self.dialect.refused  # unsupported, accepted
@@ -272,7 +272,7 @@ class FrontEnd:
         self._due[identity] = self.vehicle.time if microseconds >= 0 else nan
         return True
 
-    def _give_message(self, identity: int) -> bool:
+    def _send_requested(self, identity: int) -> bool:
         if identity == message_class("autopilot_version").id:
             capabilities = 64 | 128 | 8192 | 16384  # set-points in three ways, MAVLink 2
             none = (0,) * 8

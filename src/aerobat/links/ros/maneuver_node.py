@@ -119,7 +119,7 @@ class ManeuverNode:
             piece = PathPiece(before, goal, stamp, now + self._period - stamp)
         self._take(self._due(piece, now))
         self._last = None if goal is None else (now + self._period, goal)
-        self._follow_up()
+        self._publish_report()
 
     def _due(self, piece: PathPiece | None, now: float) -> Tick:
         commander, mission = self.commander, self.commander.mission
@@ -141,7 +141,7 @@ class ManeuverNode:
         if tick.piece is not None:
             publish(topics.goal_message(self._messages, tick.piece, tick.stamp, self.settings.with_jerk))
 
-    def _follow_up(self) -> None:
+    def _publish_report(self) -> None:
         """Have a maneuver judged once it has ended, and publish the report."""
         if self._flown is not None and self.commander.doing is not Doing.MANEUVERING:
             commander = self.commander
@@ -167,13 +167,13 @@ class ManeuverNode:
         """Process a state, unless it is implausible."""
         observed = topics.read_odometry(message, self.origin)
         if observed is None:
-            self._leave_out("is not finite, or its attitude no unit quaternion; see to the estimator")
+            self._report_ignored("is not finite, or its attitude no unit quaternion; see to the estimator")
         elif observed.time > (self._ros.time() - self.origin) / NANOSECONDS + _MAX_AHEAD:
-            self._leave_out("is stamped later than now; set the clocks alike")
+            self._report_ignored("is stamped later than now; set the clocks alike")
         else:
             self.commander.observe(observed)
 
-    def _leave_out(self, reason: str) -> None:
+    def _report_ignored(self, reason: str) -> None:
         """Report once that odometry of a kind is ignored."""
         if reason not in self._left_out:
             self._left_out.add(reason)
@@ -227,12 +227,12 @@ class ManeuverNode:
         except SpecError as error:
             answer(False, str(error))
             return
-        self._show(planned)
+        self._publish_markers(planned)
         self._flown = planned
         self._say(planned.announcement)
         answer(True, planned.announcement)
 
-    def _show(self, planned: Prepared) -> None:
+    def _publish_markers(self, planned: Prepared) -> None:
         """Publish markers of the path, its gates and the vehicle along it, in place of earlier markers."""
         stamp = self.origin + round(self._now * NANOSECONDS)
         shown = PlanMessages(self._messages, planned.plan, stamp, planned.offset)

@@ -58,7 +58,7 @@ class VehicleNode:
         self._published = self.origin  # [ns] the last published time
         if clock is not None:
             self._send_clock = ros.publisher(topics.CLOCK, topics.KIND_OF_CLOCK)
-            clock.resend = self._tell_time
+            clock.resend = self._publish_time
         self._refused = ""  # the last reason, so that it is reported once
         ros.subscribe(goal, topics.KIND_OF_GOAL, self._take_goal)
 
@@ -74,9 +74,9 @@ class VehicleNode:
             self._due = max(self._due + self._period, now)
             if self._clock is not None:
                 self._published = self._stamp(now)
-                self._tell_time()
+                self._publish_time()
 
-    def _tell_time(self) -> None:
+    def _publish_time(self) -> None:
         time = self._messages.time("Time", self._published)
         self._send_clock(self._messages.make(topics.KIND_OF_CLOCK, clock=time))
 

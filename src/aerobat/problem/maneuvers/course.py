@@ -89,17 +89,17 @@ class Course(Maneuver):
         """Return the gates for an element: those that it names, or all where it is the only element."""
         if len(self.elements) == 1:
             return gates
-        return tuple(named_gate(gates, name) for name in dict.fromkeys(_gates_of(element)))
+        return tuple(named_gate(gates, name) for name in dict.fromkeys(_gate_names(element)))
 
 
-def _gates_of(element: Maneuver | Stage) -> Iterator[str]:
+def _gate_names(element: Maneuver | Stage) -> Iterator[str]:
     """Yield the names of the gates that an element names, itself or in elements or stages of its own."""
     name = getattr(element, "gate", None)
     if name is not None:
         yield name
     if isinstance(element, Course | CustomManeuver):
         for part in element.elements if isinstance(element, Course) else element.stages:
-            yield from _gates_of(part)
+            yield from _gate_names(part)
 
 
 def _named(stages: Sequence[Stage]) -> Iterator[Stage]:

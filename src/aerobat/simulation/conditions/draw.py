@@ -173,7 +173,7 @@ def dispersed_fleet(nominal: Vehicle, draws: Draws) -> Fleet:
     one, shape = Fleet.of([nominal]), (len(draws),)
     drag = draws.columns["drag"] * nominal.mass
 
-    def alike(array: Array) -> Array:
+    def repeated(array: Array) -> Array:
         return np.broadcast_to(array[0], shape + array.shape[1:]).copy()
 
     return Fleet(
@@ -181,12 +181,12 @@ def dispersed_fleet(nominal: Vehicle, draws: Draws) -> Fleet:
         mass=draws.columns["mass"] * nominal.mass,
         inertia=draws.columns["inertia"][:, None, None] * nominal.inertia,
         drag_body=nominal.drag_body + drag[:, None],
-        rotor_positions=alike(one.rotor_positions),
-        spins=alike(one.spins),
-        min_thrusts=alike(one.min_thrusts),
-        max_thrusts=alike(one.max_thrusts),
-        torque_coefficients=alike(one.torque_coefficients),
+        rotor_positions=repeated(one.rotor_positions),
+        spins=repeated(one.spins),
+        min_thrusts=repeated(one.min_thrusts),
+        max_thrusts=repeated(one.max_thrusts),
+        torque_coefficients=repeated(one.torque_coefficients),
         lags=draws.columns["lags"] * one.lags,
-        body_centres=alike(one.body_centres),
-        semi_axes=alike(one.semi_axes),
+        body_centres=repeated(one.body_centres),
+        semi_axes=repeated(one.semi_axes),
     )

@@ -22,7 +22,7 @@ from aerobat.simulation.conditions.observer import (
 from aerobat.simulation.conditions.parts import TICK_TOLERANCE, DispersedFlights, condition_parts, whole_ticks
 from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig
-from aerobat.simulation.law_controller import flown_by, inner_loop
+from aerobat.simulation.law_controller import controller_component, inner_loop
 from aerobat.simulation.loop import due_ticks
 from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import FlightSetup, LoopPart, controller_model, plant_part
@@ -151,7 +151,7 @@ def _controller(
             flights.trajectory, nominal, environment, rate, every=period, delay=delay / rate
         ).chunk
     parameters = ControllerParameters(model, delay / rate if delay else ())
-    controller = LoopPart(flown_by(config.law, settings), parameters, source, period)
+    controller = LoopPart(controller_component(config.law, settings), parameters, source, period)
     takes_effect = partial(due_ticks, period, delay=delay)
     waiting = (LoopPart(ComputationDelay(), (), takes_effect),) if delay else ()
     return (*observer, controller, *waiting, *inner_loop(config.law, model))

@@ -126,20 +126,20 @@ class _NearestSearch:
 
     def found(self) -> tuple[Indices, Array, Indices]:
         """Return each flight's nearest piece (−1: unknown), its clearance [m] and row, (flights,)."""
-        apart = self._apart
-        self._look_at(*self._likeliest(apart))
+        apart = self._gap_bounds
+        self._check_rows(*self._nearest_boxes(apart))
         encounters = _Encounters(*np.nonzero(apart < np.maximum(self._clearance, 0.0)[:, None, None]))
         encounters = encounters._replace(first=encounters.first * ROWS_PER_BOX)
         middle = np.full(len(encounters.flight), ROWS_PER_BOX // 2)
         bounds, _ = self._separated(encounters, middle, exact_within=-inf)
-        rows, ticks = self._best_of_flights(encounters, bounds, *self._nearer(encounters, bounds))
+        rows, ticks = self._nearest_per_flight(encounters, bounds, *self._candidate_pairs(encounters, bounds))
         while len(rows):
-            bounds[rows] = np.maximum(bounds[rows], self._look_at(encounters.of(rows), ticks))
-            rows, ticks = self._nearer(encounters, bounds)
+            bounds[rows] = np.maximum(bounds[rows], self._check_rows(encounters.of(rows), ticks))
+            rows, ticks = self._candidate_pairs(encounters, bounds)
         return self._piece, self._clearance, np.minimum(self._row, self._last)
 
     @property
-    def _apart(self) -> Array:
+    def _gap_bounds(self) -> Array:
         """Lower bounds by boxes of the distance of bodies from pieces [m] over stretches, (flights, S, P)."""
         flights, rows, _ = self._position.shape
         padded = np.empty((3, flights, -(-rows // ROWS_PER_BOX) * ROWS_PER_BOX))
@@ -156,7 +156,7 @@ class _NearestSearch:
         apart = self._pieces.apart(lower, upper, over)
         return np.asarray(apart - reach[:, None, None])
 
-    def _likeliest(self, apart: Array) -> tuple[_Encounters, Indices]:
+    def _nearest_boxes(self, apart: Array) -> tuple[_Encounters, Indices]:
         """Return each flight's stretch and piece whose boxes are nearest, and the stretch's middle row."""
         flights, _, pieces = apart.shape
         best = np.argmin(apart.reshape(flights, -1), axis=1)
@@ -164,7 +164,7 @@ class _NearestSearch:
         encounters = _Encounters(known, best[known] // pieces * ROWS_PER_BOX, best[known] % pieces)
         return encounters, np.full(len(known), ROWS_PER_BOX // 2)
 
-    def _nearer(self, encounters: _Encounters, bounds: Array) -> tuple[Indices, Indices]:
+    def _candidate_pairs(self, encounters: _Encounters, bounds: Array) -> tuple[Indices, Indices]:
         """Return the pairs that may be nearer than the best known clearance, and which row of each to check.
 
         Of flights that are known to touch, this is the first earlier row whose bound allows a contact.
@@ -179,7 +179,7 @@ class _NearestSearch:
         rows = np.flatnonzero(may.any(axis=1))
         return rows, ticks[rows]
 
-    def _best_of_flights(
+    def _nearest_per_flight(
         self, encounters: _Encounters, bounds: Array, rows: Indices, ticks: Indices
     ) -> tuple[Indices, Indices]:
         """Return, of these rows and ticks, the nearest pair of each flight."""
@@ -189,7 +189,7 @@ class _NearestSearch:
         best = order[firsts]
         return rows[best], ticks[best]
 
-    def _look_at(self, encounters: _Encounters, ticks: Indices) -> Array:
+    def _check_rows(self, encounters: _Encounters, ticks: Indices) -> Array:
         """Check one row of each pair exactly; return lower bounds for all rows, (m, ROWS_PER_BOX)."""
         bounds, gaps = self._separated(encounters, ticks)
         rows = encounters.first + ticks
@@ -198,14 +198,14 @@ class _NearestSearch:
         lower = gaps < self._clearance[encounters.flight]
         hit = (gaps < 0.0) & ((rows < touched) | ((rows == touched) & lower))
         order = np.lexsort((gaps, rows))[::-1]  # the last assignment wins: a flight's earliest row
-        self._note(encounters, rows, gaps, order[hit[order]])
+        self._record(encounters, rows, gaps, order[hit[order]])
         np.minimum.at(self._touched, encounters.flight[hit], rows[hit])
         nearer = (self._touched[encounters.flight] == NO_CONTACT_ROW) & lower
         order = np.argsort(-gaps, kind="stable")
-        self._note(encounters, rows, gaps, order[nearer[order]])
+        self._record(encounters, rows, gaps, order[nearer[order]])
         return bounds
 
-    def _note(self, encounters: _Encounters, rows: Indices, gaps: Array, chosen: Indices) -> None:
+    def _record(self, encounters: _Encounters, rows: Indices, gaps: Array, chosen: Indices) -> None:
         flights = encounters.flight[chosen]
         self._piece[flights] = encounters.piece[chosen]
         self._clearance[flights] = gaps[chosen]

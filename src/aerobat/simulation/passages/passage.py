@@ -98,7 +98,7 @@ class Passage(PerFlight):
         if np.isnan(self.planned):
             return None
         if np.isnan(self.time):
-            return self._instead()
+            return self._missed_crossing()
         if not self.inside:
             return self._failed(Outcome.MISSED_GATE, self.time, miss=self.miss)
         if self.clearance < 0.0:
@@ -109,7 +109,7 @@ class Passage(PerFlight):
             return self._failed(Outcome.WRONG_ATTITUDE, self.time, angle=angle, tolerance=tolerance)
         return None
 
-    def _instead(self) -> FlightFailure:
+    def _missed_crossing(self) -> FlightFailure:
         """Return the failure of a flight that did not cross the plane in the gate's direction."""
         if self.max_distance <= 0.0:
             return self._failed(Outcome.SHORT_OF_GATE, self.planned, short=-self.max_distance)
@@ -152,7 +152,7 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Pa
         "speed": known(np.linalg.norm(velocity, axis=-1)),
         "attitude_error_deg": known(np.rad2deg(tilt)),
         "attitude_tolerance_deg": np.full(len(q), degrees(planned.attitude_tolerance)),
-        **_closest(gate, progress.swath.crossing, crossed),
+        **_least_clearance(gate, progress.swath.crossing, crossed),
         "planned": known(planned.time, ~ended_before),
         "backward_time": progress.backward,
         "max_distance": known(progress.max_distance, ~ended_before),
@@ -161,7 +161,7 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Pa
     return Passage(gate.name, planned.lap, **fields)
 
 
-def _closest(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, Any]:
+def _least_clearance(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, Any]:
     """Return a swath's smallest clearance from the opening's edges, its place and time, each (flights,).
 
     Args:

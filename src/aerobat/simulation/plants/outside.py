@@ -160,7 +160,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
     controller = next(each for each in init(FloatOps, *numbers) if isinstance(each, Controlling))
     motion = motion._replace(thrusts=controller.thrusts)
     scene = _scene(setup, gates)
-    run: PlantRun = RigidBodyRun(scene, motion) if plant is None else _begun(plant, scene, motion)
+    run: PlantRun = RigidBodyRun(scene, motion) if plant is None else _begin_run(plant, scene, motion)
     rows, touched = [], np.zeros(len(setup.times), dtype=np.int64)
     with _Firmware(setup, scene) as firmware:
         for tick, period in enumerate(np.diff(setup.times, append=setup.times[-1]).tolist()):
@@ -174,7 +174,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
     return tree_stack(rows, lambda parts: np.stack(parts, axis=-1)), touched
 
 
-def _begun(plant: Plant, scene: PlantScene, motion: VehicleState) -> PlantRun:
+def _begin_run(plant: Plant, scene: PlantScene, motion: VehicleState) -> PlantRun:
     """Return the plant's vehicle at its start. Raises SpecError if begin() returns something else."""
     run: Any = plant.begin(scene, motion)
     names = ("motion", "contact", "advance")

@@ -39,10 +39,10 @@ class Alignment:
 def aligned(flight: Flight, trajectory: Trajectory) -> Alignment:
     """Align a plan's path with a log's set-points. Raises SpecError where the log is of another plan."""
     rows = np.unique(np.linspace(0, len(flight.times) - 1, _ROWS).astype(int))
-    times, wanted = flight.times[rows], flight.setpoint_position[rows]
+    times, setpoints = flight.times[rows], flight.setpoint_position[rows]
 
     def at(shift: float) -> Alignment:
-        return _laid(shift, times, wanted, trajectory)
+        return _fit_at_shift(shift, times, setpoints, trajectory)
 
     first, last = times[0] - trajectory.duration, times[-1]
     shifts = [0.0, times[0], *np.linspace(first, last, _SHIFTS)]
@@ -63,13 +63,13 @@ def aligned(flight: Flight, trajectory: Trajectory) -> Alignment:
     return alignment
 
 
-def _laid(shift: float, times: Array, wanted: Array, trajectory: Trajectory) -> Alignment:
+def _fit_at_shift(shift: float, times: Array, setpoints: Array, trajectory: Trajectory) -> Alignment:
     path = trajectory.evaluate(np.clip(times - shift, 0.0, trajectory.duration), 0)
-    middle, goal = path.mean(axis=0), wanted.mean(axis=0)
-    (x, y, _), (u, v, _) = (path - middle).T, (wanted - goal).T
+    middle, goal = path.mean(axis=0), setpoints.mean(axis=0)
+    (x, y, _), (u, v, _) = (path - middle).T, (setpoints - goal).T
     yaw = float(np.arctan2(np.sum(x * v - y * u), np.sum(x * u + y * v)))
     c, s = np.cos(yaw), np.sin(yaw)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     translation = goal - turn @ middle
-    rest = path @ turn.T + translation - wanted
+    rest = path @ turn.T + translation - setpoints
     return Alignment(shift, yaw, translation, float(np.sqrt(np.mean(np.sum(rest**2, axis=1)))))

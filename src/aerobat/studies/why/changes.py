@@ -60,12 +60,12 @@ def _of_limits(task: Request) -> Iterator[Change]:
             key = "limits.lower and limits.upper" if derivative == 0 else f"limits.{name}"
             yield Change(f"without {key}", partial(_without_limit, derivative))
     if np.isfinite(task.problem.limits.max_tilt):
-        yield Change("without limits.max_tilt", partial(_with, "limits.max_tilt", np.inf))
+        yield Change("without limits.max_tilt", partial(_with_field, "limits.max_tilt", np.inf))
     if task.problem.environment.ground is not None:
-        yield Change("without environment.ground", partial(_with, "environment.ground", None))
+        yield Change("without environment.ground", partial(_with_field, "environment.ground", None))
 
 
-def _with(name: str, value: float | None, task: Request) -> Request:
+def _with_field(name: str, value: float | None, task: Request) -> Request:
     """Return the request with a field at a value."""
     return lens(name, task).set(task, value)
 
@@ -76,7 +76,7 @@ def _without_limit(derivative: int, task: Request) -> Request:
 
 def _of_reserve(task: Request) -> Iterator[Change]:
     if task.reserve > 0.0:
-        yield Change("without reserve", partial(_with, "planner.reserve", 0.0))
+        yield Change("without reserve", partial(_with_field, "planner.reserve", 0.0))
 
 
 def _of_vehicle(task: Request) -> Iterator[Change]:
@@ -85,11 +85,11 @@ def _of_vehicle(task: Request) -> Iterator[Change]:
         return
     yield Change(f"with {STRONGER:g} times the max_thrust", _with_stronger_rotors)
     if (vehicle.min_thrusts > 0.0).any():
-        yield Change("with min_thrust 0", partial(_with, "vehicle.rotor_defaults.min_thrust", 0.0))
+        yield Change("with min_thrust 0", partial(_with_field, "vehicle.rotor_defaults.min_thrust", 0.0))
     if vehicle.lags.any():
-        yield Change("with rotors without lag", partial(_with, "vehicle.rotor_defaults.lag", 0.0))
+        yield Change("with rotors without lag", partial(_with_field, "vehicle.rotor_defaults.lag", 0.0))
     if np.isfinite(vehicle.max_body_rate):
-        yield Change("without max_body_rate", partial(_with, "vehicle.max_body_rate", np.inf))
+        yield Change("without max_body_rate", partial(_with_field, "vehicle.max_body_rate", np.inf))
 
 
 def _with_stronger_rotors(task: Request) -> Request:
