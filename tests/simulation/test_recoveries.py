@@ -83,7 +83,7 @@ def test_a_vehicle_that_flies_to_pieces_is_told_by_numbers_and_never_hovers(flip
 def test_the_instants_of_a_long_path_are_few_and_reach_from_its_start_to_its_end(
     flip: ab.Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("aerobat.simulation.autopilot.recovery.MOST_INSTANTS", 20)
+    monkeypatch.setattr("aerobat.simulation.autopilot.recovery.MAX_INSTANTS", 20)
     found = ab.recoveries(flip)
     assert len(found.times) == 20
     assert (found.times[0], found.times[-1]) == (0.0, flip.duration)

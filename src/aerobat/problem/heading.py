@@ -30,8 +30,8 @@ from aerobat.so3 import UP
 from aerobat.states import FlatState
 from aerobat.trajectory import minimum_effort
 
-AT_POINT = 0.1  # [m] distance from the point below which its direction is unreliable
-SLOW = 0.5  # [m/s] speed below which the direction of velocity is unreliable
+MIN_DISTANCE = 0.1  # [m] distance from the point below which its direction is unreliable
+MIN_SPEED = 0.5  # [m/s] speed below which the direction of velocity is unreliable
 
 
 class HeadingMode(StrEnum):
@@ -105,9 +105,9 @@ class Heading:
         """
         upright = (1.0 + b3[:, 2:]) / 2.0
         if self.mode is HeadingMode.TOWARDS:
-            return upright * _softened(self.point - flat.position, AT_POINT)
+            return upright * _softened(self.point - flat.position, MIN_DISTANCE)
         if self.mode is HeadingMode.VELOCITY:
-            return upright * _softened(flat.velocity, SLOW)
+            return upright * _softened(flat.velocity, MIN_SPEED)
         angle = self._angles(fractions)
         level = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
         return upright * so3.rotate(so3.smallest_rotation(UP, b3), level)

@@ -42,7 +42,7 @@ MIN_CROSSING_SPEED = 1.0  # [m/s] default least speed through a gate: a vehicle 
 PARALLEL = 1e-6  # [-] a direction with a smaller component along a gate's normal is in the gate's plane
 PLANNED_SHARE = 0.5  # [-] fraction of a gate's attitude tolerance for the plan; the rest is for tracking
 ROUNDING = 1e-9  # [-] of an interval
-MOST_INTERVALS = 100  # every window of a hundredth of the duration contains the end of an interval
+MAX_INTERVALS = 100  # every window of a hundredth of the duration contains the end of an interval
 
 
 @declared
@@ -220,7 +220,7 @@ class StageSequence:
     def intervals_from(self, least: int) -> int:
         """Return the fewest intervals, at least `least`, of which one ends in the window of each stage.
 
-        Where more than MOST_INTERVALS would be needed, `least` is returned.
+        Where more than MAX_INTERVALS would be needed, `least` is returned.
         """
-        tried = range(least, max(least, MOST_INTERVALS) + 1)
+        tried = range(least, max(least, MAX_INTERVALS) + 1)
         return next((n for n in tried if all(stage.slots(n) for stage in self.stages)), least)

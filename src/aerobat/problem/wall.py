@@ -11,7 +11,7 @@ from aerobat.declaration import Positive, declared
 from aerobat.environment.obstacles.surface import beyond
 from aerobat.problem.opening import OpeningShape
 
-LEAST_AREA = 1e-9  # [m²] smallest area of a part; smaller parts are dropped
+MIN_AREA = 1e-9  # [m²] smallest area of a part; smaller parts are dropped
 
 
 @declared
@@ -28,7 +28,7 @@ class Wall:
         whole = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
         for normal, distance in zip(*opening.sides, strict=True):
             part = beyond(whole, whole @ normal - distance)
-            if _area(part) > LEAST_AREA:
+            if _area(part) > MIN_AREA:
                 yield part
 
 

@@ -14,7 +14,7 @@ TOUCHDOWN = 1e-3  # [m] depth below the ground that counts as no hit: paths that
 # A slow vehicle that sinks by no more than the tolerance of places counts as standing on the ground.
 LANDING_SPEED = 2.0  # [m/s] the speed of a fall from 20 cm, which a landing gear survives
 LANDING_DEPTH = 0.1  # [m] the tolerance of places
-NO_LENGTH = 1e-6  # [m] smaller lengths are rounding
+ZERO_LENGTH = 1e-6  # [m] smaller lengths are rounding
 FEW_DECIMALS = 0.095  # smaller values would show less than two digits in two decimals
 
 
@@ -29,7 +29,7 @@ class Contact(IntEnum):
 
 def length(metres: float) -> str:
     """Return a length with the unit that suits it."""
-    return f"{digits(metres)} m" if metres >= 1.0 else f"{digits(100.0 * metres, NO_LENGTH * 100.0)} cm"
+    return f"{digits(metres)} m" if metres >= 1.0 else f"{digits(100.0 * metres, ZERO_LENGTH * 100.0)} cm"
 
 
 def digits(value: float, nothing: float = 0.0) -> str:

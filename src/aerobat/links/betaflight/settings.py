@@ -21,7 +21,7 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
 GYRO_LIMIT = 1998.0  # [°/s] range of the gyro, and largest rate of a stick
-_COARSEST = 10.0  # [°/s] resolution of the sticks' rates
+_RATE_STEP = 10.0  # [°/s] resolution of the sticks' rates
 _MIN_RATE = 570.0  # [°/s] least rate at a stick's end, with room for corrections
 _CORRECTION = 9.0  # [rad/s] beyond the reference's rates: corrections of the outer loop, and its lead
 _LEVER_SPREAD = 0.02  # [-] largest relative difference of the rotors' lever arms
@@ -57,7 +57,7 @@ def stick_rate(peak: float) -> float:
             f"{GYRO_LIMIT:.0f}°/s; plan it with a lower max_body_rate of the vehicle"
         )
     wanted = max(fastest + 180.0 / pi * _CORRECTION, _MIN_RATE)
-    return pi / 180.0 * min(_COARSEST * ceil(wanted / _COARSEST), _COARSEST * int(GYRO_LIMIT / _COARSEST))
+    return pi / 180.0 * min(_RATE_STEP * ceil(wanted / _RATE_STEP), _RATE_STEP * int(GYRO_LIMIT / _RATE_STEP))
 
 
 def board_rate(vehicle: Vehicle, peak: float = 0.0) -> float:
@@ -112,7 +112,7 @@ def betaflight_settings(vehicle: Vehicle, max_rate: float, simulated: bool = Fal
     """
     order = rotor_order(vehicle)
     reversed_yaw = vehicle.rotors[order[0]].spin < 0  # Betaflight's front right turns counter-clockwise
-    rate = round(180.0 / pi * max_rate / _COARSEST)
+    rate = round(180.0 / pi * max_rate / _RATE_STEP)
     values: dict[str, object] = {
         "rates_type": "ACTUAL",
         "yaw_motors_reversed": "ON" if reversed_yaw else "OFF",

@@ -21,7 +21,7 @@ _AUTOPILOT = 1  # the component number of an autopilot
 _GROUND_STATION = 8  # the autopilot number of systems that are no autopilots
 _SYNCHRONIZATIONS = 50  # clock synchronizations that are kept; the one with the shortest round trip is used
 _MAX_AHEAD = 0.02  # [s] added to the one-way delay: largest lead of a state's time stamp
-_MAX_APART = 0.1  # [s] largest difference between the times of a state's attitude and position
+_MAX_TIME_DIFFERENCE = 0.1  # [s] largest difference between the times of a state's attitude and position
 
 
 class AutopilotLink:
@@ -210,7 +210,7 @@ class AutopilotLink:
             return []
         else:
             age = 1e-3 * (message.time_boot_ms - self._attitude.time_boot_ms)
-            if abs(age) > _MAX_APART:
+            if abs(age) > _MAX_TIME_DIFFERENCE:
                 return []
             state = _of_position(message, self._attitude, age, offset)
         if state is None:

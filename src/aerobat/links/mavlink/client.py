@@ -31,7 +31,7 @@ _HOVER_DWELL = 3.0  # [s] of hover after an abort, before landing
 _HOVER_SPEED = 0.3  # [m/s] largest speed of a hover
 _MAX_SILENCE = 10.0  # [s] without news after an abort; then the vehicle is ordered to land, or given up
 _RECOVERY_TIMEOUT = 60.0  # [s] time limit for coming to a hover, and for a landing beside the descent
-_SLOWEST_DESCENT = 0.2  # [m/s] slowest descent of a landing
+_MIN_DESCENT_SPEED = 0.2  # [m/s] slowest descent of a landing
 
 
 class ClientStage(StrEnum):
@@ -326,7 +326,7 @@ class Client:
             self.link.set_mode(Mode.LAND)
             if self._now - max(self.link.heard, self._began) > _MAX_SILENCE:
                 self._lose("no news of the vehicle")
-            elif self._elapsed > _RECOVERY_TIMEOUT + height / _SLOWEST_DESCENT:
+            elif self._elapsed > _RECOVERY_TIMEOUT + height / _MIN_DESCENT_SPEED:
                 self._lose("the vehicle does not land as it is told")
 
     @property

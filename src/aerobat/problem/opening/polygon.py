@@ -15,8 +15,8 @@ from aerobat.declaration.field_types import finite
 from aerobat.declaration.sentences import FieldError, shown
 from aerobat.problem.opening.shape import Edge, EdgeProbe, LinearBounds, OpeningShape
 
-STRAIGHT = 1e-6  # [-] sine of a turn at a corner below which the corner is on a straight line
-FARTHEST = 1e15  # [m] largest coordinate, as of all lengths in files
+STRAIGHT_SINE = 1e-6  # [-] sine of a turn at a corner below which the corner is on a straight line
+MAX_COORDINATE = 1e15  # [m] largest coordinate, as of all lengths in files
 MAX_CORNERS = 24  # of a polygon: a flight checks each side at every tick
 ROUNDING = 1e-12  # [-] tolerance relative to an opening's size
 TURNS = np.radians(np.arange(0.0, 180.0, 5.0))  # [rad] turns in which a section is tried in a polygon
@@ -127,7 +127,7 @@ class Polygon(OpeningShape):
         left = distances - reach
         threes = np.array(list(combinations(range(len(normals)), 3)))
         rows = np.concatenate([normals[threes], np.ones((len(threes), 3, 1))], axis=2)
-        solvable = np.abs(np.linalg.det(rows)) > STRAIGHT
+        solvable = np.abs(np.linalg.det(rows)) > STRAIGHT_SINE
         found = np.linalg.solve(rows[solvable], left[threes[solvable]][..., None])[..., 0]
         fits = (left - found[:, :2] @ normals.T - found[:, 2:]).min(axis=1) >= -ROUNDING * distances.max()
         best = found[fits][np.argmax(found[fits][:, 2])]
@@ -188,9 +188,9 @@ def _corners(value: Any) -> Array:
     if not 3 <= len(value) <= MAX_CORNERS:
         raise FieldError("", f"must have from 3 to {MAX_CORNERS} corners, got {len(value)}; give as many")
     corners = finite(value, len(value), 2)
-    if np.abs(corners).max() > FARTHEST:
+    if np.abs(corners).max() > MAX_COORDINATE:
         raise FieldError(
-            "", f"must have corners within {FARTHEST:g} m, got {np.abs(corners).max():g}; check units"
+            "", f"must have corners within {MAX_COORDINATE:g} m, got {np.abs(corners).max():g}; check units"
         )
     sides = np.roll(corners, -1, axis=0) - corners
     lengths = np.linalg.norm(sides, axis=1)
@@ -201,7 +201,7 @@ def _corners(value: Any) -> Array:
     sines, cosines = last[:, 0] * sides[:, 1] - last[:, 1] * sides[:, 0], np.sum(last * sides, axis=1)
     turns = np.arctan2(sines, cosines)
     sign = np.sign(turns.sum())
-    straight = np.abs(sines) < STRAIGHT
+    straight = np.abs(sines) < STRAIGHT_SINE
     if straight.any():
         where = _text(corners[straight])
         raise FieldError("", f"has its corner {where} on a line with those beside it; drop or move it")

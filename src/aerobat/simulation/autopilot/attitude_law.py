@@ -18,9 +18,9 @@ from aerobat.kernels.quaternions import conjugate, multiply, to_body
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import subtract
 
-_STOPPING = 0.7  # [-] fraction used of a hovering vehicle's angular acceleration
+_STOPPING_FRACTION = 0.7  # [-] fraction used of a hovering vehicle's angular acceleration
 _MAX_YAW_RATE = 4.0  # [rad/s] largest commanded yaw rate: lagging rotors cannot tilt a body that spins faster
-_OPPOSITE = 1e-6  # [-] cosine of half the tilt, below which yaw is undefined
+_MIN_HALF_COSINE = 1e-6  # [-] cosine of half the tilt, below which yaw is undefined
 
 
 class Authority(NamedTuple):
@@ -48,9 +48,9 @@ def limited_attitude_error(
     sign = ops.select(q[0] < 0.0, -1.0, 1.0)
     w, x, y, z = (sign * part for part in q)
     upright = ops.sqrt(w * w + z * z)  # the cosine of half the tilt
-    turned = upright > _OPPOSITE
-    c = ops.select(turned, w / ops.maximum(upright, _OPPOSITE), 1.0)  # of half the yaw, the cosine
-    s = ops.select(turned, z / ops.maximum(upright, _OPPOSITE), 0.0)  # and the sine
+    turned = upright > _MIN_HALF_COSINE
+    c = ops.select(turned, w / ops.maximum(upright, _MIN_HALF_COSINE), 1.0)  # of half the yaw, the cosine
+    s = ops.select(turned, z / ops.maximum(upright, _MIN_HALF_COSINE), 0.0)  # and the sine
     tilt = _limited_fraction(ops, gains, ops.sqrt(x * x + y * y), authority.tilt, authority.lag)
     yaw = _limited_fraction(ops, gains, magnitude(ops, s), authority.yaw, authority.lag)
     yaw = ops.minimum(yaw, _MAX_YAW_RATE * gains.damping / (gains.stiffness * magnitude(ops, s) + TINY))
@@ -70,7 +70,7 @@ def _limited_fraction(ops: Ops, gains: Gains, half: Scalar, acceleration: Scalar
         acceleration: the angular deceleration [rad/s²] available.
         lag: [s] until it sets in.
     """
-    a = _STOPPING * acceleration
+    a = _STOPPING_FRACTION * acceleration
     # (√(a² τ² + 4 a s) − a τ) / s, written without the difference
     slope = 4.0 * a / (a * lag + ops.sqrt(a * a * lag * lag + 4.0 * a * half) + TINY)
     return ops.minimum(1.0, slope * gains.damping / (gains.stiffness + TINY))

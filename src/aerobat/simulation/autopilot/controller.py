@@ -23,7 +23,7 @@ from aerobat.simulation.autopilot.attitude_law import Authority, limited_attitud
 from aerobat.simulation.loop import Component, Signals
 
 _MIN_LIFT = 0.2  # [-] of gravity: least upward thrust on the way to a point; keeps the vehicle upright
-_MAX_SIDEWAYS = 1.0  # [-] of gravity: most horizontal thrust along x and along y on the way to a point
+_MAX_HORIZONTAL = 1.0  # [-] of gravity: most horizontal thrust along x and along y on the way to a point
 
 
 class AutopilotModel(NamedTuple):
@@ -104,7 +104,7 @@ def _upright(ops: Ops, gravity: Scalar, outer: PositionLoopState, demand: Thrust
         outer: the answer of the position loop.
         demand: the thrust required by the reference.
     """
-    sideways, lift = _MAX_SIDEWAYS * gravity, _MIN_LIFT * gravity
+    sideways, lift = _MAX_HORIZONTAL * gravity, _MIN_LIFT * gravity
     x, y, z = add(demand.value, outer.acceleration)
     upright = clip(ops, x, -sideways, sideways), clip(ops, y, -sideways, sideways), ops.maximum(z, lift)
     # a saturated component has no rate

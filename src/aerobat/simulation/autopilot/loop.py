@@ -18,8 +18,8 @@ from aerobat.vehicle.fleet import Fleet
 
 RATE = 500.0  # [1/s] of the controller and the plant
 # delays that a position loop towards points must allow for: its bandwidth is lower where they are longer
-_FREE_ERROR = 0.3  # [rad] tilt error that must not saturate rotors
-_LAG_COUNTED = 0.6  # [-] fraction of the rotors' lag that counts: the attitude loop's lead covers the rest
+_LINEAR_ERROR = 0.3  # [rad] tilt error that must not saturate rotors
+_LAG_FRACTION = 0.6  # [-] fraction of the rotors' lag that counts: the attitude loop's lead covers the rest
 
 # [s] for which commanded rates are kept without a newer command; then the attitude is held
 COMMAND_HOLD_TIME = 0.04
@@ -35,7 +35,8 @@ def autopilot_setup(start: Body, vehicle: Vehicle, environment: Environment) -> 
     authority = Authority(
         accelerations[:, :2].min(axis=-1), accelerations.min(axis=-1), fleet.lags.max(axis=-1)
     )
-    slewing = 1.0 / max_bandwidth(fleet, environment, _FREE_ERROR) + _LAG_COUNTED * fleet.lags.max(axis=-1)
+    lag = _LAG_FRACTION * fleet.lags.max(axis=-1)
+    slewing = 1.0 / max_bandwidth(fleet, environment, _LINEAR_ERROR) + lag
     model = AutopilotModel(tracking, authority, upright=vehicle.controller.gains(1.0 / slewing))
     controller = AutopilotController(vehicle.controller.feature_flags)
     parts = LoopPart(StateObserver()), LoopPart(controller, model), plant_part(fleet, environment, RATE)

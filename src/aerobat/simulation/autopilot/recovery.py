@@ -38,12 +38,12 @@ from aerobat.vehicle import Vehicle
 
 HORIZON = 15.0  # [s] time limit of a recovery; a vehicle that does not hover by then never recovers
 INSTANTS_RATE = 100.0  # [1/s] rate of instants, where the caller names none
-MOST_INSTANTS = 2000  # largest number of instants; on a longer path they lie further apart
+MAX_INSTANTS = 2000  # largest number of instants; on a longer path they lie further apart
 _CHUNK = 100  # ticks simulated at once, so that their references take little memory
 _HOVER_DWELL = 0.5  # [s] time for which all copies must hover before the simulation ends early
-_FEW_SPANS = 3  # number of spans up to which a sentence names each
+_MAX_NAMED_SPANS = 3  # number of spans up to which a sentence names each
 _HOVER_SPEED = 0.2  # [m/s] largest speed of a hover
-_ALIGNED = 0.2  # [rad] largest angle of a hover between thrust axis and the thrust for rest
+_HOVER_ANGLE = 0.2  # [rad] largest angle of a hover between thrust axis and the thrust for rest
 
 
 class UndeterminedAttitude(SpecError):
@@ -117,7 +117,7 @@ class Recoveries:
     @property
     def _spans(self) -> str:
         """The spans of no return in words."""
-        if len(self.no_return) <= _FEW_SPANS:
+        if len(self.no_return) <= _MAX_NAMED_SPANS:
             return " and ".join(f"{span.start:.2f} to {span.end:.2f} s" for span in self.no_return)
         first, last = self.no_return[0].start, self.no_return[-1].end
         lost = 100.0 * float(np.mean(~self.possible))
@@ -151,7 +151,7 @@ def recoveries(
     """
     vehicle, environment = vehicle_of(plan, vehicle).without_dead_rotors(), environment_of(plan, environment)
     path = as_trajectory(plan)
-    rate = min(INSTANTS_RATE, (MOST_INSTANTS - 1) / path.duration)
+    rate = min(INSTANTS_RATE, (MAX_INSTANTS - 1) / path.duration)
     instants = path.sample(rate) if times is None else frozen(times, "times", (None,))
     required = reference(path, vehicle, instants, environment=environment)
     if required.undetermined:
@@ -232,7 +232,7 @@ class _RecoveryBatch:
         carried = self._vehicle.drag_body * so3.unrotate(q_world_body, self._environment.wind)
         rest_thrust = self._vehicle.mass * self._environment.weight - so3.rotate(q_world_body, carried)
         along = np.sum(so3.thrust_axis(q_world_body) * rest_thrust, axis=-1)
-        return np.asarray(along >= np.cos(_ALIGNED) * np.linalg.norm(rest_thrust, axis=-1))
+        return np.asarray(along >= np.cos(_HOVER_ANGLE) * np.linalg.norm(rest_thrust, axis=-1))
 
 
 def _body(signals: Signals) -> Body:

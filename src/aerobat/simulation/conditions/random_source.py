@@ -23,10 +23,10 @@ Words: TypeAlias = NDArray[np.uint16]
 Arrange: TypeAlias = Callable[[Sequence[Coded], Array, NDArray[np.intp]], Tree]
 
 _LEVELS = 2**16
-_WORDS_AT_ONCE = 4  # 16-bit words in one 64-bit number of the generator
-_TOGETHER = 128  # vehicles whose words are transposed at once, so that they stay in a cache
-_APART = 8  # padding [64-bit numbers] between vehicles' rows: rows a power of two apart conflict in a cache
-_DRAWN_AT_ONCE = 256  # samples of a vehicle: one call of its generator costs as much as some hundred words
+_WORDS_PER_NUMBER = 4  # 16-bit words in one 64-bit number of the generator
+_VEHICLES_PER_BLOCK = 128  # vehicles whose words are transposed at once, so that they stay in a cache
+_ROW_PADDING = 8  # [64-bit numbers] between vehicles' rows: rows a power of two apart conflict in a cache
+_SAMPLES_PER_DRAW = 256  # samples of a vehicle: one call of its generator costs as much as some hundred words
 
 
 class RandomSource:
@@ -63,7 +63,7 @@ class RandomSource:
         self._words = normals + 2 * uniforms
         self._period = period
         self._size = block
-        self._blocks = max(1, _DRAWN_AT_ONCE // block)
+        self._blocks = max(1, _SAMPLES_PER_DRAW // block)
         self._restart()
 
     def chunk(self, begin: int, end: int) -> Tree:
@@ -96,14 +96,14 @@ class RandomSource:
     def _draw(self) -> None:
         """Draw the next blocks of all vehicles; transpose the words of some vehicles while in the cache."""
         count, vehicles = self._blocks * self._words * self._size, len(self._generators)
-        numbers = count // _WORDS_AT_ONCE
-        drawn = np.empty((min(_TOGETHER, vehicles), numbers + _APART), dtype="<u8")
+        numbers = count // _WORDS_PER_NUMBER
+        drawn = np.empty((min(_VEHICLES_PER_BLOCK, vehicles), numbers + _ROW_PADDING), dtype="<u8")
         turned = np.empty((count, vehicles), dtype=np.uint16)
-        for first in range(0, vehicles, _TOGETHER):
-            together = self._generators[first : first + _TOGETHER]
+        for first in range(0, vehicles, _VEHICLES_PER_BLOCK):
+            together = self._generators[first : first + _VEHICLES_PER_BLOCK]
             for own, generator in zip(drawn, together, strict=False):
                 own[:numbers] = generator.random_raw(numbers)
-            turned[:, first : first + _TOGETHER] = drawn[: len(together)].view("<u2")[:, :count].T
+            turned[:, first : first + _VEHICLES_PER_BLOCK] = drawn[: len(together)].view("<u2")[:, :count].T
         self._drawn: Words = turned.reshape(self._blocks, self._words, self._size, vehicles)
         self._turn += 1
 

@@ -42,7 +42,7 @@ _KINDS = {
     _GATE: Contact.GATE,
     _OBSTACLE: Contact.OBSTACLE,
 }
-_AT_ONCE = 1e4  # [1/s] a rotor whose inverse time constant is at least this is simulated without lag
+_NO_LAG_RATE = 1e4  # [1/s] a rotor whose inverse time constant is at least this is simulated without lag
 _ROUNDING = 1e-9  # [-] rounding of a number of steps
 
 
@@ -66,7 +66,7 @@ class MujocoRun:
     def __init__(self, scene: PlantScene, motion: VehicleState, contacts: bool, max_step: float) -> None:
         self._mujoco = import_extra("mujoco", "the plant mujoco needs MuJoCo", "aerobat[mujoco]")
         self._airframe = scene.airframe
-        rates = [rate for rate in scene.airframe.rotors.inverse_time_constant if rate < _AT_ONCE]
+        rates = [rate for rate in scene.airframe.rotors.inverse_time_constant if rate < _NO_LAG_RATE]
         self._max_step = min([max_step, *(1.0 / rate for rate in rates)])  # RK4 is stable to 2.8 times that
         self._model: mujoco.MjModel = self._mujoco.MjModel.from_xml_string(mujoco_model(scene, contacts))
         self._data: mujoco.MjData = self._mujoco.MjData(self._model)
@@ -250,7 +250,7 @@ def _actuators(airframe: Airframe) -> Iterator[dict[str, str]]:
             "ctrllimited": "true",
             "ctrlrange": _text((low, max(high, low + 1e-9))),  # MuJoCo accepts no empty range (failed rotor)
         }
-        if rate < _AT_ONCE:
+        if rate < _NO_LAG_RATE:
             actuator |= {"dyntype": "filter", "dynprm": repr(1.0 / float(rate))}
         yield actuator
 

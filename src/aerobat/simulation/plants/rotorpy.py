@@ -27,7 +27,7 @@ GRAVITY = 9.81  # [m/s²] hard-coded in RotorPy
 _GRAVITY_SPREAD = 0.05  # [m/s²] by which gravity differs between places on Earth
 _ROTORS = 4  # RotorPy inverts a square allocation
 _THRUST_COEFFICIENT = 1e-5  # [N/(rad/s)²] arbitrary: it cancels, since rotors are specified by their thrusts
-_LEAST_LAG = 1e-3  # [s] RotorPy's integrator needs a lag
+_MIN_LAG = 1e-3  # [s] RotorPy's integrator needs a lag
 
 
 def _vehicle_name(value: Any) -> str | None:
@@ -170,7 +170,7 @@ def _parameters_of(airframe: Airframe) -> dict[str, Any]:
         "k_m": torque * _THRUST_COEFFICIENT,
         "k_d": (dx + dy) / 2,
         "k_z": dz,
-        "tau_m": np.maximum(1.0 / np.array(rotors.inverse_time_constant), _LEAST_LAG),
+        "tau_m": np.maximum(1.0 / np.array(rotors.inverse_time_constant), _MIN_LAG),
     }
 
 

@@ -19,7 +19,7 @@ from aerobat.studies.lens import lens
 from aerobat.vehicle import Vehicle
 
 HALF = 0.5
-STRONGER = 1.5  # factor on the rotors' maximum thrusts
+THRUST_FACTOR = 1.5  # factor on the rotors' maximum thrusts
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def _of_vehicle(task: Request) -> Iterator[Change]:
     vehicle = task.vehicle
     if vehicle is None:
         return
-    yield Change(f"with {STRONGER:g} times the max_thrust", _with_stronger_rotors)
+    yield Change(f"with {THRUST_FACTOR:g} times the max_thrust", _with_stronger_rotors)
     if (vehicle.min_thrusts > 0.0).any():
         yield Change("with min_thrust 0", partial(_with_field, "vehicle.rotor_defaults.min_thrust", 0.0))
     if vehicle.lags.any():
@@ -94,7 +94,7 @@ def _of_vehicle(task: Request) -> Iterator[Change]:
 
 def _with_stronger_rotors(task: Request) -> Request:
     assert task.vehicle is not None
-    rotors = (replace(rotor, max_thrust=STRONGER * rotor.max_thrust) for rotor in task.vehicle.rotors)
+    rotors = (replace(rotor, max_thrust=THRUST_FACTOR * rotor.max_thrust) for rotor in task.vehicle.rotors)
     return replace(task, vehicle=replace(task.vehicle, rotors=tuple(rotors)))
 
 
