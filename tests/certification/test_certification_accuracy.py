@@ -56,7 +56,7 @@ def coarse(trajectory: Trajectory) -> tuple[ThrustCurve, ThrustCurve, Subinterva
 def accuracy_of(curve: ThrustCurve, pieces: Subintervals) -> InterpolationError:
     norms = curve.norms(curve.series(curve.on(pieces)), pieces)
     seconds = pieces.seconds(curve.trajectory)
-    return interpolation_error.accuracy(norms, seconds, curve.sums[pieces.interval], curve.vehicle)
+    return interpolation_error.error_bounds(norms, seconds, curve.sums[pieces.interval], curve.vehicle)
 
 
 def turning(curve: ThrustCurve, pieces: Subintervals) -> ThrustDirectionRates:

@@ -131,7 +131,7 @@ def test_interpolation_is_as_near_as_its_bound_says_on_coarse_pieces_too(seed, d
         pieces, norms = pieces[usable], norms[usable]
         if not len(pieces):
             continue
-        found = interpolation_error.accuracy(
+        found = interpolation_error.error_bounds(
             norms, pieces.seconds(flight.trajectory), coarse.sums[pieces.interval], flight.vehicle
         )
         middle = truth.at(pieces.interval, (pieces.start + pieces.length / 2)[:, None])[:, 0, 1]

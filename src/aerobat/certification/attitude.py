@@ -79,10 +79,12 @@ class ThrustDirectionRates:
         back = np.exp(-1j * angle)
         return _flat(back * self.omega), _flat(back * self.omega_dot)
 
-    def turning(self, angle: Array, yaw: Array) -> tuple[Array, Array]:
+    def with_yaw(self, angle: Array, yaw: Array) -> tuple[Array, Array]:
         """Return ω and ω' of a body turned from that frame by a yaw with two derivatives, (P, N, 3)."""
-        still, still_dot = map(xyz, self.body(angle + yaw[..., 0]))
-        omega, omega_dot = flatness.spun(still, still_dot, tuple(np.moveaxis(yaw[..., 1:], -1, 0)))
+        without_yaw, without_yaw_dot = map(xyz, self.body(angle + yaw[..., 0]))
+        omega, omega_dot = flatness.spun(
+            without_yaw, without_yaw_dot, tuple(np.moveaxis(yaw[..., 1:], -1, 0))
+        )
         return np.stack(omega, axis=-1), np.stack(omega_dot, axis=-1)
 
 

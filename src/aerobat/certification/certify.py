@@ -20,7 +20,7 @@ from aerobat.certification.body_path import BodyPath
 from aerobat.certification.certificate import Certificate, Finding, Side
 from aerobat.certification.clearance import clearance_finding, frame_findings
 from aerobat.certification.continuity import discontinuities, seam
-from aerobat.certification.enclosure.interpolation_error import accuracy
+from aerobat.certification.enclosure.interpolation_error import error_bounds
 from aerobat.certification.enclosure.queries import (
     SUMMATION_ROUNDING,
     ChebyshevSeries,
@@ -105,9 +105,9 @@ def certify(
     has_obstacles = len(environment.pieces) > 0
     is_near = has_obstacles or len(envelope.passages) > 0
     columns = SeriesColumns(derived, on_thrust, with_axis=is_near)
-    series, lost = _series(curve, found, columns)
+    series, unproven = _series(curve, found, columns)
     if series is not None:
-        findings += series.answers(_queries(vehicle, envelope, on_measures, columns))
+        findings += series.findings(_queries(vehicle, envelope, on_measures, columns))
     findings += kinematic_findings(trajectory, envelope.speed, [x for x in on_path if x not in on_thrust])
     bodies = _bodies(curve, series, whole.bounding_ellipsoid.revolved) if is_near else None
     if bodies and has_obstacles:
@@ -119,8 +119,8 @@ def certify(
     jumps = discontinuities(curve, floor, series)
     if envelope.closed:
         jumps += seam(trajectory, vehicle, environment)
-    too_unequal = next((span.start for span in lost), None)
-    return Certificate(tuple(findings), found.vanishing + lost, jumps, too_unequal)
+    too_unequal = next((span.start for span in unproven), None)
+    return Certificate(tuple(findings), found.vanishing + unproven, jumps, too_unequal)
 
 
 def _series(
@@ -218,9 +218,9 @@ def interpolated(
     seconds = pieces.seconds(curve.trajectory)
     rates = ThrustDirectionRates.along(values[..., 1:, :], series[:, 0, 1], seconds, basis)
     angle, yaw = rates.carried(curve.trajectory.heading), curve.yaw_on(pieces)
-    omega, omega_dot = rates.body(angle) if yaw is None else rates.turning(angle, yaw)
+    omega, omega_dot = rates.body(angle) if yaw is None else rates.with_yaw(angle, yaw)
     sums = curve.sums[pieces.interval]
-    bound = accuracy(curve.norms(series, pieces), seconds, sums, vehicle, curve.turns(pieces))
+    bound = error_bounds(curve.norms(series, pieces), seconds, sums, vehicle, curve.yaw_bounds(pieces))
     # errors of the frame's angle accumulate from piece to piece
     own_error = (bound.twist_remainder + basis.lebesgue * bound.twist_rounding)[:, None]
     angle_error = np.cumsum(own_error, axis=0)
@@ -235,8 +235,8 @@ def interpolated(
         rate_error = bound.rate_remainder + (angle_error - own_error) * bound.rate_per_radian
         rate_error += per_second * basis.steepening * noise
         weights = _weights(columns.derived, vehicle)
-        found.append(_derived(weights, found[0], per_second[..., None] * (basis.derivative @ thrusts)))
-        errors.append(_derived([np.abs(each) for each in weights], error, rate_error))
+        found.append(_weighted(weights, found[0], per_second[..., None] * (basis.derivative @ thrusts)))
+        errors.append(_weighted([np.abs(each) for each in weights], error, rate_error))
     if columns.with_axis:  # each component is as exact as the one along z
         thrust = values[:, :, 1]
         found.append(basis.analysis @ (thrust / np.linalg.norm(thrust, axis=-1, keepdims=True)))
@@ -245,7 +245,7 @@ def interpolated(
     return ChebyshevSeries(curve.trajectory, pieces, series, error, columns.scale(vehicle), everywhere)
 
 
-def _derived(weights: Sequence[Array], values: Array, rates: Array) -> Array:
+def _weighted(weights: Sequence[Array], values: Array, rates: Array) -> Array:
     """Return the quantities of derived limits, or their errors, from `quantities.values` and derivatives.
 
     A wrench is linear in the rotors' thrusts, so quantities that are linear in the wrench are linear in the

@@ -40,14 +40,14 @@ CLEARANCE_TIGHTNESS = 3e-4  # [m] largest distance between the proven bound and 
 NEAR_TIGHTNESS = 0.5  # this distance as a fraction of the gap, where that is smaller
 OVERLAP_TIGHTNESS = 0.02  # this distance as a fraction of an overlap's depth, where that is larger
 FINEST_TIGHTNESS = 1e-6  # [m] smallest value of this distance, for tiny gaps
-FIRST = 64  # pieces considered first: any small gap found prunes many others
+FIRST_PIECES = 64  # pieces considered first: any small gap found prunes many others
 HALVINGS = 3  # halvings between searches for planes; these cost little more for 100 pairs than for one
 ROUNDS = 14  # rounds of searching planes and halving
-MAX_OPEN = 20_000  # limit of the pairs besides the initial ones; no known path needs a tenth of it
+MAX_PAIRS = 20_000  # limit of the pairs besides the initial ones; no known path needs a tenth of it
 
 
 @dataclass(frozen=True)
-class LeastGap:
+class ClearanceEnclosure:
     """The smallest gap between a body and obstacles, enclosed between `value` and `bound`."""
 
     value: float = inf  # [m] the gap reached at `time`
@@ -71,8 +71,8 @@ def clearance_finding(attitude: BodyPath | None, ball: BodyPath, pieces: Pieces)
         ball: The ball around the body, on the rest of the path.
         pieces: The pieces of the obstacles, at least one.
     """
-    known = LeastGap() if attitude is None else least_gap(attitude, pieces)
-    around = least_gap(ball, pieces)
+    known = ClearanceEnclosure() if attitude is None else enclose_clearance(attitude, pieces)
+    around = enclose_clearance(ball, pieces)
     bound = min(known.bound, around.bound)
     nearest, verdict = min(known, around, key=lambda gap: gap.value), Verdict.UNDECIDED
     if bound >= 0.0:
@@ -94,23 +94,23 @@ def frame_findings(
         ball: The ball around the body, on the rest of the path.
         passages: The passages of gates.
     """
-    return [_clear(attitude, ball, passage) for passage in passages]
+    return [_frame_finding(attitude, ball, passage) for passage in passages]
 
 
-def _clear(attitude: BodyPath | None, ball: BodyPath, passage: PlannedPassage) -> Finding:
+def _frame_finding(attitude: BodyPath | None, ball: BodyPath, passage: PlannedPassage) -> Finding:
     """Return the finding about one passage."""
     gate, reach = passage.gate, ball.body.reach
     around = gate.opening.circumradius + reach
     paths = [path for path in (attitude, ball) if path is not None]
-    away = np.sort(np.concatenate([_away(path, gate, around) for path in paths]))
-    begin = away[away < passage.time].max(initial=0.0)
-    end = away[away > passage.time].min(initial=ball.trajectory.duration)
+    off_gate = np.sort(np.concatenate([_times_off_gate(path, gate, around) for path in paths]))
+    begin = off_gate[off_gate < passage.time].max(initial=0.0)
+    end = off_gate[off_gate > passage.time].min(initial=ball.trajectory.duration)
     known = None if attitude is None else attitude.during(begin, end)
     found = clearance_finding(known, ball.during(begin, end), Pieces(gate.plane_around(around + reach)))
     return replace(found, gate=gate.name, obstacle=None, field="")
 
 
-def _away(path: BodyPath, gate: Gate, around: float) -> Array:
+def _times_off_gate(path: BodyPath, gate: Gate, around: float) -> Array:
     """Return instants [s] at which the body is not at a gate's plane within `around` [m] of its centre."""
     times, centres, axes = path.sampled
     offset = centres - gate.places(times)
@@ -121,25 +121,25 @@ def _away(path: BodyPath, gate: Gate, around: float) -> Array:
     return np.asarray(times[is_off | (np.linalg.norm(offset, axis=1) > around)])
 
 
-def least_gap(path: BodyPath, pieces: Pieces) -> LeastGap:
+def enclose_clearance(path: BodyPath, pieces: Pieces) -> ClearanceEnclosure:
     """Enclose the smallest gap between a body on its path and the pieces; infinite for an empty path."""
     if not len(path.pieces):
-        return LeastGap()
+        return ClearanceEnclosure()
     centres, radii = path.balls
     lower = pieces.apart(centres, centres, path.pieces.spans(path.trajectory)) - radii[:, None]
-    first = np.argsort(lower.min(axis=0))[:FIRST]
-    pairs = _Beside.of(path, pieces, lower[:, first].argmin(axis=0), first).separated()
-    found = pairs.nearest(LeastGap())
+    first = np.argsort(lower.min(axis=0))[:FIRST_PIECES]
+    pairs = _PathObstaclePairs.of(path, pieces, lower[:, first].argmin(axis=0), first).separated()
+    found = pairs.nearest(ClearanceEnclosure())
     near = lower < found.enough
     found = replace(found, bound=float(lower[~near].min(initial=inf)))
-    pairs = _Beside.of(path, pieces, *np.nonzero(near))
-    most = MAX_OPEN + len(pairs)
+    pairs = _PathObstaclePairs.of(path, pieces, *np.nonzero(near))
+    most = MAX_PAIRS + len(pairs)
     for _ in range(ROUNDS):
         pairs = pairs.separated()
-        found, pairs = pairs.left_open(pairs.nearest(found))
+        found, pairs = pairs.pruned(pairs.nearest(found))
         for _ in range(HALVINGS):
             pairs = pairs.halves()
-        found, pairs = pairs.left_open(found)
+        found, pairs = pairs.pruned(found)
         if not 0 < len(pairs) <= most:
             break
     # bounds of pairs that are still open are valid, but may not be tight
@@ -147,7 +147,7 @@ def least_gap(path: BodyPath, pieces: Pieces) -> LeastGap:
 
 
 @dataclass(frozen=True, eq=False)
-class _Beside:
+class _PathObstaclePairs:
     """Pairs of a part of a path and a piece of an obstacle, with a plane that touches the piece."""
 
     path: BodyPath
@@ -159,7 +159,7 @@ class _Beside:
     offsets: Array  # h [m], (m,)
 
     @classmethod
-    def of(cls, path: BodyPath, pieces: Pieces, rows: Indices, obstacles: Indices) -> _Beside:
+    def of(cls, path: BodyPath, pieces: Pieces, rows: Indices, obstacles: Indices) -> _PathObstaclePairs:
         """Return pairs of whole pieces of a path and obstacles, before planes are known."""
         parts, count = Subintervals.whole(len(path.pieces))[rows], len(rows)
         return cls(path, pieces, parts, path.series[rows], obstacles, np.zeros((count, 3)), np.zeros(count))
@@ -167,8 +167,8 @@ class _Beside:
     def __len__(self) -> int:
         return len(self.parts)
 
-    def __getitem__(self, rows: Mask | Indices) -> _Beside:
-        return _Beside(
+    def __getitem__(self, rows: Mask | Indices) -> _PathObstaclePairs:
+        return _PathObstaclePairs(
             self.path,
             self.pieces,
             self.parts[rows],
@@ -178,16 +178,16 @@ class _Beside:
             self.offsets[rows],
         )
 
-    def halves(self) -> _Beside:
+    def halves(self) -> _PathObstaclePairs:
         """Return both halves of every part, with the same planes."""
         halves = chebyshev.basis(self.series.shape[1] - 1).halves
         series = np.concatenate([half @ self.series for half in halves])
         twice = np.tile(np.arange(len(self)), 2)
         return replace(self[twice], parts=self.parts.halves(), series=series)
 
-    def separated(self) -> _Beside:
+    def separated(self) -> _PathObstaclePairs:
         """Return the same pairs with the planes that separate best at the middle of the parts."""
-        centres, axes = np.split(_in_the_middle(self._relative), 2, axis=-1)
+        centres, axes = np.split(_at_middle(self._relative), 2, axis=-1)
         arms, shapes = self.path.body.turned(axes / np.linalg.norm(axes, axis=-1, keepdims=True))
         planes = self.pieces.separated(self.obstacles, centres + arms, shapes)
         found = replace(self, normals=planes.normals, offsets=planes.offsets)
@@ -196,7 +196,7 @@ class _Beside:
         normals = np.where(worse[:, None], self.normals, planes.normals)
         return replace(self, normals=normals, offsets=np.where(worse, self.offsets, planes.offsets))
 
-    def nearest(self, known: LeastGap) -> LeastGap:
+    def nearest(self, known: ClearanceEnclosure) -> ClearanceEnclosure:
         """Return the smallest gap at the middle of a part, or `known` where that is not larger."""
         gaps = self.middle + self.error
         row = int(np.argmin(gaps)) if len(gaps) else 0
@@ -206,7 +206,7 @@ class _Beside:
         name = self.pieces.pieces[self.obstacles[row]].name
         return replace(known, value=float(gaps[row]), time=time, obstacle=name)
 
-    def left_open(self, found: LeastGap) -> tuple[LeastGap, _Beside]:
+    def pruned(self, found: ClearanceEnclosure) -> tuple[ClearanceEnclosure, _PathObstaclePairs]:
         """Return `found` with the bound of all pairs that are far enough, and the remaining pairs."""
         near = self.lower < found.enough
         bound = (self.lower - self.error)[~near].min(initial=found.bound)
@@ -215,43 +215,45 @@ class _Beside:
     @cached_property
     def middle(self) -> Array:
         """The gaps [m] at the middle of the parts, without errors, (m,)."""
-        return _in_the_middle(self._linear)
+        return _at_middle(self._linear)
 
     @cached_property
     def lower(self) -> Array:
         """Lower bounds of the gaps [m] along the parts, without errors, (m,)."""
         peak, tail, _ = parabola_maximum(-self._linear)
-        return np.asarray(-peak - tail - self._bend)
+        return np.asarray(-peak - tail - self._tangent_excess)
 
     @cached_property
     def error(self) -> Array:
         """The largest error [m] of `middle` and `lower`, (m,)."""
         position, axis = self.path.error[self.parts.interval].T
-        bent = self._moved[2]
+        deviation = self._piece_motion[2]
         summed = np.abs(self._linear).sum(axis=1) + np.abs(self.offsets) + self.pieces.largest
         summed += np.abs(self.series[:, 0, :3]).sum(axis=1)
-        return np.asarray(position + bent + np.abs(self._lever) * axis + SUMMATION_ROUNDING * summed)
+        return np.asarray(
+            position + deviation + np.abs(self._axis_slope) * axis + SUMMATION_ROUNDING * summed
+        )
 
     @cached_property
     def _relative(self) -> Array:
         """The series relative to the pieces, whose motion along each part is approximated by a line."""
         if not self.pieces.moving:
             return self.series
-        middle, slope, _ = self._moved
+        middle, slope, _ = self._piece_motion
         series = self.series.copy()
         series[:, 0, :3] -= middle
         series[:, 1, :3] -= slope
         return series
 
     @cached_property
-    def _moved(self) -> tuple[Array, Array, Array]:
+    def _piece_motion(self) -> tuple[Array, Array, Array]:
         """Motion of the pieces [m], as m + s τ along the parts with τ in [−1, 1].
 
         Return m and s, (m, 3) each, and the largest distance of the true motion from that line, (m,).
         """
         begin, end = self._times(-1.0), self._times(1.0)
         first, last = self.pieces.moved(self.obstacles, begin), self.pieces.moved(self.obstacles, end)
-        bent = np.zeros(len(self))
+        deviation = np.zeros(len(self))
         for number, motion in self.pieces.moving:
             own = np.flatnonzero(self.obstacles == number)
             for jump in motion.times.tolist():
@@ -259,8 +261,8 @@ class _Beside:
                 part = ((jump - begin[inside]) / (end - begin)[inside])[:, None]
                 line = first[inside] + part * (last - first)[inside]
                 away = np.linalg.norm(motion.moved(np.full(len(inside), jump)) - line, axis=-1)
-                bent[inside] = np.maximum(bent[inside], away)
-        return (first + last) / 2.0, (last - first) / 2.0, bent
+                deviation[inside] = np.maximum(deviation[inside], away)
+        return (first + last) / 2.0, (last - first) / 2.0, deviation
 
     def _times(self, position: float) -> Array:
         """Return the times [s] of a position in [-1, 1] on each part, (m,)."""
@@ -268,7 +270,7 @@ class _Beside:
         return self.path.pieces[self.parts.interval].times(self.path.trajectory, along)
 
     @cached_property
-    def _along(self) -> tuple[Array, Array]:
+    def _projections(self) -> tuple[Array, Array]:
         """The series of n·p [m] and of u = n·b3, (m, K + 1) each."""
         places = self._relative.reshape(*self.series.shape[:2], 2, 3)
         along = (places @ self.normals[:, None, :, None])[..., 0]
@@ -278,7 +280,7 @@ class _Beside:
     def _tangents(self) -> tuple[Array, Array, Array]:
         """The values of u, of s [m] and of its slope [m] at the middle of the parts, (m,) each."""
         body = self.path.body
-        cosine = np.clip(_in_the_middle(self._along[1]), -1.0, 1.0)
+        cosine = np.clip(_at_middle(self._projections[1]), -1.0, 1.0)
         difference = body.wide**2 - body.high**2
         reached = np.sqrt(body.wide**2 - difference * cosine**2)
         return cosine, reached, -difference * cosine / reached
@@ -286,26 +288,26 @@ class _Beside:
     @cached_property
     def _linear(self) -> Array:
         """The series of φ [m] with s replaced by its tangent, (m, K + 1)."""
-        (position, turning), (cosine, reached, slope) = self._along, self._tangents
-        series = position + self._lever[:, None] * turning
+        (position, alignment), (cosine, reached, slope) = self._projections, self._tangents
+        series = position + self._axis_slope[:, None] * alignment
         series[:, 0] += slope * cosine - reached - self.path.body.aside - self.offsets
         return np.asarray(series)
 
     @property
-    def _lever(self) -> Array:
+    def _axis_slope(self) -> Array:
         """The derivative of φ with respect to u [m], (m,)."""
         return np.asarray(self.path.body.up - self._tangents[2])
 
     @property
-    def _bend(self) -> Array:
+    def _tangent_excess(self) -> Array:
         """The largest excess of s over its tangent [m] along the parts, (m,); 0 where wide ≥ high."""
-        body, turning = self.path.body, self._along[1]
-        beyond = np.abs(turning[:, 0] - self._tangents[0]) + np.abs(turning[:, 1:]).sum(axis=1)
+        body, alignment = self.path.body, self._projections[1]
+        beyond = np.abs(alignment[:, 0] - self._tangents[0]) + np.abs(alignment[:, 1:]).sum(axis=1)
         beyond += self.path.error[self.parts.interval, 1]
         return np.asarray(max(body.high**2 - body.wide**2, 0.0) / (2.0 * body.wide) * beyond**2)
 
 
-def _in_the_middle(series: Array) -> Array:
+def _at_middle(series: Array) -> Array:
     """Return the values of series (m, K + 1, ...) at the middle of their intervals, (m, ...)."""
     signs = np.cos(np.pi / 2 * np.arange(series.shape[1])).round()
     return np.asarray(np.tensordot(signs, series, (0, 1)))

@@ -53,8 +53,8 @@ def subdivide(curve: ThrustCurve, floor: float) -> Subdivision:
 
 def _accurate(curve: ThrustCurve, pieces: Subintervals, norms: Array) -> NDArray[np.bool_]:
     seconds = pieces.seconds(curve.trajectory)
-    found = interpolation_error.accuracy(
-        norms, seconds, curve.sums[pieces.interval], curve.vehicle, curve.turns(pieces)
+    found = interpolation_error.error_bounds(
+        norms, seconds, curve.sums[pieces.interval], curve.vehicle, curve.yaw_bounds(pieces)
     )
     allowed = MAX_REMAINDER * np.maximum(quantities.scales(curve.vehicle), found.magnitude)
     small = (found.remainder <= allowed).all(axis=1)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification.enclosure import chebyshev
-from aerobat.certification.enclosure.interpolation_error import Turns
+from aerobat.certification.enclosure.interpolation_error import YawBounds
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.flatness.references import lateral_drag
@@ -84,13 +84,13 @@ class ThrustCurve:
         found = [polynomial.evaluate(yaw[pieces.interval, None], s) for yaw in self.yaw]
         return np.concatenate(found, axis=-1) if found else None
 
-    def turns(self, pieces: Subintervals) -> Turns | None:
+    def yaw_bounds(self, pieces: Subintervals) -> YawBounds | None:
         """Return the magnitudes of the yaw's Chebyshev terms on pieces, or None without yaw."""
         values = self.yaw_on(pieces)
         if values is None:
             return None
         sums = np.stack([np.abs(yaw[pieces.interval, :, 0]).sum(axis=1) for yaw in self.yaw], axis=-1)
-        return Turns(np.abs(self.basis.analysis @ values), chebyshev.EVALUATION_ROUNDING * sums)
+        return YawBounds(np.abs(self.basis.analysis @ values), chebyshev.EVALUATION_ROUNDING * sums)
 
     def series(self, values: Array) -> Array:
         """Return the Chebyshev series of v, f, f', f'' from their values `on` pieces, (P, K + 1, 4, 3)."""

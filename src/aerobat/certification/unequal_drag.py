@@ -67,12 +67,12 @@ def interpolated_with_unequal_drag(
     values = np.stack([x.values for x in bounded], axis=-1)
     proven = np.isfinite(error).all(axis=1) & np.isfinite(values).all(axis=(1, 2))
     count = len(pieces) if proven.all() else int(np.argmin(proven))
-    lost = _from(curve, motion.pieces, count)
+    unproven = _from(curve, motion.pieces, count)
     if count == 0:
-        return None, lost
+        return None, unproven
     known, series = motion.pieces[:count], motion.basis.analysis @ values[:count]
-    scale, everywhere = columns.scale(curve.vehicle), everywhere and not lost
-    return ChebyshevSeries(curve.trajectory, known, series, error[:count], scale, everywhere), lost
+    scale, everywhere = columns.scale(curve.vehicle), everywhere and not unproven
+    return ChebyshevSeries(curve.trajectory, known, series, error[:count], scale, everywhere), unproven
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +150,7 @@ class _Motion:
         """The inverse of the squared norm of the quaternion."""
         return self.squared.bounded().inverse(self.squared.least())
 
-    def turned(self, world: Array) -> list[Array]:
+    def body_polynomials(self, world: Array) -> list[Array]:
         """Return world vectors (P, N, 3) or (3,) in body axes, times `squared`: polynomials, (P, N) each."""
         w, x, y, z = self.quaternion
         a, b, c = np.moveaxis(world, -1, 0)
@@ -173,7 +173,8 @@ class _Motion:
         size = np.linalg.norm(bounds, axis=0)
         off = rounding + self.attitude_error * size
         x, y, z = (
-            self.polynomials(component).bounded() * self.per_square for component in self.turned(world)
+            self.polynomials(component).bounded() * self.per_square
+            for component in self.body_polynomials(world)
         )
         return x.with_error(off), y.with_error(off), z.with_error(off)
 
@@ -193,11 +194,11 @@ class _Motion:
         least, defect, slope, rate = [], [], [], []
         for axis, coefficient in enumerate(self.drag[:2].tolist()):
             (zeroth, off), (first, off_first) = (self.dragged(coefficient, k) for k in (0, 1))
-            parts = self.turned(zeroth)
+            parts = self.body_polynomials(zeroth)
             least.append(self.polynomials(parts[2]).least()[:, 0] / self.squared.bound()[:, 0] - off)
             defect.append(sup(parts[axis]) + off)
             slope.append(sup(parts[1 - axis]) + off)
-            rate.append(sup(self.turned(first)[axis]) + off_first)
+            rate.append(sup(self.body_polynomials(first)[axis]) + off_first)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             lowest = np.where(np.minimum(*least) > 0.0, np.minimum(*least), 0.0)
             tilt = np.hypot(*defect) / lowest  # tilt error without any error about the thrust axis
@@ -208,8 +209,8 @@ class _Motion:
             driven = seconds * (sup(self._spin) + omega * tilt)
             grown = np.exp(seconds * omega * lever)
             angle, largest = 0.0, []
-            for handed, more, growth in zip(self._handed_over, driven, grown, strict=True):
-                angle = 2 * growth * (angle / 2 + handed + more)
+            for jump, more, growth in zip(self._attitude_jumps, driven, grown, strict=True):
+                angle = 2 * growth * (angle / 2 + jump + more)
                 largest.append(angle)
             found = 2 * tilt + np.array(largest) * (1 + lever)
         return np.where(found < LARGEST_ERROR, found, np.inf)
@@ -225,7 +226,7 @@ class _Motion:
         return spin if self.yaw is None else spin - self.yaw[0].values * self.squared.values
 
     @cached_property
-    def _handed_over(self) -> Array:
+    def _attitude_jumps(self) -> Array:
         """The angle [rad] between the attitude at a piece's start and that of its predecessor's end, (P,)."""
         ends = series_of.chebvander(np.array([-1.0, 1.0]), QUATERNION_DEGREE) @ self.attitude
         before = np.concatenate([self.start[None], ends[:-1, 1]])
@@ -264,12 +265,12 @@ class _Motion:
     def axis(self, direction: Array) -> Bounded:
         """Return the component of the thrust axis along a direction (3,)."""
         off = self.attitude_error * float(np.linalg.norm(direction))
-        along = self.polynomials(self.turned(direction)[2]).bounded() * self.per_square
+        along = self.polynomials(self.body_polynomials(direction)[2]).bounded() * self.per_square
         return along.with_error(off)
 
     def _inverse(self, coefficient: float, along: Bounded) -> Bounded:
         """Return 1/α_z or 1/β_z, given `along` = α_z or β_z."""
-        whole = self.polynomials(self.turned(self.dragged(coefficient, 0)[0])[2])
+        whole = self.polynomials(self.body_polynomials(self.dragged(coefficient, 0)[0])[2])
         least = whole.least() / self.squared.bound()
         return along.inverse(least)
 
@@ -292,9 +293,9 @@ def _is_rough(bounded: Sequence[Bounded], motion: _Motion, columns: SeriesColumn
     scales = columns.scale(motion.curve.vehicle)[: stated + len(columns.derived)]
     rough = np.zeros(len(motion.pieces), dtype=bool)
     for i, (column, scale) in enumerate(zip(bounded, scales, strict=False)):
-        part = MAX_REMAINDER if i < stated else MAX_COMMAND_REMAINDER
+        tolerance = MAX_REMAINDER if i < stated else MAX_COMMAND_REMAINDER
         size = np.maximum(scale, column.bound[:, 0])
-        rough |= ~(_remainder(column, motion) <= part * size)
+        rough |= ~(_remainder(column, motion) <= tolerance * size)
     return rough
 
 

@@ -57,7 +57,7 @@ class EllipseBounds:
 
 
 @dataclass(frozen=True)
-class Turns:
+class YawBounds:
     """The yaw relative to a frame without spin, with two time derivatives, along P pieces."""
 
     terms: Array  # magnitudes of their Chebyshev coefficients, (P, K + 1, 3)
@@ -77,8 +77,8 @@ def regular(norms: Array) -> NDArray[np.bool_]:
     return _off_zero(thrust[:, 0], thrust[:, 1:] @ growth(thrust.shape[1] - 1, RHO[1:2])[1:, 0])
 
 
-def accuracy(
-    norms: Array, seconds: Array, sums: Array, vehicle: Vehicle, turns: Turns | None = None
+def error_bounds(
+    norms: Array, seconds: Array, sums: Array, vehicle: Vehicle, yaw: YawBounds | None = None
 ) -> InterpolationError:
     """Bound the interpolation error on regular pieces.
 
@@ -87,18 +87,18 @@ def accuracy(
         seconds: Durations of the pieces [s], (P,).
         sums: Sums of the absolute values of the terms of v, f, f', f'', (P, 4).
         vehicle: The vehicle.
-        turns: Its yaw relative to the frame without spin, or None.
+        yaw: Its yaw relative to the frame without spin, or None.
     """
-    around = on_ellipses(norms, seconds / 2, vehicle, turns)
+    around = on_ellipses(norms, seconds / 2, vehicle, yaw)
     real = MagnitudeBounds(*(bound[:, 0] for bound in vars(around.magnitudes).values()))
     min_thrust = norms[:, 0, 1] - norms[:, 1:, 1].sum(axis=1)
     speed = norms[..., 0].sum(axis=1)
     rounded = first_order(real, min_thrust, speed, EVALUATION_ROUNDING * sums, vehicle)
-    if turns is not None:
-        off, rate, acceleration = turns.rounding.T
+    if yaw is not None:
+        off, rate, acceleration = yaw.rounding.T
         omega = rounded.omega + off * real.omega + rate
         omega_dot = rounded.omega_dot + off * real.omega_dot + acceleration
-        omega_dot += turns.on_ellipses[:, 0, 1] * rounded.omega + rate * real.omega
+        omega_dot += yaw.on_ellipses[:, 0, 1] * rounded.omega + rate * real.omega
         rounded = replace(rounded, omega=omega, omega_dot=omega_dot)
     decay, rate_decay = tails(norms.shape[1] - 1, RHO[1:])
     bounds = np.where(around.regular[..., None], quantities.bounds(vehicle, around.magnitudes), np.inf)
@@ -121,7 +121,7 @@ def accuracy(
     )
 
 
-def on_ellipses(norms: Array, half: Array, vehicle: Vehicle, turns: Turns | None = None) -> EllipseBounds:
+def on_ellipses(norms: Array, half: Array, vehicle: Vehicle, yaw: YawBounds | None = None) -> EllipseBounds:
     """Return bounds from the norms (P, K + 1, 4) of the terms of v, f, f', f''.
 
     `half` (P,) is half the duration of the pieces [s].
@@ -136,14 +136,14 @@ def on_ellipses(norms: Array, half: Array, vehicle: Vehicle, turns: Turns | None
     ratio = (mean + away) / root  # upper bound of |f|/|n|
     twist = half[:, None] * away * jerk / (2 * root**2)
     curl = twist * (RHO + 1 / RHO) / 2  # imaginary part of the angle, accumulated from the real line
-    if turns is not None:
-        turned, rate, acceleration = np.moveaxis(turns.on_ellipses, -1, 0)
+    if yaw is not None:
+        turned, rate, acceleration = np.moveaxis(yaw.on_ellipses, -1, 0)
         curl = curl + turned
     usable &= curl < MAX_FRAME_ANGLE
     frame = (1 + away * mean / root**2) * np.exp(np.where(usable, curl, 0.0))  # upper bound of |x|, |y|
     omega = frame * jerk / root
     omega_dot = frame * (snap + 2 * ratio * jerk**2 / root) / root
-    if turns is not None:
+    if yaw is not None:
         omega_dot = np.hypot(omega_dot + rate * omega, acceleration)
         omega = np.hypot(omega, rate)
     grown = away * (2 * mean + away) / (mean + root)  # upper bound of |n − c|

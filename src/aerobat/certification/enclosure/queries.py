@@ -36,7 +36,7 @@ class ExtremumQuery:
     slack: float = 0.0  # violation that still counts as met
     source: Limit | None = None  # the limit that sets this bound
 
-    def answer(self, reached: float, bound: float, time: float, everywhere: bool) -> Finding:
+    def finding(self, reached: float, bound: float, time: float, everywhere: bool) -> Finding:
         """Return the finding for a proven enclosure of the maximum.
 
         Args:
@@ -78,7 +78,7 @@ class ChebyshevSeries:
         alternating = (-1.0) ** np.arange(self.series.shape[1])
         return np.stack([alternating @ self.series, self.series.sum(axis=1)], axis=1)
 
-    def answers(self, queries: Sequence[ExtremumQuery]) -> list[Finding]:
+    def findings(self, queries: Sequence[ExtremumQuery]) -> list[Finding]:
         """Return a finding for each query; none if there are no pieces."""
         count = len(self.pieces)
         if not (count and queries):
@@ -95,7 +95,9 @@ class ChebyshevSeries:
         found = enclose_maximum(batch)
         times = self.pieces[found.member // len(queries)].times(self.trajectory, found.position)
         ranges = zip(queries, found.min.tolist(), found.max.tolist(), times.tolist(), strict=True)
-        return [query.answer(reached, bound, time, self.everywhere) for query, reached, bound, time in ranges]
+        return [
+            query.finding(reached, bound, time, self.everywhere) for query, reached, bound, time in ranges
+        ]
 
 
 def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float) -> list[ExtremumQuery]:

@@ -62,7 +62,7 @@ def kinematic_findings(trajectory: Trajectory, speed: float, limits: Iterable[Li
     """Return the findings about the largest speed [m/s] and the extrema of path quantities with limits."""
     curve = PolynomialCurve.of(trajectory)
     columns = [_speed(curve, speed), *(_linear(curve, limit, place) for place, limit in enumerate(limits, 1))]
-    return curve.series(columns).answers([query for column in columns for query in column.queries])
+    return curve.series(columns).findings([query for column in columns for query in column.queries])
 
 
 def _speed(curve: PolynomialCurve, limit: float) -> PolynomialColumn:
