@@ -181,17 +181,19 @@ def test_a_path_that_bends_no_more_than_its_way_through_a_gate_clears_the_frame_
 
     def is_asked(speed: float) -> bool:
         position, velocity = (gate.position + offset).tolist(), (speed * along).tolist()
-        return min(opening.room(FloatOps, position, velocity, extent)) >= 0.0
+        return min(opening.clearances(FloatOps, position, velocity, extent)) >= 0.0
 
     slowest = next((speed for speed in np.geomspace(0.3, 100.0, 80) if is_asked(speed)), None)
     assume(slowest)
     velocity = slowest * along
     for side in (gate.lateral, -gate.lateral, gate.up, -gate.up):
-        passage = Motion(gate, body, offset, velocity, way.bending * side, one.attitude, np.zeros(3)).passage(
-            5 * RATE
-        )
+        passage = Motion(
+            gate, body, offset, velocity, way.lateral_acceleration * side, one.attitude, np.zeros(3)
+        ).passage(5 * RATE)
         assert passage.clearance > 0.0
-    slowed = Motion(gate, body, offset, velocity, -way.bending * gate.normal, one.attitude, np.zeros(3))
+    slowed = Motion(
+        gate, body, offset, velocity, -way.lateral_acceleration * gate.normal, one.attitude, np.zeros(3)
+    )
     times = np.arange(0.0, 5.0, 1e-3)
     assert ((slowed.states(times)[0] - gate.position) @ gate.normal).max() > 0.999 * way.reach
 

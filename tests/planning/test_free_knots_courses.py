@@ -97,7 +97,7 @@ def test_a_path_is_made_more_direct_by_less_where_the_body_only_touches_the_fram
         hit = Finding("clearance", "m", Side.MIN, clearance, clearance, 0.0, 0.0, Verdict.VIOLATED)
         (body,) = more_direct((), stages, task, [hit])
         (again,) = more_direct((body,), stages, task, [hit])
-        return again.bending / body.bending
+        return again.lateral_acceleration / body.lateral_acceleration
 
     assert 1.0 < raised_by(-0.001) < raised_by(-0.1)
 

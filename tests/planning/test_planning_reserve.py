@@ -8,7 +8,7 @@ import pytest
 
 from aerobat.certification import Certificate, Side
 from aerobat.errors import Infeasible
-from aerobat.limits.limit import kept as kept_of
+from aerobat.limits.limit import effective_reserve
 from aerobat.planning import FreeKnots, Miqp, Planner, TimeOptimal
 from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.recorder import Recorder
@@ -94,9 +94,9 @@ def test_a_large_reserve_leaves_strong_rotors_the_room_to_sink() -> None:
 
 
 def test_of_a_small_room_a_reserve_keeps_a_part_that_grows_and_never_all() -> None:
-    assert kept_of(0.3, float("inf")) == 0.3
-    assert kept_of(0.15, 0.15) == pytest.approx(0.075)
-    parts = [kept_of(0.01 * k, 0.15) for k in range(50)]
+    assert effective_reserve(0.3, float("inf")) == 0.3
+    assert effective_reserve(0.15, 0.15) == pytest.approx(0.075)
+    parts = [effective_reserve(0.01 * k, 0.15) for k in range(50)]
     assert parts == sorted(parts)
     assert parts[0] == 0.0
     assert parts[-1] < 0.15

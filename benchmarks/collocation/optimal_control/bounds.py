@@ -81,7 +81,7 @@ class Bounds:
     def kept(self, reserve: float) -> Array:
         """The reserve that rotors keep from their lower and upper ends, zero of all else, (2, M)."""
         limits = (*self.path, *self.driven)
-        shares = [(0.0, 0.0) if limit.rotor is None else limit.kept(reserve) for limit in limits]
+        shares = [(0.0, 0.0) if limit.rotor is None else limit.reserves(reserve) for limit in limits]
         return np.asarray(self.sizes * np.array([*shares, (0.0, 0.0)]).T)
 
     @cached_property

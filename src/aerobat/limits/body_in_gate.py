@@ -31,7 +31,8 @@ from aerobat.kernels.vectors import dot, subtract
 from aerobat.problem.gate import Gate
 from aerobat.vehicle import Ellipsoid
 
-SLOWEST = 0.5  # [m/s] lower bound of v_n in the curvature term; far below the speeds required at gates
+# [m/s] lower bound of v_n in the curvature term; far below the speeds required at gates
+MIN_NORMAL_SPEED = 0.5
 FRAME_CLEARANCE = 0.01  # [m] smallest distance of the body from the frame
 
 # [m] extent of a body from its centre of mass in an outward direction
@@ -46,7 +47,7 @@ class OpeningAhead(NamedTuple):
     outward: tuple[Vector, ...]  # normals of its K sides
     distances: tuple[Scalar, ...]  # [m] of the sides from the place
     reach: Scalar  # [m] distance before and behind the plane over which the body must be clear
-    bending: Scalar  # [m/s²] largest acceleration across a straight line
+    lateral_acceleration: Scalar  # [m/s²] largest acceleration across a straight line
 
     @classmethod
     def of_parameters(cls, parameters: Sequence[Scalar]) -> OpeningAhead:
@@ -59,7 +60,7 @@ class OpeningAhead(NamedTuple):
         distances = tuple(parameters[6 + 3 * sides + k] for k in range(sides))
         return cls(vectors[0], vectors[1], outward, distances, parameters[-2], parameters[-1])
 
-    def room(self, ops: Ops, position: Vector, velocity: Vector, extent: Extent) -> Iterator[Scalar]:
+    def clearances(self, ops: Ops, position: Vector, velocity: Vector, extent: Extent) -> Iterator[Scalar]:
         """Yield 2 K + 1 values that are nonnegative where the body is clear of the frame.
 
         The values are the clearance [m²/s] on each side, before and behind the plane, and the excess speed
@@ -72,13 +73,14 @@ class OpeningAhead(NamedTuple):
             extent: Extent of the body in its attitude there.
         """
         through, offset = dot(self.normal, velocity), subtract(position, self.place)
-        bent = self.bending * self.reach * self.reach / 2.0 / ops.maximum(through, SLOWEST)
+        deviation = self.lateral_acceleration * self.reach * self.reach / 2.0
+        deviation = deviation / ops.maximum(through, MIN_NORMAL_SPEED)
         for outward, distance in zip(self.outward, self.distances, strict=True):
-            room = (distance - extent(outward) - dot(outward, offset)) * through - bent
+            clearance = (distance - extent(outward) - dot(outward, offset)) * through - deviation
             across = self.reach * dot(outward, velocity)
-            yield room - across
-            yield room + across
-        yield through - ops.sqrt(2.0 * self.bending * self.reach)
+            yield clearance - across
+            yield clearance + across
+        yield through - ops.sqrt(2.0 * self.lateral_acceleration * self.reach)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +90,12 @@ class BodyInGate:
     gate: Gate
     stage: int
     reach: float  # [m] distance before and behind the plane over which the body must be clear
-    bending: float  # [m/s²] largest acceleration across a straight line
+    lateral_acceleration: float  # [m/s²] largest acceleration across a straight line
 
     @property
     def min_speed(self) -> float:
         """The smallest speed through the gate [m/s] at which the path cannot turn back."""
-        return sqrt(2.0 * self.bending * self.reach)
+        return sqrt(2.0 * self.lateral_acceleration * self.reach)
 
     @property
     def parameters(self) -> Array:
@@ -101,7 +103,7 @@ class BodyInGate:
         normals, distances = self.gate.opening.sides
         outward = normals @ self.gate.plane_axes
         place = np.concatenate([self.gate.position, self.gate.normal])
-        ahead = [self.reach, self.bending]
+        ahead = [self.reach, self.lateral_acceleration]
         return np.concatenate([place, outward.ravel(), distances - FRAME_CLEARANCE, ahead])
 
 

@@ -105,7 +105,7 @@ class Clearance:
         return bodies, numbers, found
 
 
-def left_between(
+def plane_clearance(
     ops: Ops, revolved: Sequence[Scalar], position: Vector, thrust: Vector, normal: Vector, offset: Scalar
 ) -> Scalar:
     """Return the clearance between a body and a plane [m].

@@ -15,7 +15,7 @@ from aerobat.problem import Condition, Limits
 from aerobat.problem.condition import ForceBalance
 from aerobat.vehicle import Vehicle
 
-HALF = 0.15  # reserve for which `kept` keeps half of a small room
+HALVING_RESERVE = 0.15  # reserve for which `effective_reserve` keeps half of a small room
 SMALLEST_SIZE = 1e-3  # in SI units: a smaller bound gets size 1
 
 
@@ -35,7 +35,7 @@ class Limit:
     fields: tuple[str, str]  # that set the lower and the upper bound: "max_thrust", "limits.velocity"
     size: float  # size of its range; reserves and violations are fractions of it
     rotor: int | None = None  # index of the rotor that the limit is about
-    # room next to either end, as a fraction of the size; `kept` reduces the reserve in a small room
+    # room next to either end, as a fraction of the size; a small room reduces the reserve
     rooms: tuple[float, float] = (0.0, 0.0)
     # whether other limits imply it along a whole path, so that an optimizer may omit it
     is_implied: bool = False
@@ -63,10 +63,10 @@ class Limit:
         constant = self.quantity.constant
         return (self.lower - constant) / self.size, (self.upper - constant) / self.size
 
-    def kept(self, reserve: float) -> tuple[float, float]:
+    def reserves(self, reserve: float) -> tuple[float, float]:
         """Return the reserve kept for the controller at either end, as fractions of the limit's size."""
         lower, upper = self.rooms
-        return kept(reserve, lower), kept(reserve, upper)
+        return effective_reserve(reserve, lower), effective_reserve(reserve, upper)
 
     def exceeded(self, excess: float, time: float, fields: Sequence[str] = ()) -> Reason:
         """Return a sentence without its full stop about a violation.
@@ -96,13 +96,13 @@ class Asked:
         return force_balance(self.environment, self.vehicle)
 
 
-def kept(reserve: float, room: float) -> float:
+def effective_reserve(reserve: float, room: float) -> float:
     """Return the reserve that is kept at an end with some room: the reserve, or a part of a small room.
 
-    A reserve of HALF keeps half of the room, and no reserve keeps all of it. Both are fractions of a limit's
-    size.
+    A reserve of HALVING_RESERVE keeps half of the room, and no reserve keeps all of it. Both are fractions of
+    a limit's size.
     """
-    return min(reserve, room * (reserve / (reserve + HALF))) if reserve > 0.0 else 0.0
+    return min(reserve, room * (reserve / (reserve + HALVING_RESERVE))) if reserve > 0.0 else 0.0
 
 
 def quantity_name(quantity: str, rotor: int | None) -> str:

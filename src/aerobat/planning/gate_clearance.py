@@ -67,7 +67,8 @@ def more_direct(
             found[k] = _body_in_gate(k, stages, task, BENDING_IN_MANEUVER)
         else:
             touches = frame.value >= -FRAME_CLEARANCE
-            found[k] = replace(last, bending=(A_LITTLE_MORE if touches else MORE_BENDING) * last.bending)
+            factor = A_LITTLE_MORE if touches else MORE_BENDING
+            found[k] = replace(last, lateral_acceleration=factor * last.lateral_acceleration)
     return tuple(body for body in found.values() if body is not None)
 
 

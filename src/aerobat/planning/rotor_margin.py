@@ -11,7 +11,7 @@ from aerobat.certification.certificate import proven_margin
 from aerobat.environment import Environment
 from aerobat.errors import Reason
 from aerobat.flatness import reference
-from aerobat.limits.limit import kept
+from aerobat.limits.limit import effective_reserve
 from aerobat.simulation.outcome import digits
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -137,7 +137,9 @@ def reserve_shortfalls(certificate: Certificate, reserve: float) -> list[Reserve
     if reserve <= 0.0:
         return []
     found = [
-        ReserveShortfall(finding, kept(reserve, finding.room), proven_margin(finding) / _size(finding))
+        ReserveShortfall(
+            finding, effective_reserve(reserve, finding.room), proven_margin(finding) / _size(finding)
+        )
         for finding in rotor_findings(certificate)
     ]
     return sorted((each for each in found if each.size > 0.0), key=lambda shortfall: shortfall.kept)

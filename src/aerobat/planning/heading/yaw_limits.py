@@ -65,7 +65,7 @@ class YawLimits:
     @cached_property
     def _ends(self) -> Array:
         lower, upper = np.array([limit.ends for limit in self._limits]).reshape(-1, 2).T
-        keep = np.array([limit.kept(self.task.reserve) for limit in self._limits])
+        keep = np.array([limit.reserves(self.task.reserve) for limit in self._limits])
         ends = np.concatenate([upper - keep[:, 1], -lower - keep[:, 0]])
         return np.asarray(np.maximum(ends, self._values(np.zeros((ORDERS, len(self.times))))))
 

@@ -15,7 +15,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.engines.llvm.functions import NO_DIRECTION, SmoothFunctions, smooth_functions, triples
 from aerobat.kernels.ops import Ops, Scalar
-from aerobat.limits.clearance import NEAREST, SIZE, Clearance, Planes, left_between
+from aerobat.limits.clearance import NEAREST, SIZE, Clearance, Planes, plane_clearance
 from aerobat.planning.task import Task
 
 MOVED = 6  # number of components of velocity and acceleration, in which clearances are nonlinear
@@ -95,6 +95,6 @@ def _functions() -> SmoothFunctions:
         ops: Ops, revolved: Sequence[Scalar], thrust: Sequence[Scalar], others: Sequence[Scalar]
     ) -> Sequence[Scalar]:
         (along,), (position, normal) = triples(thrust), triples(others[:6])
-        return [left_between(ops, revolved, position, along, normal, others[6])]
+        return [plane_clearance(ops, revolved, position, along, normal, others[6])]
 
     return smooth_functions(kernel, 4, 3, 7)

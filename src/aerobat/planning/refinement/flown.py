@@ -93,8 +93,11 @@ class FlownPath:
 
 
 def _halfway(before: Sequence[BodyInGate], in_gates: Sequence[BodyInGate]) -> tuple[BodyInGate, ...]:
-    """Return rooms whose `bending` is halfway between both; a gate without room before counts as zero."""
-    bending = {body.stage: body.bending for body in before}
+    """Return the mean of both lateral accelerations in each gate, counting zero for a gate without one before."""
+    accelerations = {body.stage: body.lateral_acceleration for body in before}
     return tuple(
-        replace(body, bending=0.5 * (body.bending + bending.get(body.stage, 0.0))) for body in in_gates
+        replace(
+            body, lateral_acceleration=0.5 * (body.lateral_acceleration + accelerations.get(body.stage, 0.0))
+        )
+        for body in in_gates
     )

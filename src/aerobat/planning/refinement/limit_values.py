@@ -91,7 +91,7 @@ class LimitValues:
     @cached_property
     def reserve(self) -> Array:
         """The reserve for the controller in each constraint, as a fraction of its limit's size, (c,)."""
-        return np.array([limit.kept(self.task.reserve)[sign > 0.0] for limit, sign in self.sides])
+        return np.array([limit.reserves(self.task.reserve)[sign > 0.0] for limit, sign in self.sides])
 
     def frames(self, times: Array, derivatives: Array) -> Frames:
         """Return the body axes and planes of a path with derivatives (m, 6, 3) at times (m,)."""

@@ -180,7 +180,7 @@ def room_functions(sides: int) -> SmoothFunctions:
         (position, velocity, acceleration), (constant,) = triples(state), triples(shared[5:8])
         thrust = add(add_scaled(acceleration, shared[4], velocity), constant)
         extent = extent_of_thrust(ops, shared[:4], thrust)
-        return [*OpeningAhead.of_parameters(shared[8:]).room(ops, position, velocity, extent)]
+        return [*OpeningAhead.of_parameters(shared[8:]).clearances(ops, position, velocity, extent)]
 
     return smooth_functions(kernel, 16 + 4 * sides, STATE)
 
