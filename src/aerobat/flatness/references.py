@@ -39,7 +39,7 @@ from aerobat.vehicle.allocation import rotor_thrusts
 QUINTIC = 5  # degree of the interpolant of the thrust between nodes
 # parts of a segment whose thrust has a higher degree; the error of quintics falls with the length to the
 # sixth
-PARTS = 16
+QUINTICS_PER_SEGMENT = 16
 UNDETERMINED = 1e-3  # the attitude is undetermined where |f| is below this fraction of gravity
 
 
@@ -92,8 +92,8 @@ def reference(
     if not has_unequal_drag(vehicle):
         path, at = _mean_frames(trajectory, vehicle, environment, times)
         return _assembled(times, flat, path, at, vehicle, environment, None, yaw)
-    path, at, turned = _turned_frames(trajectory, vehicle, environment, times)
-    return _assembled(times, flat, path, at, vehicle, environment, turned.at(times), yaw)
+    path, at, frame_angle = _unequal_frames(trajectory, vehicle, environment, times)
+    return _assembled(times, flat, path, at, vehicle, environment, frame_angle.at(times), yaw)
 
 
 @validated
@@ -128,8 +128,8 @@ def reference_of(
         angle = np.zeros(len(times))
         if times[-1] > times[0]:
             trajectory = trajectory_through(times, flat, heading)
-            *_, turned = _turned_frames(trajectory, vehicle, environment, times[:0])
-            angle = turned.at(times - times[0])
+            *_, frame_angle = _unequal_frames(trajectory, vehicle, environment, times[:0])
+            angle = frame_angle.at(times - times[0])
     return _assembled(times, flat, path, path.samples, vehicle, environment, angle)
 
 
@@ -197,7 +197,7 @@ def _nodes_for_quintics(trajectory: Trajectory, vehicle: Vehicle) -> list[float]
     The list is empty where the thrust has degree 5 or less.
     """
     degree = trajectory.degree - (1 if lateral_drag(vehicle) > 0.0 else 2)
-    return [] if degree <= QUINTIC else np.linspace(0.0, 1.0, PARTS + 1)[1:-1].tolist()
+    return [] if degree <= QUINTIC else np.linspace(0.0, 1.0, QUINTICS_PER_SEGMENT + 1)[1:-1].tolist()
 
 
 def _mean_frames(
@@ -219,7 +219,7 @@ def _mean_frames(
     return path, path.samples[np.argsort(order)[len(joining) :]]
 
 
-def _turned_frames(
+def _unequal_frames(
     trajectory: Trajectory, vehicle: Vehicle, environment: Environment, times: Array
 ) -> tuple[TransportedFrames, NDArray[np.intp], FrameAngle]:
     """Return the same, and the angle from the frames of mean drag to those of unequal drag."""
@@ -263,9 +263,9 @@ def _assembled(
     q, determined = path.q_world_body[nodes], path.determined[nodes]
     airspeed = flat.velocity - environment.wind
     spin = None if yaw is None else yaw.T[1:]
-    turned = q if yaw is None else so3.multiply(q, so3.about_axis(so3.UP, yaw[:, 0]))
+    yawed = q if yaw is None else so3.multiply(q, so3.about_axis(so3.UP, yaw[:, 0]))
     if angle is None:
-        q = turned
+        q = yawed
         omega, omega_dot = body_rates(thrust, q, determined)
         if spin is not None:
             rates = kernel.spun(xyz(omega), xyz(omega_dot), tuple(spin))
@@ -273,7 +273,7 @@ def _assembled(
         wrench = wrench_for(thrust, airspeed, omega, omega_dot, vehicle)
     else:
         drag, balance = UnequalDrag.of(vehicle, environment), thrust[:, 0]
-        q = np.where(determined[:, None], body_attitudes(q, angle, flat, drag, balance), turned)
+        q = np.where(determined[:, None], body_attitudes(q, angle, flat, drag, balance), yawed)
         omega, omega_dot, specific = body_motion(q, flat, drag, balance, spin)
         omega, omega_dot = (np.where(determined[:, None], rate, 0.0) for rate in (omega, omega_dot))
         moment = kernel.moment(vehicle.inertia.tolist(), xyz(omega), xyz(omega_dot))

@@ -28,11 +28,11 @@ from aerobat.vehicle.vehicle import Vehicle
 
 NODES = 20  # Chebyshev nodes of a piece
 # largest last terms, relative to the first, of functions that are singular where no attitude is determined
-RESOLVED = 1e-10
-SHORTEST = 2.0**-12  # smallest piece, as a fraction of a segment
-ROUNDS = 100  # limit of Picard iterations; the errors fall as the terms of the exponential series
-SETTLED = 1e-14  # [rad] change at which the iteration has converged
-LARGEST_PART = 0.5  # largest contribution of the drag difference, as a fraction of the mean-drag thrust
+MAX_LAST_TERM = 1e-10
+MIN_PIECE_LENGTH = 2.0**-12  # smallest piece, as a fraction of a segment
+MAX_ITERATIONS = 100  # limit of Picard iterations; the errors fall as the terms of the exponential series
+ANGLE_TOLERANCE = 1e-14  # [rad] change at which the iteration has converged
+MAX_RELATIVE_SIZE = 0.5  # largest contribution of the drag difference, as a fraction of the mean-drag thrust
 
 
 @dataclass(frozen=True)
@@ -58,15 +58,15 @@ class UnequalDrag:
         """The excess of the drag coefficient along body x over the mean [1/s]."""
         return float(self.coefficients[0] - self.coefficients[1]) / 2
 
-    def part(self, thrust: Array, airspeed: Array) -> Array:
+    def relative_size(self, thrust: Array, airspeed: Array) -> Array:
         """Return the largest contribution of unequal drag, as a fraction (...) of mean-drag thrusts."""
         size = np.maximum(np.linalg.norm(thrust, axis=-1), np.finfo(float).tiny)
         return np.asarray(abs(self.difference) * np.linalg.norm(airspeed, axis=-1) / size)
 
-    def counted(self, thrust: Array, airspeed: Array) -> Array:
-        """Return `difference`, reduced where its contribution exceeds LARGEST_PART of the thrust, (...)."""
-        part = self.part(thrust, airspeed)
-        return np.asarray(self.difference * LARGEST_PART / np.maximum(part, LARGEST_PART))
+    def saturated_difference(self, thrust: Array, airspeed: Array) -> Array:
+        """Return `difference`, reduced where its relative size exceeds MAX_RELATIVE_SIZE, (...)."""
+        size = self.relative_size(thrust, airspeed)
+        return np.asarray(self.difference * MAX_RELATIVE_SIZE / np.maximum(size, MAX_RELATIVE_SIZE))
 
 
 def resolved_pieces(trajectory: Trajectory, drag: UnequalDrag) -> Subintervals:
@@ -77,8 +77,8 @@ def resolved_pieces(trajectory: Trajectory, drag: UnequalDrag) -> Subintervals:
         airspeed, thrust = motion[:, :, 0] - drag.wind, motion[:, :, 1] + drag.weight
         singular = [1 / np.sum((thrust + c * airspeed) ** 2, axis=-1) for c in drag.coefficients[:2]]
         series = np.abs(np.stack(singular, axis=1) @ analysis().T)
-        rough = (series[..., -2:].max(axis=(1, 2)) > RESOLVED * series[..., 0].max(axis=1)) & (
-            pending.length > SHORTEST
+        rough = (series[..., -2:].max(axis=(1, 2)) > MAX_LAST_TERM * series[..., 0].max(axis=1)) & (
+            pending.length > MIN_PIECE_LENGTH
         )
         done.append(pending[~rough])
         pending = pending[rough].halves()
@@ -122,13 +122,13 @@ class FrameAngle:
         yaw = trajectory.yaw_polynomials(1)[pieces.interval, None]
         yaw_rate = polynomial.evaluate(yaw, pieces.positions(nodes()))[..., 0]
         angle = np.zeros(local.norm.shape)
-        for _ in range(ROUNDS):
+        for _ in range(MAX_ITERATIONS):
             rate = local.spin(angle, yaw_rate)
             series = chebyshev.chebint(rate @ analysis().T, lbnd=-1, axis=1) * seconds[:, None] / 2
             series[1:, 0] += np.cumsum(series.sum(axis=1))[:-1]
             series[:, 0] += trajectory.yaw_polynomials(0)[0, 0, 0]
             last, angle = angle, series @ chebyshev.chebvander(nodes(), NODES).T
-            if np.abs(angle - last).max() <= SETTLED * max(1.0, np.abs(angle).max()):
+            if np.abs(angle - last).max() <= ANGLE_TOLERANCE * max(1.0, np.abs(angle).max()):
                 break
         starts, _ = pieces.spans(trajectory)
         return cls(starts, seconds, series)
@@ -152,7 +152,7 @@ def body_attitudes(q_mean: Array, angle: Array, flat: FlatState, drag: UnequalDr
     """
     near = so3.multiply(q_mean, so3.about_axis(UP, angle))
     airspeed = flat.velocity - drag.wind
-    kappa = drag.counted(balance, airspeed)
+    kappa = drag.saturated_difference(balance, airspeed)
     thrust, air = (xyz(so3.unrotate(near, vector)) for vector in (balance, airspeed))
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = kernel.nearest_axes(
         np.sqrt, add_scaled(thrust, kappa, air), add_scaled(thrust, -kappa, air)
@@ -175,7 +175,7 @@ def body_motion(
         yaw: Yaw rate about the thrust axis [rad/s] and its derivative, (2, ...), or None.
     """
     airspeed = flat.velocity - drag.wind
-    kappa = drag.counted(balance, airspeed)
+    kappa = drag.saturated_difference(balance, airspeed)
     mean = drag.mean
     world = (airspeed, flat.acceleration, flat.jerk, flat.acceleration + drag.weight, flat.snap)
     air, accelerated, jerk, thrust, snap = (xyz(so3.unrotate(q, vector)) for vector in world)
@@ -214,7 +214,7 @@ class _Local:
             parts += [x + 1j * y, z]
         across, rising, air, air_along, accelerated, accelerated_along = parts
         norm = np.maximum(np.linalg.norm(thrust, axis=-1), np.finfo(float).tiny)
-        kappa = drag.counted(thrust, airspeed)
+        kappa = drag.saturated_difference(thrust, airspeed)
         return cls(kappa, norm, rising, across, air, air_along, accelerated, accelerated_along)
 
     def spin(self, angle: Array, yaw_rate: Array) -> Array:
