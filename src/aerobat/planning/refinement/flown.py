@@ -93,11 +93,9 @@ class FlownPath:
 
 
 def _halfway(before: Sequence[BodyInGate], in_gates: Sequence[BodyInGate]) -> tuple[BodyInGate, ...]:
-    """Return the mean of both lateral accelerations in each gate, counting zero for a gate without one before."""
-    accelerations = {body.stage: body.lateral_acceleration for body in before}
+    """Return bodies in gates with the mean of both lateral accelerations, zero for a gate without one before."""
+    known = {body.stage: body.lateral_acceleration for body in before}
     return tuple(
-        replace(
-            body, lateral_acceleration=0.5 * (body.lateral_acceleration + accelerations.get(body.stage, 0.0))
-        )
+        replace(body, lateral_acceleration=0.5 * (body.lateral_acceleration + known.get(body.stage, 0.0)))
         for body in in_gates
     )
