@@ -77,23 +77,25 @@ def filter_loop(slots: int) -> tuple[Init, Step]:
         state = ekf.propagate(ops, parameters.ekf, carry[0], inputs.sample, inputs.elapsed)
         predicted = ekf.predict_covariance(ops, parameters.ekf, state)
         exposures = [e._replace(age=e.age + inputs.elapsed) for e in carry[1]]
-        past, age = _picked(ops, exposures, inputs.arrived)
+        past, age = _selected_exposure(ops, exposures, inputs.arrived)
         state = ekf.fuse(ops, parameters.ekf, predicted, inputs.measured, past, age, inputs.arrived > NO_SLOT)
         fresh = Exposure(ekf.pose_of(state), 0.0)
-        kept = []
+        updated = []
         for slot, exposure in enumerate(exposures):
             back = ekf.carried_back(predicted, state, exposure.past, exposure.age)
-            kept.append(select_tree(ops, _is_slot(inputs.exposed, slot), fresh, exposure._replace(past=back)))
-        return (state, tuple(kept)), state
+            updated.append(
+                select_tree(ops, _is_slot(inputs.exposed, slot), fresh, exposure._replace(past=back))
+            )
+        return (state, tuple(updated)), state
 
     return init, step
 
 
-def _picked(ops: Ops, exposures: list[Exposure], wanted: Scalar) -> Exposure:
-    picked = exposures[0]
+def _selected_exposure(ops: Ops, exposures: list[Exposure], wanted: Scalar) -> Exposure:
+    selected = exposures[0]
     for slot, exposure in enumerate(exposures[1:], start=1):
-        picked = select_tree(ops, _is_slot(wanted, slot), exposure, picked)
-    return picked
+        selected = select_tree(ops, _is_slot(wanted, slot), exposure, selected)
+    return selected
 
 
 def _is_slot(wanted: Scalar, slot: int) -> Scalar:
@@ -264,15 +266,15 @@ def _run(log: SensorLog, ekf: Ekf, gravity: float, velocity: Array, plan: Schedu
     for begin, end in pairwise([*range(0, count, _ROWS), count]):
         cut = operator.itemgetter(slice(begin, end))
         carry, states = loop.scan(carry, tree_map(cut, plan.inputs))
-        parts.append(_kept(states))
+        parts.append(_stored(states))
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _kept(states: EkfState) -> dict[str, Array]:
+def _stored(states: EkfState) -> dict[str, Array]:
     """Return states with leaves (1, rows) as arrays (rows, ...)."""
-    kept = {name: from_components(getattr(states.nominal, name))[0] for name in _NOMINAL}
-    kept["sigma"] = np.sqrt(from_components([states.covariance[i] for i in _DIAGONAL])[0])
-    return kept | {name: getattr(states, name)[0] for name in ("jumps", "nis", "accepted")}
+    stored = {name: from_components(getattr(states.nominal, name))[0] for name in _NOMINAL}
+    stored["sigma"] = np.sqrt(from_components([states.covariance[i] for i in _DIAGONAL])[0])
+    return stored | {name: getattr(states, name)[0] for name in ("jumps", "nis", "accepted")}
 
 
 def _coasting(log: SensorLog, accepted: Mask, max_gap: float) -> Iterator[TimeInterval]:

@@ -107,12 +107,12 @@ def _attitudes(
     """Yield the attitudes of other stages that require one."""
     axes = thrust_axis(path.q_world_body)
     for stage, time in others:
-        if _asks_attitude(stage):
+        if _requires_attitude(stage):
             up = unit(_between(path, axes, time))
             yield PlannedAttitude(stage.name, up, time, problem.tolerance.attitude, stage.lap)
 
 
-def _asks_attitude(stage: Stage) -> bool:
+def _requires_attitude(stage: Stage) -> bool:
     """Return True for an attitude, or a specific thrust with one component fixed."""
     across = (c.quantity is Quantity.SPECIFIC_THRUST and c.lower == c.upper for c in stage.conditions)
     return stage.attitude is not None or any(across)
@@ -133,9 +133,9 @@ def criterion(problem: Problem) -> str:
     ]
     within = "the goal and the places of other stages" if passed else "the whole path"
     angle = f"{degrees(tolerance.attitude):.3g}°"
-    kept = f"{within} within {length(tolerance.position)}, attitudes of stages within {angle}"
+    tolerances = f"{within} within {length(tolerance.position)}, attitudes of stages within {angle}"
     clear = ["no obstacle touched"] if problem.surroundings.obstacles else []
-    return ", ".join([*passed, *clear, kept])
+    return ", ".join([*passed, *clear, tolerances])
 
 
 def _nearest_stages(problem: Problem, path: SampledPath) -> list[tuple[Stage, float]]:

@@ -70,7 +70,7 @@ def smallest_opening(
     Raises:
         SpecError: no passage is through this gate, or the flights are too few for this probability.
     """
-    return opening_of(_needed(scores, gate, side), gate, probability, confidence, side)
+    return opening_of(_needed_scales(scores, gate, side), gate, probability, confidence, side)
 
 
 def opening_of(
@@ -114,7 +114,7 @@ def _rank(count: int, probability: float, confidence: float) -> int:
     return min(int(binom.ppf(confidence, count, probability)) + 1, count)
 
 
-def _needed(scores: Score, gate: Gate, side: Side) -> Array:
+def _needed_scales(scores: Score, gate: Gate, side: Side) -> Array:
     """Return the scale of the opening that each flight needs, infinite where none is enough, (flights,)."""
     passages = [passage for passage in scores.passages if passage.gate == gate.name]
     if not passages:

@@ -38,7 +38,7 @@ from aerobat.vehicle import Vehicle, as_vehicle
 # [m] median distance from the set-points that shows another path; clock differences make less
 OTHER_PATH = 0.5
 COASTING = 0.1  # [s] without a pose from which a filter coasts: several periods of any motion capture
-_FELT = {  # outcomes of contacts detected by the plant
+_CONTACT_OUTCOMES = {  # outcomes of contacts detected by the plant
     Contact.GROUND: Outcome.TOUCHED_GROUND,
     Contact.GATE: Outcome.TOUCHED_GATE,
     Contact.OBSTACLE: Outcome.HIT_OBSTACLE,
@@ -199,7 +199,7 @@ class Score(PerFlight):
             yield self.nearest.failure
         if isfinite(self.contact_time):
             obstacle = self.nearest.obstacle if self.nearest else "an obstacle"
-            yield FlightFailure(self.contact_time, _FELT[self.contact], {"obstacle": obstacle})
+            yield FlightFailure(self.contact_time, _CONTACT_OUTCOMES[self.contact], {"obstacle": obstacle})
 
     def _departure(self) -> Iterator[FlightFailure]:
         """Yield the time at which a flight left its path, if it did."""

@@ -135,7 +135,7 @@ def sensitivity(
         for name, shape in shapes.items()
         for unit in np.eye(int(np.prod(shape))).reshape(-1, *shape)
     ]
-    values, slopes = _flown(setup, directions)
+    values, slopes = _differentiated_flight(setup, directions)
     return _sensitivity(values, slopes, shapes, setup.is_batch)
 
 
@@ -156,7 +156,7 @@ def _known(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def _flown(setup: FlightSetup, directions: Sequence[list[Array]]) -> tuple[_Sums, _Sums]:
+def _differentiated_flight(setup: FlightSetup, directions: Sequence[list[Array]]) -> tuple[_Sums, _Sums]:
     """Return the last row of the loop, and its derivatives; leaves (vehicles, directions).
 
     Each vehicle flies once for each direction, all side by side.
@@ -175,7 +175,7 @@ def _flown(setup: FlightSetup, directions: Sequence[list[Array]]) -> tuple[_Sums
     for begin, end in setup.chunks(copies=count):
         inputs = paired(setup.inputs(begin, end))
         if loop is None:
-            functions = differentiated(*_summed(*compose(setup.components, metrics_row)))
+            functions = differentiated(*_error_sums(*compose(setup.components, metrics_row)))
             loop = setup.engine(count).compile(*functions, parameters, first_row(inputs))
             carry = loop.init(first_row(inputs))
         carry, rows = loop.scan(carry, inputs, end)
@@ -184,7 +184,7 @@ def _flown(setup: FlightSetup, directions: Sequence[list[Array]]) -> tuple[_Sums
 
 
 @lru_cache(maxsize=32)
-def _summed(init: Init, step: Step) -> tuple[Init, Step]:
+def _error_sums(init: Init, step: Step) -> tuple[Init, Step]:
     """Return a loop whose rows are error sums, from a loop whose rows are metrics."""
 
     def advance(ops: Ops, parameters: Tree, carry: Tree, inputs: LoopInput) -> tuple[Tree, _Sums]:
@@ -203,7 +203,7 @@ def _sensitivity(
     ended = np.where(values.flying > 0.5, 1.0, np.nan)
     cuts = np.cumsum([int(np.prod(shape)) for shape in shapes.values()])[:-1]
 
-    def part(value: Array, slope: Array) -> Gradient:
+    def gradient(value: Array, slope: Array) -> Gradient:
         named = zip(shapes.items(), np.split(slope, cuts, axis=1), strict=True)
         by_name = {name: each(x.reshape(-1, *shape)) for (name, shape), x in named}
         return Gradient(each(value[:, 0]), MappingProxyType(by_name))
@@ -214,26 +214,26 @@ def _sensitivity(
         return own
 
     return Sensitivity(
-        part(values.square / ticks, slopes.square / ticks),
-        part(values.square_angle / ticks, slopes.square_angle / ticks),
-        part(values.final_square * ended, slopes.final_square * ended),
+        gradient(values.square / ticks, slopes.square / ticks),
+        gradient(values.square_angle / ticks, slopes.square_angle / ticks),
+        gradient(values.final_square * ended, slopes.final_square * ended),
     )
 
 
 def _tangent(setup: FlightSetup, name: str, unit: Array) -> LoopParameters:
     """Return the derivative of the loop's parameters in a quantity along `unit`; leaves (vehicles,)."""
-    still: LoopParameters = tree_map(np.zeros_like, setup.parameters)
-    observer, controller, plant, metrics = still.own
+    zeros: LoopParameters = tree_map(np.zeros_like, setup.parameters)
+    observer, controller, plant, metrics = zeros.own
     if name in _GAINS:
         model = controller.model._replace(gains=_gains(setup, name))
         controller = controller._replace(model=model)
     elif name.startswith("start."):
-        return still._replace(start=_start(still.start, setup.parameters.start, name, unit))
+        return zeros._replace(start=_start(zeros.start, setup.parameters.start, name, unit))
     elif name.startswith("rotors."):
         plant = plant._replace(airframe=_rotors(plant.airframe, setup, name, unit))
     else:
         plant = plant._replace(airframe=_mass_properties(plant.airframe, setup, name, unit))
-    return still._replace(own=(observer, controller, plant, metrics))
+    return zeros._replace(own=(observer, controller, plant, metrics))
 
 
 def _gains(setup: FlightSetup, name: str) -> Gains:
@@ -246,45 +246,45 @@ def _gains(setup: FlightSetup, name: str) -> Gains:
     return Gains(*(none if slope is None else slope + none for slope in slopes))
 
 
-def _start(still: Body, start: Body, name: str, unit: Array) -> Body:
+def _start(zeros: Body, start: Body, name: str, unit: Array) -> Body:
     if name == "start.attitude":  # q ⊗ exp(φ) ≈ q + ½ q ⊗ (0, φ)
         q = body_states(start).q_world_body
         change = 0.5 * so3.multiply(q, np.append(0.0, unit))
-        return still._replace(q_world_body=components(change))
-    return still._replace(**{name.removeprefix("start."): _alike(unit, len(start.position[0]))})
+        return zeros._replace(q_world_body=components(change))
+    return zeros._replace(**{name.removeprefix("start."): _alike(unit, len(start.position[0]))})
 
 
-def _mass_properties(still: Airframe, setup: FlightSetup, name: str, unit: Array) -> Airframe:
+def _mass_properties(zeros: Airframe, setup: FlightSetup, name: str, unit: Array) -> Airframe:
     count = len(setup.fleet)
     if name == "inertia":  # d(J⁻¹) = −J⁻¹ dJ J⁻¹
         change = 0.5 * (unit + unit.T)
         inverse = np.linalg.inv(setup.fleet.inertia)
-        moved = still.mass_properties._replace(
+        tangent = zeros.mass_properties._replace(
             inertia=tuple(_alike(row, count) for row in change),
             inverse_inertia=matrix_components(-inverse @ change @ inverse),
         )
     elif name == "mass":
-        moved = still.mass_properties._replace(mass=np.ones(count))
+        tangent = zeros.mass_properties._replace(mass=np.ones(count))
     else:
-        moved = still.mass_properties._replace(drag_body=_alike(unit, count))
-    return still._replace(mass_properties=moved)
+        tangent = zeros.mass_properties._replace(drag_body=_alike(unit, count))
+    return zeros._replace(mass_properties=tangent)
 
 
-def _rotors(still: Airframe, setup: FlightSetup, name: str, unit: Array) -> Airframe:
-    rotors, fleet, count = still.rotors, setup.fleet, len(setup.fleet)
+def _rotors(zeros: Airframe, setup: FlightSetup, name: str, unit: Array) -> Airframe:
+    rotors, fleet, count = zeros.rotors, setup.fleet, len(setup.fleet)
     match name:
         case "rotors.lag":
             rates = np.divide(-unit, fleet.lags**2, out=np.zeros_like(fleet.lags), where=fleet.lags > 0.0)
-            moved = rotors._replace(inverse_time_constant=components(rates))
+            tangent = rotors._replace(inverse_time_constant=components(rates))
         case "rotors.position_body":
             total, _, _, yaw = rotors.allocation
             x, y, _ = unit.T
-            moved = rotors._replace(allocation=(total, _alike(y, count), _alike(-x, count), yaw))
+            tangent = rotors._replace(allocation=(total, _alike(y, count), _alike(-x, count), yaw))
         case "rotors.torque_coefficient":
-            moved = rotors._replace(allocation=(*rotors.allocation[:3], components(-fleet.spins * unit)))
+            tangent = rotors._replace(allocation=(*rotors.allocation[:3], components(-fleet.spins * unit)))
         case _:
-            moved = rotors._replace(**{name.removeprefix("rotors."): _alike(unit, count)})
-    return still._replace(rotors=moved)
+            tangent = rotors._replace(**{name.removeprefix("rotors."): _alike(unit, count)})
+    return zeros._replace(rotors=tangent)
 
 
 def _alike(vector: Array, vehicles: int) -> Tree:
