@@ -93,7 +93,7 @@ class FlownPath:
 
 
 def _halfway(before: Sequence[BodyInGate], in_gates: Sequence[BodyInGate]) -> tuple[BodyInGate, ...]:
-    """Return bodies in gates with the mean of both lateral accelerations, zero for a gate without one before."""
+    """Return the gates with the mean of both lateral accelerations; a gate unknown before counts as zero."""
     known = {body.stage: body.lateral_acceleration for body in before}
     return tuple(
         replace(body, lateral_acceleration=0.5 * (body.lateral_acceleration + known.get(body.stage, 0.0)))
