@@ -9,7 +9,7 @@ from aerobat.kernels.ops import Axes, Ops, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, to_body
 from aerobat.kernels.vectors import add, add_scaled, cross, dot, norm, scale, subtract, transform
 
-_SHORTEST = 1e-3  # [m/s²], or [-] of unit vectors: shorter vectors have no usable direction
+_MIN_NORM = 1e-3  # [m/s²], or [-] of unit vectors: shorter vectors have no usable direction
 
 
 def axes_along(ops: Ops, thrust: Vector, reference: ReferencePoint) -> Axes:
@@ -18,12 +18,12 @@ def axes_along(ops: Ops, thrust: Vector, reference: ReferencePoint) -> Axes:
     The reference's axes are returned where the thrust vanishes or lies along its first axis.
     """
     first, second, third = axes(reference.q_world_body)
-    b3 = scale(1.0 / ops.maximum(norm(ops, thrust), _SHORTEST), thrust)
-    aside = cross(b3, first)
-    size = norm(ops, aside)
-    b2 = scale(1.0 / ops.maximum(size, _SHORTEST), aside)
+    b3 = scale(1.0 / ops.maximum(norm(ops, thrust), _MIN_NORM), thrust)
+    lateral = cross(b3, first)
+    size = norm(ops, lateral)
+    b2 = scale(1.0 / ops.maximum(size, _MIN_NORM), lateral)
     b1 = cross(b2, b3)
-    determined = (norm(ops, thrust) > _SHORTEST) & (size > _SHORTEST)
+    determined = (norm(ops, thrust) > _MIN_NORM) & (size > _MIN_NORM)
     return select_tree(ops, determined, (b1, b2, b3), (first, second, third))
 
 

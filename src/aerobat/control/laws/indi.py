@@ -57,9 +57,9 @@ class Indi(ControlLaw):
 
     def init(self, ops: Ops, model: ControllerModel, seen: Seen) -> Increments:
         """Return the measurements before the first tick."""
-        turned = to_body(axes(seen.body.q_world_body), seen.reference.omega_dot)
+        acceleration = to_body(axes(seen.body.q_world_body), seen.reference.omega_dot)
         moment = motors.wrench(model.airframe.rotors, seen.thrusts).moment_body
-        return Increments(seen.body.omega_body, turned, moment, ZERO, 0.0)
+        return Increments(seen.body.omega_body, acceleration, moment, ZERO, 0.0)
 
     def step(
         self, ops: Ops, model: ControllerModel, state: Any, seen: Seen, elapsed: Scalar
@@ -80,8 +80,8 @@ class Indi(ControlLaw):
         desired = axes_along(ops, thrust, reference)
         feedback = attitude_feedback(ops, model, seen, desired, self.attitude_gain, self.rate_gain)
         wanted = add(to_body(body_axes, reference.omega_dot), feedback)
-        lacking = subtract(wanted, measured.angular_acceleration)
-        increment = transform(model.airframe.mass_properties.inertia, lacking)
+        missing = subtract(wanted, measured.angular_acceleration)
+        increment = transform(model.airframe.mass_properties.inertia, missing)
         load = RotorWrench(collective(model, body_axes, thrust), add(measured.moment, increment))
         return measured, load
 
@@ -89,13 +89,13 @@ class Indi(ControlLaw):
         self, ops: Ops, model: ControllerModel, state: Increments, seen: Seen, elapsed: Scalar
     ) -> Increments:
         """Return the measurements a tick later."""
-        turned = scale(1.0 / elapsed, subtract(seen.body.omega_body, state.omega))
-        turned = select_tree(ops, state.has_omega > 0.5, turned, state.angular_acceleration)
+        acceleration = scale(1.0 / elapsed, subtract(seen.body.omega_body, state.omega))
+        acceleration = select_tree(ops, state.has_omega > 0.5, acceleration, state.angular_acceleration)
         moment = motors.wrench(model.airframe.rotors, seen.thrusts).moment_body
         error = subtract(seen.reference.position, seen.body.position)
         return Increments(
             seen.body.omega_body,
-            low_passed(state.angular_acceleration, turned, self.filter_time, elapsed),
+            low_passed(state.angular_acceleration, acceleration, self.filter_time, elapsed),
             low_passed(state.moment, moment, self.filter_time, elapsed),
             clamp_norm(ops, add_scaled(state.integral, elapsed, error), self.max_integral),
             1.0,

@@ -23,7 +23,7 @@ from aerobat.kernels.rigid_body import RotorWrench
 from aerobat.kernels.vectors import clamp_norm, dot, norm, subtract
 
 _MIN_THRUST = 3.0  # [m/s²] smallest thrust in the gains: with less, turning hardly moves the vehicle
-_TUNED_FOR = 25.0  # [rad/s] bandwidth of the attitude loop; vehicles that allow less get slower gains
+_NOMINAL_BANDWIDTH = 25.0  # [rad/s] bandwidth of the attitude loop; vehicles that allow less get slower gains
 
 
 @lru_cache(maxsize=32)
@@ -73,14 +73,14 @@ class Lqr(ControlLaw):
         p, q, r = subtract(body.omega_body, to_body(body_axes, reference.omega))
         demand = thrust_demand(model.airframe.mass_properties, model.environment, reference).value
         f = ops.maximum(norm(ops, demand), _MIN_THRUST)
-        slow = ops.sqrt(0.5 * model.gains.stiffness) / _TUNED_FOR
-        square = slow * slow
-        pull_x = square * slow * (k1 * slow * x + k2 * vx) / f
-        pull_y = square * slow * (k1 * slow * y + k2 * vy) / f
+        ratio = ops.sqrt(0.5 * model.gains.stiffness) / _NOMINAL_BANDWIDTH
+        square = ratio * ratio
+        pull_x = square * ratio * (k1 * ratio * x + k2 * vx) / f
+        pull_y = square * ratio * (k1 * ratio * y + k2 * vy) / f
         acceleration = (
-            pull_y - k3 * square * tilt_x - k4 * slow * p,
-            -pull_x - k3 * square * tilt_y - k4 * slow * q,
-            -yaw1 * square * turn - yaw2 * slow * r,
+            pull_y - k3 * square * tilt_x - k4 * ratio * p,
+            -pull_x - k3 * square * tilt_y - k4 * ratio * q,
+            -yaw1 * square * turn - yaw2 * ratio * r,
         )
         thrust = dot(demand, body_axes[2]) - z1 * z - z2 * vz
         mass = model.airframe.mass_properties.mass

@@ -32,8 +32,8 @@ from aerobat.kernels.vectors import (
     transform,
 )
 
-_YAW_OF_GAIN = 1.0 / 3.0  # [-] largest yaw gain over that of the inner loop; a faster one is underdamped
-_TILT_OF_FREQUENCY = 0.215  # [-] largest tilt gain over the frequency of the inner loop's poles, likewise
+_MAX_YAW_RATIO = 1.0 / 3.0  # [-] largest yaw gain over that of the inner loop; a faster one is underdamped
+_MAX_TILT_RATIO = 0.215  # [-] largest tilt gain over the frequency of the inner loop's poles, likewise
 # [m/s²] below this specific thrust corrections are reduced, because small errors swing its direction
 _FULL_THRUST = 9.8
 
@@ -84,30 +84,30 @@ class Rates(ControlLaw):
         error = attitude_error(ops, body, body_axes, attitude)
         gains = rate_gains(ops, model.airframe)
         lag = 1.0 / rotors.inverse_time_constant[0]
-        asked = self._fed_forward(model, body_axes, reference, lag / elapsed)
-        turning = add(asked, times(gains.derivative, to_body(body_axes, reference.omega_dot)))
-        left = subtract(turning, times(gains.integral, state.integral))
+        feedforward = self._feedforward(model, body_axes, reference, lag / elapsed)
+        turning = add(feedforward, times(gains.derivative, to_body(body_axes, reference.omega_dot)))
+        remaining = subtract(turning, times(gains.integral, state.integral))
         p, q, r = gains.proportional
-        lead = left[0] / p, left[1] / q, left[2] / r
-        tilt_gain = ops.minimum(self.tilt_gain, _TILT_OF_FREQUENCY * gains.frequency)
-        yaw_gain = ops.minimum(self.yaw_gain, _YAW_OF_GAIN * gains.proportional[2])
+        lead = remaining[0] / p, remaining[1] / q, remaining[2] / r
+        tilt_gain = ops.minimum(self.tilt_gain, _MAX_TILT_RATIO * gains.frequency)
+        yaw_gain = ops.minimum(self.yaw_gain, _MAX_YAW_RATIO * gains.proportional[2])
         feedback = times(scale(2.0, error.rotation), (tilt_gain, tilt_gain, yaw_gain))
-        asked_rate = to_body(body_axes, reference.omega)
-        correction = add(subtract(to_body(body_axes, attitude.omega), asked_rate), feedback)
+        reference_rate = to_body(body_axes, reference.omega)
+        correction = add(subtract(to_body(body_axes, attitude.omega), reference_rate), feedback)
         correction = clip_components(ops, correction, self.max_correction)
-        told = ops.minimum(1.0, norm(ops, attitude.specific_thrust) / _FULL_THRUST)
-        correction = scale(told * told, correction)
-        omega = add(add(asked_rate, lead), correction)
+        thrust_fraction = ops.minimum(1.0, norm(ops, attitude.specific_thrust) / _FULL_THRUST)
+        correction = scale(thrust_fraction * thrust_fraction, correction)
+        omega = add(add(reference_rate, lead), correction)
         thrust = collective(ops, mass_properties.mass, body_axes[2], attitude)
         thrust = thrust + mass_properties.mass * reference.ahead.thrust_change * lag / elapsed
         setpoint = RateSetpoint(clip_components(ops, omega, self.max_rate), thrust)
         rate_error = subtract(setpoint.omega, body.omega_body)
-        angular = add(times(gains.proportional, subtract(rate_error, lead)), asked)
+        angular = add(times(gains.proportional, subtract(rate_error, lead)), feedforward)
         load = RotorWrench(thrust, transform(mass_properties.inertia, angular))
         integral = add_scaled(state.integral, elapsed, lead)
         return RatesState(outer, integral, setpoint), load
 
-    def _fed_forward(
+    def _feedforward(
         self, model: ControllerModel, body_axes: Any, reference: ReferencePoint, steps: Scalar
     ) -> Vector:
         """Return the reference's moment divided by the inertia [rad/s²], `steps` controller steps ahead."""
