@@ -16,7 +16,7 @@ from aerobat.engines.pytree import components, tree_map
 from aerobat.kernels.gates import progress
 from aerobat.kernels.gates.progress import GateProgress
 from aerobat.kernels.gates.section import extent, gap, section
-from aerobat.kernels.gates.snapshot import Snapshot, between
+from aerobat.kernels.gates.snapshot import Snapshot, interpolated
 from aerobat.kernels.gates.swath import Swath, swept_between
 from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, bounding_ellipsoid, gate_places
@@ -89,7 +89,7 @@ class _Track:
         """The state where the plane is crossed in an interval, leaves (1,)."""
         fraction = -self.distance[k] / (self.distance[k + 1] - self.distance[k])
         last, now = (_part(self.rows, slice(j, j + 1)) for j in (k, k + 1))
-        return between(last, now, fraction)
+        return interpolated(last, now, fraction)
 
     def nearest(self, intervals: Sequence[np.intp] | NDArray[np.intp]) -> np.intp | None:
         """Of the intervals the one that crosses next to the planned instant, None of none in the window."""

@@ -9,7 +9,7 @@ from aerobat.kernels.motors import Rotors, clamp
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip, magnitude
 from aerobat.kernels.rigid_body import RotorWrench
 
-_BEARING = 1e-9  # [-] a rotor with a smaller fraction of the collective thrust counts as carrying none
+_MIN_FRACTION = 1e-9  # [-] a rotor with a smaller fraction of the collective thrust counts as carrying none
 
 
 class Mixer(NamedTuple):
@@ -51,8 +51,8 @@ def desaturate(ops: Ops, rotors: Rotors, mixer: Mixer, load: RotorWrench) -> Per
         ops, _lowered(ops, rotors, mixer, load.thrust, tilting), mixer.min_collective, mixer.max_collective
     )
     level = tuple(c * thrust for c in mixer.collective)
-    tilted = _as_far_as_fits(ops, rotors, level, tilting)
-    return clamp(ops, rotors, _as_far_as_fits(ops, rotors, tilted, tuple(d * mz for d in mixer.yaw)))
+    tilted = _scaled_to_limits(ops, rotors, level, tilting)
+    return clamp(ops, rotors, _scaled_to_limits(ops, rotors, tilted, tuple(d * mz for d in mixer.yaw)))
 
 
 def _lowered(ops: Ops, rotors: Rotors, mixer: Mixer, thrust: Scalar, tilting: PerRotor) -> Scalar:
@@ -63,17 +63,17 @@ def _lowered(ops: Ops, rotors: Rotors, mixer: Mixer, thrust: Scalar, tilting: Pe
     """
     slopes, ceilings = [], []
     for c, df, high in zip(mixer.collective, tilting, rotors.max_thrust, strict=True):
-        bears, fraction = c > _BEARING, ops.maximum(c, _BEARING)
-        slopes.append(ops.select(bears, df / fraction, 0.0))
-        ceilings.append(ops.select(bears, high / fraction, mixer.max_collective))
+        carries, fraction = c > _MIN_FRACTION, ops.maximum(c, _MIN_FRACTION)
+        slopes.append(ops.select(carries, df / fraction, 0.0))
+        ceilings.append(ops.select(carries, high / fraction, mixer.max_collective))
     spread = reduce(ops.maximum, slopes) - reduce(ops.minimum, slopes)
     room = mixer.max_collective - mixer.min_collective
-    part = room / ops.maximum(ops.maximum(spread, room), _BEARING)
-    bounds = (ceiling - part * slope for ceiling, slope in zip(ceilings, slopes, strict=True))
+    scaling = room / ops.maximum(ops.maximum(spread, room), _MIN_FRACTION)
+    bounds = (ceiling - scaling * slope for ceiling, slope in zip(ceilings, slopes, strict=True))
     return reduce(ops.minimum, bounds, thrust)
 
 
-def _as_far_as_fits(ops: Ops, rotors: Rotors, base: PerRotor, change: PerRotor) -> PerRotor:
+def _scaled_to_limits(ops: Ops, rotors: Rotors, base: PerRotor, change: PerRotor) -> PerRotor:
     """Return base + s·change with the largest s in [0, 1] within limits, for a base within them."""
     limits = zip(rotors.min_thrust, rotors.max_thrust, rotors.slack, strict=True)
     fraction: Scalar = 1.0

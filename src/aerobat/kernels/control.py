@@ -29,7 +29,7 @@ from aerobat.kernels.rigid_body import Body, EnvironmentParameters, RotorWrench
 from aerobat.kernels.vectors import ZERO, add, dot, norm
 
 # [-] smallest thrust, as a fraction of the commanded specific thrust, where the vehicle points away from it
-_MIN_PART = 0.3
+_MIN_THRUST_FRACTION = 0.3
 
 
 class FeatureFlags(NamedTuple):
@@ -130,8 +130,8 @@ def track_attitude(
     mass_properties, rotors = model.airframe
     error = pursuit.error
     # while rotors saturate, the attitude error does not indicate a lasting moment
-    counted = ops.select(state.commands.saturated, 0.0, elapsed)
-    integral = integrate_attitude_error(ops, model.gains, state.attitude_integral, error, counted)
+    integration_time = ops.select(state.commands.saturated, 0.0, elapsed)
+    integral = integrate_attitude_error(ops, model.gains, state.attitude_integral, error, integration_time)
     moment, change = feedback_moment(model.gains, mass_properties.inertia, error, integral), ZERO
     if flags.moment_feedforward:
         now, change = moment_and_change(mass_properties.inertia, body_axes, rates)
@@ -174,8 +174,8 @@ def predicted(
         delay: delay of the commands [s].
     """
     rotors = model.airframe.rotors
-    left = motors.decay_factors(ops, rotors, ops.maximum(elapsed - delay, 0.0))
-    now = motors.first_order_response(state.thrusts, state.commands.thrusts, left)
+    decay = motors.decay_factors(ops, rotors, ops.maximum(elapsed - delay, 0.0))
+    now = motors.first_order_response(state.thrusts, state.commands.thrusts, decay)
     motion = motors.VehicleState(body, now)
     return motors.advance(ops, model.airframe, model.environment, motion, state.commands.thrusts, delay).body
 
@@ -186,7 +186,7 @@ def collective(ops: Ops, mass: Scalar, b3: Vector, attitude: AttitudeCommand) ->
     A vehicle that points away keeps a fraction of |f|, because without thrust it could not turn back.
     """
     f = attitude.specific_thrust
-    return mass * ops.maximum(dot(f, b3), _MIN_PART * norm(ops, f))
+    return mass * ops.maximum(dot(f, b3), _MIN_THRUST_FRACTION * norm(ops, f))
 
 
 def rotor_commands(
@@ -220,12 +220,12 @@ def rotor_commands(
         desired = select_tree(ops, feasible, desired, desaturated)
     if flags.motor_lag_compensation:
         fraction = 1.0 - ops.exp(-period / model.gains.lead_time_constant)
-        desired = _leading(thrusts, desired, mix(model.mixer, ahead), decay_factors, fraction)
+        desired = _lead_compensated(thrusts, desired, mix(model.mixer, ahead), decay_factors, fraction)
     changed = ops.select(feasible & within_limits(rotors, desired), False, True)
     return Commands(motors.clamp(ops, rotors, desired), changed)
 
 
-def _leading(
+def _lead_compensated(
     thrusts: PerRotor, desired: PerRotor, changes: PerRotor, decay_factors: PerRotor, fraction: Scalar
 ) -> PerRotor:
     """Return commands [N] that move the rotors in one period by a `fraction` of `desired` − `thrusts`.
@@ -235,6 +235,6 @@ def _leading(
     predicted thrusts, they continue after a saturation until the rotors reach `desired`.
     """
     return tuple(
-        f + ((w - f) * fraction + change) / (1.0 - left)
-        for f, w, change, left in zip(thrusts, desired, changes, decay_factors, strict=True)
+        f + ((w - f) * fraction + change) / (1.0 - decay)
+        for f, w, change, decay in zip(thrusts, desired, changes, decay_factors, strict=True)
     )

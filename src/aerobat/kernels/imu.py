@@ -33,8 +33,8 @@ class ImuState(NamedTuple):
     """The last sample, and the true values at its end."""
 
     sample: ImuSample
-    felt: ImuSample  # true values at the instant
-    has_felt: Scalar  # 1, or 0 before the first sample
+    true_sample: ImuSample  # true values at the instant
+    has_sample: Scalar  # 1, or 0 before the first sample
 
 
 class BiasParameters(NamedTuple):
@@ -52,7 +52,12 @@ def init() -> ImuState:
 
 
 def step(
-    ops: Ops, parameters: ImuParameters, state: ImuState, felt: ImuSample, bias: ImuSample, noise: ImuSample
+    ops: Ops,
+    parameters: ImuParameters,
+    state: ImuState,
+    true_sample: ImuSample,
+    bias: ImuSample,
+    noise: ImuSample,
 ) -> ImuState:
     """Return the next sample, over the interval since the last one; the first is instantaneous.
 
@@ -60,21 +65,21 @@ def step(
         ops: the arithmetic of the engine.
         parameters: the errors of the IMU.
         state: state after the last sample.
-        felt: the true rate and specific force at this instant.
+        true_sample: the true rate and specific force at this instant.
         bias: the present biases.
         noise: independent standard normals.
     """
-    before = select_tree(ops, state.has_felt > 0.5, state.felt, felt)
+    before = select_tree(ops, state.has_sample > 0.5, state.true_sample, true_sample)
     gyro = parameters.gyro_noise, parameters.gyro_range
     accelerometer = parameters.accelerometer_noise, parameters.accelerometer_range
-    means = (scale(0.5, add(a, b)) for a, b in zip(before, felt, strict=True))
+    means = (scale(0.5, add(a, b)) for a, b in zip(before, true_sample, strict=True))
     measured = (
         clip_components(ops, add(add_scaled(mean, spread, drawn), offset), limit)
         for mean, (spread, limit), drawn, offset in zip(
             means, (gyro, accelerometer), noise, bias, strict=True
         )
     )
-    return ImuState(ImuSample(*measured), felt, 1.0)
+    return ImuState(ImuSample(*measured), true_sample, 1.0)
 
 
 def walk(parameters: BiasParameters, bias: ImuSample, noise: ImuSample) -> ImuSample:

@@ -14,7 +14,8 @@ from aerobat.kernels.ops import Matrix, Ops, Scalar, Vector
 from aerobat.kernels.unequal_drag import BodyMotion
 from aerobat.kernels.vectors import add, add_scaled, dot, scale
 
-STILL = 1e-12  # [rad²/s²] added to the square of a rate, so that the rate of a body at rest is differentiable
+# [rad²/s²] added to the square of a rate, so that the rate of a body at rest is differentiable
+RATE_SMOOTHING = 1e-12
 
 
 class InertiaAndDrag(NamedTuple):
@@ -38,9 +39,9 @@ def measures(ops: Ops, airframe: InertiaAndDrag, motion: BodyMotion, up: Vector)
     """
     if airframe.unequal is not None:
         body = unequal_drag.DraggedBody(airframe.mass, airframe.unequal, airframe.inertia)
-        asked = unequal_drag.demand(ops.sqrt, body, motion)
-        rate = ops.sqrt(dot(asked.omega, asked.omega) + STILL)
-        return *asked.wrench, *asked.rate, asked.specific_thrust, rate, dot(asked.b3, up)
+        demand = unequal_drag.demand(ops.sqrt, body, motion)
+        rate = ops.sqrt(dot(demand.omega, demand.omega) + RATE_SMOOTHING)
+        return *demand.wrench, *demand.rate, demand.specific_thrust, rate, dot(demand.b3, up)
     drag, v, a = airframe.lateral_drag, motion.airspeed, motion.acceleration
     f = add(add_scaled(a, drag, v), motion.weight)
     rates = (
@@ -55,5 +56,5 @@ def measures(ops: Ops, airframe: InertiaAndDrag, motion: BodyMotion, up: Vector)
     thrust = flatness.collective(airframe.mass, airframe.axial_drag, norm, b3, v)
     thrust_rate = flatness.collective_rate(airframe.mass, airframe.axial_drag, b3, (norm, f1), (v, a))
     moment, moment_rate = flatness.moment_and_rate(airframe.inertia, omega, omega_dot, angular_jerk)
-    rate = ops.sqrt(dot(turning[0], turning[0]) + STILL)
+    rate = ops.sqrt(dot(turning[0], turning[0]) + RATE_SMOOTHING)
     return thrust, *moment, thrust_rate, *moment_rate, norm, rate, dot(b3, up)

@@ -13,7 +13,7 @@ from aerobat.kernels import rigid_body
 from aerobat.kernels.ops import Ops, PerRotor, Scalar, clip
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters, MassProperties, RotorWrench
 
-LEAST_STEP = 1e-12  # smallest step as a divisor, in time constants
+MIN_STEP = 1e-12  # smallest step as a divisor, in time constants
 
 
 class Rotors(NamedTuple):
@@ -44,7 +44,7 @@ def first_order_response(thrusts: PerRotor, commands: PerRotor, decay_factors: P
 
     This is the exact solution, stable for any lag.
     """
-    return tuple(u + (f - u) * left for f, u, left in zip(thrusts, commands, decay_factors, strict=True))
+    return tuple(u + (f - u) * decay for f, u, decay in zip(thrusts, commands, decay_factors, strict=True))
 
 
 def collective_thrust(rotors: Rotors, thrusts: PerRotor) -> Scalar:
@@ -92,11 +92,11 @@ def advance(
     command.
     """
     rotors = airframe.rotors
-    wanted = clamp(ops, rotors, commands)
+    clamped = clamp(ops, rotors, commands)
     halfway = decay_factors(ops, rotors, 0.5 * dt)
-    middle = first_order_response(motion.thrusts, wanted, halfway)
-    end = first_order_response(middle, wanted, halfway)
-    mean = first_order_response(motion.thrusts, wanted, _mean_factors(ops, rotors, halfway, dt))
+    middle = first_order_response(motion.thrusts, clamped, halfway)
+    end = first_order_response(middle, clamped, halfway)
+    mean = first_order_response(motion.thrusts, clamped, _mean_factors(ops, rotors, halfway, dt))
     start = tuple(6.0 * m - 4.0 * f - g for m, f, g in zip(mean, middle, end, strict=True))
     loads = wrench(rotors, start), wrench(rotors, middle), wrench(rotors, end)
     body = rigid_body.step(ops, airframe.mass_properties, environment, motion.body, loads, dt)
@@ -106,6 +106,6 @@ def advance(
 def _mean_factors(ops: Ops, rotors: Rotors, halfway: PerRotor, dt: Scalar) -> PerRotor:
     """Return the mean of each rotor's decay factor over `dt` [s]."""
     return tuple(
-        (1.0 - left * left) / ops.maximum(dt * rate, LEAST_STEP)
-        for left, rate in zip(halfway, rotors.inverse_time_constant, strict=True)
+        (1.0 - decay * decay) / ops.maximum(dt * rate, MIN_STEP)
+        for decay, rate in zip(halfway, rotors.inverse_time_constant, strict=True)
     )

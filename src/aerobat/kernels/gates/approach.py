@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from aerobat.kernels.gates.snapshot import Snapshot, between, relative
+from aerobat.kernels.gates.snapshot import Snapshot, interpolated, relative
 from aerobat.kernels.ops import Ops, Scalar, Vector, clip, magnitude, select_tree
 from aerobat.kernels.vectors import ZERO, dot, subtract
 
@@ -33,10 +33,10 @@ def init(target: Target) -> Approach:
 
 def _nearest(ops: Ops, last: Snapshot, now: Snapshot) -> Approach:
     """Return the nearest approach between two snapshots with positions relative to the place."""
-    way = subtract(now.position, last.position)
-    square = dot(way, way)
-    toward = -dot(last.position, way) / ops.select(square > 0.0, square, 1.0)
-    here = between(last, now, clip(ops, toward, 0.0, 1.0))
+    displacement = subtract(now.position, last.position)
+    square = dot(displacement, displacement)
+    fraction = -dot(last.position, displacement) / ops.select(square > 0.0, square, 1.0)
+    here = interpolated(last, now, clip(ops, fraction, 0.0, 1.0))
     return Approach(dot(here.position, here.position), here.time, here.velocity)
 
 

@@ -10,7 +10,7 @@ from aerobat.kernels.ops import Ops, Scalar, Vector, clip, magnitude, select_tre
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.vectors import add_scaled, dot, norm, subtract
 
-_STRAIGHT = 1e-12  # [-] smallest curvature of the cosine; less is rounding
+_MIN_CURVATURE = 1e-12  # [-] smallest curvature of the cosine; less is rounding
 
 
 class Direction(NamedTuple):
@@ -40,15 +40,15 @@ def _nearest(ops: Ops, direction: Direction, last: Snapshot, now: Snapshot) -> P
     form.
     """
     before, after = axes(last.q_world_body)[2], axes(now.q_world_body)[2]
-    way = subtract(after, before)
-    p, q = dot(before, direction.up), dot(way, direction.up)
-    square, slope, bend = dot(before, before), dot(before, way), dot(way, way)
-    curved = p * bend - q * slope
-    is_curved = magnitude(ops, curved) > _STRAIGHT
+    change = subtract(after, before)
+    p, q = dot(before, direction.up), dot(change, direction.up)
+    square, slope, change_sq = dot(before, before), dot(before, change), dot(change, change)
+    curved = p * change_sq - q * slope
+    is_curved = magnitude(ops, curved) > _MIN_CURVATURE
     fraction = (q * square - p * slope) / ops.select(is_curved, curved, 1.0)
     fraction = clip(ops, ops.select(is_curved, fraction, 1.0), 0.0, 1.0)
-    there = add_scaled(before, fraction, way)
-    cosine, end = dot(there, direction.up) / norm(ops, there), p + q
+    axis = add_scaled(before, fraction, change)
+    cosine, end = dot(axis, direction.up) / norm(ops, axis), p + q
     time = last.time + fraction * (now.time - last.time)
     return select_tree(ops, cosine > end, Pointing(cosine, time), Pointing(end, now.time))
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from aerobat.kernels.gates import swath
 from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
-from aerobat.kernels.gates.snapshot import PlaceMotion, Snapshot, beside, between
+from aerobat.kernels.gates.snapshot import PlaceMotion, Snapshot, interpolated, relative_to_moving
 from aerobat.kernels.gates.swath import SwathProgress
 from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
 from aerobat.kernels.vectors import ZERO, dot
@@ -61,14 +61,14 @@ def step(
         counted: whether there was a last tick, and whether this tick counts.
     """
     plane, ellipsoid = gate
-    last, now = (beside(ops, each, plane.centre, plane.motion) for each in snapshots)
+    last, now = (relative_to_moving(ops, each, plane.centre, plane.motion) for each in snapshots)
     before, behind = dot(last.position, plane.normal), dot(now.position, plane.normal)
     both = counted[0] & counted[1]
     forward = both & (before <= 0.0) & (behind > 0.0)
     back = both & (before > 0.0) & (behind <= 0.0)
     crosses = ops.select(forward, 1.0, ops.select(back, 1.0, 0.0))
     fraction = -before / ops.select(crosses > 0.5, behind - before, 1.0)
-    here = between(last, now, fraction)
+    here = interpolated(last, now, fraction)
     latest = select_tree(ops, forward, here, progress.latest)
     is_passing = (behind > 0.0) & (behind < plane.depth) & (latest.time < inf)
     off_time = magnitude(ops, latest.time - plane.planned)

@@ -73,8 +73,8 @@ def section(
     body_axes = axes(normalize(ops, q_world_body))
     in_body = [to_body(body_axes, direction) for direction in directions]
     height, along, beside = (
-        dot(offset, direction) + dot(ellipsoid.centre, turned)
-        for direction, turned in zip(directions, in_body, strict=True)
+        dot(offset, direction) + dot(ellipsoid.centre, rotated)
+        for direction, rotated in zip(directions, in_body, strict=True)
     )
     n, a, b = (_stretched(ellipsoid, direction) for direction in in_body)
     reach_sq = dot(n, n)

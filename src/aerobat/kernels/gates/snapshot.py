@@ -17,7 +17,7 @@ class Snapshot(NamedTuple):
     q_world_body: Quaternion  # interpolated attitudes are not of unit length
 
 
-class Bend(NamedTuple):
+class VelocityJump(NamedTuple):
     """An instant at which the velocity of a place jumps."""
 
     time: Scalar  # [s]
@@ -27,21 +27,23 @@ class Bend(NamedTuple):
 class PlaceMotion(NamedTuple):
     """The motion of a place from its initial position."""
 
-    velocity: Vector  # [m/s] before all bends
-    bends: tuple[Bend, ...]
+    velocity: Vector  # [m/s] before all jumps
+    velocity_jumps: tuple[VelocityJump, ...]
 
 
-def beside(ops: Ops, snapshot: Snapshot, centre: Vector, motion: PlaceMotion | tuple[()]) -> Snapshot:
+def relative_to_moving(
+    ops: Ops, snapshot: Snapshot, centre: Vector, motion: PlaceMotion | tuple[()]
+) -> Snapshot:
     """Return the snapshot relative to a centre, which moves by `motion` (() for a fixed one)."""
     seen = relative(snapshot, centre)
     if not motion:
         return seen
     position = add_scaled(seen.position, -snapshot.time, motion.velocity)
     velocity = subtract(seen.velocity, motion.velocity)
-    for bend in motion.bends:
-        since = ops.maximum(snapshot.time - bend.time, 0.0)
-        position = add_scaled(position, -since, bend.change)
-        velocity = add_scaled(velocity, ops.select(since > 0.0, -1.0, 0.0), bend.change)
+    for jump in motion.velocity_jumps:
+        since = ops.maximum(snapshot.time - jump.time, 0.0)
+        position = add_scaled(position, -since, jump.change)
+        velocity = add_scaled(velocity, ops.select(since > 0.0, -1.0, 0.0), jump.change)
     return seen._replace(position=position, velocity=velocity)
 
 
@@ -50,7 +52,7 @@ def relative(snapshot: Snapshot, centre: Vector) -> Snapshot:
     return snapshot._replace(position=subtract(snapshot.position, centre))
 
 
-def between(a: Snapshot, b: Snapshot, fraction: Scalar) -> Snapshot:
+def interpolated(a: Snapshot, b: Snapshot, fraction: Scalar) -> Snapshot:
     """Return the linear interpolation at a fraction of the way between two snapshots."""
     w, x, y, z = (p + fraction * (q - p) for p, q in zip(a.q_world_body, b.q_world_body, strict=True))
     return Snapshot(

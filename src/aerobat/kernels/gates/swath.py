@@ -21,7 +21,7 @@ from aerobat.kernels.gates.section import (
     gap,
     section,
 )
-from aerobat.kernels.gates.snapshot import Snapshot, between
+from aerobat.kernels.gates.snapshot import Snapshot, interpolated
 from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
 from aerobat.kernels.vectors import dot, norm, subtract
 
@@ -153,11 +153,11 @@ def _extreme(
     """
     last, now = snapshots
     directions = normal, direction.along, direction.beside
-    way = subtract(now.position, last.position)
-    there = section(ops, ellipsoid, directions, now.position, now.q_world_body)
-    change = dot(way, directions[0]), dot(way, directions[1])
-    fraction = fraction_of_farthest(ops, there, change, within, direction.both_ways)
-    at = between(last, now, fraction)
+    displacement = subtract(now.position, last.position)
+    end_section = section(ops, ellipsoid, directions, now.position, now.q_world_body)
+    change = dot(displacement, directions[0]), dot(displacement, directions[1])
+    fraction = fraction_of_farthest(ops, end_section, change, within, direction.both_ways)
+    at = interpolated(last, now, fraction)
     here = section(ops, ellipsoid, directions, at.position, at.q_world_body)
     point = farthest(ops, here, direction.both_ways)
     reach = ops.select(direction.both_ways > 0.5, magnitude(ops, point.along), point.along)

@@ -26,7 +26,7 @@ from aerobat.declaration import by_value
 from aerobat.engines.pytree import components, tree_map
 from aerobat.kernels.gates.progress import GatePlane, GateProgress
 from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
-from aerobat.kernels.gates.snapshot import Bend, PlaceMotion
+from aerobat.kernels.gates.snapshot import PlaceMotion, VelocityJump
 from aerobat.kernels.gates.swath import NOWHERE, Extreme, Swath
 from aerobat.problem.gate import Gate
 from aerobat.problem.opening import EdgeProbe, edge_name
@@ -238,8 +238,9 @@ def _motion(gate: Gate) -> PlaceMotion | tuple[()]:
     """Return the motion of a moving gate; () for a fixed one."""
     if gate.motion is None:
         return ()
-    bends = zip(gate.motion.times.tolist(), gate.motion.turns, strict=True)
-    return PlaceMotion(components(gate.velocity), tuple(Bend(time, components(by)) for time, by in bends))
+    jumps = zip(gate.motion.times.tolist(), gate.motion.turns, strict=True)
+    changes = tuple(VelocityJump(time, components(change)) for time, change in jumps)
+    return PlaceMotion(components(gate.velocity), changes)
 
 
 def _directions(gate: Gate) -> tuple[PlaneDirection, ...]:
