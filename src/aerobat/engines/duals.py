@@ -142,23 +142,23 @@ def differentiated(init: Init, step: Step) -> tuple[Init, Step]:
     """
 
     def begin(ops: Ops, parameters: Tree, row: Tree) -> Tree:
-        return _apart(init(DualOps(ops), _together(parameters), _together(row)))
+        return _split_pairs(init(DualOps(ops), _as_duals(parameters), _as_duals(row)))
 
     def advance(ops: Ops, parameters: Tree, carry: Tree, row: Tree) -> tuple[Tree, Tree]:
-        carry, output = step(DualOps(ops), _together(parameters), _together(carry), _together(row))
-        return _apart(carry), _apart(output)
+        carry, output = step(DualOps(ops), _as_duals(parameters), _as_duals(carry), _as_duals(row))
+        return _split_pairs(carry), _split_pairs(output)
 
     return begin, advance
 
 
-def _together(pair: Tree) -> Tree:
+def _as_duals(pair: Tree) -> Tree:
     """Return values and tangents as dual numbers."""
     values, tangents = pair
-    given = (None if isinstance(tangent, tuple) else tangent for tangent in tangents)
-    return tree_unflatten(values, map(Dual, tree_leaves(values), given))
+    optional = (None if isinstance(tangent, tuple) else tangent for tangent in tangents)
+    return tree_unflatten(values, map(Dual, tree_leaves(values), optional))
 
 
-def _apart(tree: Tree) -> Tree:
+def _split_pairs(tree: Tree) -> Tree:
     """Return dual numbers as values and tangents."""
     numbers = [value_and_tangent(leaf) for leaf in tree_leaves(tree)]
     return tree_unflatten(tree, (value for value, _ in numbers)), tuple(tangent for _, tangent in numbers)

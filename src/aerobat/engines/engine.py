@@ -20,7 +20,7 @@ Step: TypeAlias = Callable[[Ops, Tree, Tree, Tree], tuple[Tree, Tree]]
 
 
 class Held(NamedTuple):
-    """Inputs that stay constant for several ticks, each stored once; kernels see the tree of values."""
+    """Inputs with a zero-order hold, constant for several ticks and stored once; kernels see the values."""
 
     row: Any  # indices into `values` for each tick, (ticks,); () for one tick with its own values
     values: Tree  # leaves (samples,) or (samples, vehicles)
@@ -33,7 +33,7 @@ class Held(NamedTuple):
 
 
 class Coded(NamedTuple):
-    """Inputs that are entries of a table, stored as indices; kernels see the tree of entries."""
+    """Dictionary-encoded inputs: entries of a table, stored as indices; kernels see the tree of entries."""
 
     codes: (
         Tree  # leaves (ticks, vehicles), or (vehicles,) for one tick, in a `Held` (samples, vehicles); uint16

@@ -16,24 +16,24 @@ def gradient(output: Symbol, inputs: Sequence[Symbol]) -> list[Symbol]:
     """
     trace, ops = output.trace, TraceOps(output.trace)
     wanted = {symbol.number for symbol in inputs}
-    needed, moved = sorted(trace.needed([output.number])), set(wanted)
+    needed, dependent = sorted(trace.needed([output.number])), set(wanted)
     for number in needed:
-        if any(argument in moved for argument in trace.operations[number].arguments):
-            moved.add(number)
+        if any(argument in dependent for argument in trace.operations[number].arguments):
+            dependent.add(number)
     slopes: dict[int, Symbol] = {output.number: trace.symbol(1.0)}
     for number in reversed(needed):
-        if number in wanted or number not in moved or number not in slopes:
+        if number in wanted or number not in dependent or number not in slopes:
             continue
         operation = trace.operations[number]
         arguments = [Symbol(trace, i) for i in operation.arguments]
         slope = slopes[number]
-        for argument, part in _parts(ops, operation.name, arguments, Symbol(trace, number), slope):
+        for argument, term in _contributions(ops, operation.name, arguments, Symbol(trace, number), slope):
             known = slopes.get(argument.number)
-            slopes[argument.number] = part if known is None else known + part
+            slopes[argument.number] = term if known is None else known + term
     return [slopes.get(symbol.number, trace.symbol(0.0)) for symbol in inputs]
 
 
-def _parts(
+def _contributions(
     ops: TraceOps, name: str, arguments: list[Symbol], value: Symbol, slope: Symbol
 ) -> list[tuple[Symbol, Symbol]]:
     """Return the arguments of an operation, each with its contribution to the derivative by that argument."""
@@ -45,8 +45,8 @@ def _parts(
         case "multiply", [x, y]:
             return [(x, slope * y), (y, slope * x)]
         case "divide", [x, y]:
-            part = slope / y
-            return [(x, part), (y, -(part * value))]
+            quotient = slope / y
+            return [(x, quotient), (y, -(quotient * value))]
         case "negate", [x]:
             return [(x, -slope)]
         case "sqrt", [x]:

@@ -180,16 +180,16 @@ def trace_loop(init: Init, step: Step, parameters: Tree, inputs: Tree) -> Traced
     next_tree, row = step(ops, parameters, tree_unflatten(first_tree, carry), inputs)
     following = [trace.symbol(leaf) for leaf in tree_leaves(next_tree)]
     row = tree_unflatten(row, [trace.symbol(leaf) for leaf in tree_leaves(row)])
-    kept = _kept(trace, _numbers(carry), _numbers(following), _numbers(tree_leaves(row)))
+    live = _live_parts(trace, _numbers(carry), _numbers(following), _numbers(tree_leaves(row)))
     return TracedLoop(
         trace=trace,
         parameters=_numbers(tree_leaves(parameters)),
         inputs=_numbers(tree_leaves(inputs)),
-        carry=_numbers(carry[i] for i in kept),
-        first_carry=_numbers(first[i] for i in kept),
-        next_carry=_numbers(following[i] for i in kept),
+        carry=_numbers(carry[i] for i in live),
+        first_carry=_numbers(first[i] for i in live),
+        next_carry=_numbers(following[i] for i in live),
         outputs=_numbers(tree_leaves(row)),
-        carry_tree=tree_unflatten(first_tree, (i if i in kept else () for i in range(len(carry)))),
+        carry_tree=tree_unflatten(first_tree, (i if i in live else () for i in range(len(carry)))),
         row=row,
     )
 
@@ -202,12 +202,14 @@ def _numbers(symbols: Iterable[Symbol]) -> tuple[int, ...]:
     return tuple(symbol.number for symbol in symbols)
 
 
-def _kept(trace: Trace, carry: Sequence[int], following: Sequence[int], outputs: Sequence[int]) -> list[int]:
+def _live_parts(
+    trace: Trace, carry: Sequence[int], following: Sequence[int], outputs: Sequence[int]
+) -> list[int]:
     """Return the parts of the carry on which the outputs eventually depend."""
-    kept: set[int] = set()
+    live: set[int] = set()
     while True:
-        needed = trace.needed((*outputs, *(following[i] for i in kept)))
+        needed = trace.needed((*outputs, *(following[i] for i in live)))
         more = {i for i, number in enumerate(carry) if number in needed}
-        if more == kept:
-            return sorted(kept)
-        kept = more
+        if more == live:
+            return sorted(live)
+        live = more

@@ -26,8 +26,8 @@ from aerobat.engines.engine import (
     read_only,
     tick_count,
 )
+from aerobat.engines.llvm.code_cache import cached_code
 from aerobat.engines.llvm.codegen import module
-from aerobat.engines.llvm.kept_code import kept_code
 from aerobat.engines.llvm.packing import ARRAYS, COUNTS, Layout, PackedInputs, Packing
 from aerobat.engines.pytree import Tree, piecewise_constant_leaves, tree_leaves, tree_map, tree_unflatten
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
@@ -167,7 +167,7 @@ def object_code(loop: TracedLoop, layout: Layout) -> bytes:
     features = llvm.get_host_cpu_features().flatten()
     versions = f"llvmlite {llvmlite.__version__}, LLVM {llvm.llvm_version_info}"
     machine = f"{llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features}"
-    return kept_code(
+    return cached_code(
         f"{versions}\n{machine}\n{layout}\n{loop}",
         lambda: target_machine().emit_object(llvm.parse_assembly(module(loop, layout))),
     )

@@ -59,23 +59,23 @@ def smooth_functions(
     def inputs(name: str, count: int) -> list[Symbol]:
         return [trace.input(f"{name} {i}") for i in range(count)]
 
-    common, moving, still = inputs("shared", shared), inputs("moved", moved), inputs("fixed", fixed)
-    directions, own = inputs("direction", moved), [*moving, *still]
+    common, moving, fixed_symbols = inputs("shared", shared), inputs("moved", moved), inputs("fixed", fixed)
+    directions, own = inputs("direction", moved), [*moving, *fixed_symbols]
     along = [*map(Dual, moving, directions)]
-    found = kernel(DualOps(TraceOps(trace)), [*map(Dual, common)], along, [*map(Dual, still)])
+    found = kernel(DualOps(TraceOps(trace)), [*map(Dual, common)], along, [*map(Dual, fixed_symbols)])
     parts = zip(*map(value_and_tangent, found), strict=True)
     values, slopes = ([trace.symbol(part) for part in each] for each in parts)
     weights = inputs("weight", len(values))
-    bent = gradient(trace.symbol(sum(map(mul, weights, slopes))), moving)
+    curvature = gradient(trace.symbol(sum(map(mul, weights, slopes))), moving)
     if squares:
         pairs = [a * b if a is not b else 0.5 * a * b for a, b in combinations_with_replacement(slopes, 2)]
         weights += inputs("pair", len(pairs))
         squared = trace.symbol(sum(map(mul, weights[len(values) :], pairs)))
-        bent = [*map(Symbol.__add__, bent, gradient(squared, directions))]
+        curvature = [*map(Symbol.__add__, curvature, gradient(squared, directions))]
     return SmoothFunctions(
         place_function(common, own, (), values),
         place_function(common, own, directions, slopes),
-        place_function(common, [*own, *weights], directions, bent),
+        place_function(common, [*own, *weights], directions, curvature),
     )
 
 
@@ -95,17 +95,17 @@ def place_function(
         directions: Inputs that all places take in turn, one row after another.
         outputs: The results.
     """
-    given, turns, found = (tuple(s.number for s in each) for each in ((*shared, *own), directions, outputs))
-    loop = TracedLoop(outputs[0].trace, given, turns, (), (), (), found, (), ())
-    width, constant = lanes(), (False,) * len(turns)
+    given, ticks, found = (tuple(s.number for s in each) for each in ((*shared, *own), directions, outputs))
+    loop = TracedLoop(outputs[0].trace, given, ticks, (), (), (), found, (), ())
+    width, constant = lanes(), (False,) * len(ticks)
     places = (True,) * len(shared) + (False,) * len(own)
-    layout = Layout(width, places, (InputKind(shared=True),) * len(turns), (), constant)
+    layout = Layout(width, places, (InputKind(shared=True),) * len(ticks), (), constant)
     _, scan = machine_code(loop, layout)
 
     def function(shared: Array, own: Array, directions: Array) -> Array:
         blocks = -(-len(own) // width)
-        lacking = blocks * width - len(own)
-        padded = np.concatenate([own, own[:1].repeat(lacking, 0)]) if lacking else own
+        padding = blocks * width - len(own)
+        padded = np.concatenate([own, own[:1].repeat(padding, 0)]) if padding else own
         packed = padded.reshape(blocks, width, -1).swapaxes(1, 2).copy()
         result = np.empty((len(directions), len(found), blocks * width))
         given = map(address, (shared, packed, directions))

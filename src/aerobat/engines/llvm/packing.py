@@ -147,10 +147,11 @@ class Packing:
         shared = np.empty((ticks, len(columns)))
         for index, column in enumerate(columns):
             shared[:, index] = column
-        arrays = (shared, self._told(leaves, ticks), held[False], self._told(leaves, ticks, True), held[True])
+        plain, coded = (self._per_tick(leaves, ticks, are_codes) for are_codes in (False, True))
+        arrays = (shared, plain, held[False], coded, held[True])
         return PackedInputs((*arrays, tables[-1]), (held[False].shape[1], held[True].shape[1]))
 
-    def _told(self, leaves: Sequence[Array], ticks: int, coded: bool = False) -> NDArray[Any]:
+    def _per_tick(self, leaves: Sequence[Array], ticks: int, coded: bool = False) -> NDArray[Any]:
         """Return the inputs given at every tick, (blocks, ticks, leaf, width)."""
         chosen = self._of(leaves, InputKind(False, coded=coded))
         packed = np.empty((self.blocks, ticks, len(chosen), self.width), _DTYPES[coded])

@@ -13,12 +13,12 @@ from pathlib import Path
 from aerobat.errors import SpecError
 from aerobat.storage import read_whole, write_whole
 
-MOST_KEPT = 256  # largest number of files; a loop takes 0.1 to 0.3 MB
+MAX_FILES = 256  # largest number of files; a loop takes 0.1 to 0.3 MB
 MAX_SIZE = 2**24  # [bytes] largest size of a file
 DIGEST_SIZE = hashlib.sha256().digest_size
 
 
-def kept_code(listing: str, compiled: Callable[[], bytes]) -> bytes:
+def cached_code(listing: str, compiled: Callable[[], bytes]) -> bytes:
     """Return cached object code for a listing, or compile it and cache it.
 
     A folder that cannot be read or written, or a truncated file, only costs the time to compile.
@@ -62,6 +62,6 @@ def _compiler() -> str:
 
 def _remove_oldest(folder: Path) -> None:
     """Remove all but the most recently used files."""
-    kept = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime)
-    for path in kept[:-MOST_KEPT]:
+    by_age = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime)
+    for path in by_age[:-MAX_FILES]:
         path.unlink(missing_ok=True)

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from aerobat.engines.llvm import kept_code
+from aerobat.engines.llvm import code_cache
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of caches of the test's own."""
     place = tmp_path / "machine-code"
-    monkeypatch.setattr(kept_code, "_folder", lambda: place)
+    monkeypatch.setattr(code_cache, "_folder", lambda: place)
     return place
 
 
@@ -22,39 +22,39 @@ def refuse() -> bytes:
 
 
 def test_a_listing_is_compiled_once(folder: Path) -> None:
-    assert kept_code.kept_code("%0 = input", lambda: b"first") == b"first"
-    assert kept_code.kept_code("%0 = input", refuse) == b"first"
-    assert kept_code.kept_code("%0 = another", lambda: b"second") == b"second"
+    assert code_cache.cached_code("%0 = input", lambda: b"first") == b"first"
+    assert code_cache.cached_code("%0 = input", refuse) == b"first"
+    assert code_cache.cached_code("%0 = another", lambda: b"second") == b"second"
 
 
 def test_another_compiler_compiles_anew(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept_code.kept_code("%0 = input", lambda: b"first")
-    monkeypatch.setattr(kept_code, "_compiler", lambda: "changed sources")
-    assert kept_code.kept_code("%0 = input", lambda: b"second") == b"second"
+    code_cache.cached_code("%0 = input", lambda: b"first")
+    monkeypatch.setattr(code_cache, "_compiler", lambda: "changed sources")
+    assert code_cache.cached_code("%0 = input", lambda: b"second") == b"second"
 
 
 @pytest.mark.parametrize("damage", [lambda code: code[:-1], lambda code: code + b"0", lambda code: b""])
 def test_a_damaged_file_is_compiled_anew(folder: Path, damage: Callable[[bytes], bytes]) -> None:
-    kept_code.kept_code("%0 = input", lambda: b"code")
+    code_cache.cached_code("%0 = input", lambda: b"code")
     (file,) = folder.iterdir()
     file.write_bytes(damage(file.read_bytes()))
-    assert kept_code.kept_code("%0 = input", lambda: b"code") == b"code"
-    assert kept_code.kept_code("%0 = input", refuse) == b"code"
+    assert code_cache.cached_code("%0 = input", lambda: b"code") == b"code"
+    assert code_cache.cached_code("%0 = input", refuse) == b"code"
 
 
 def test_no_folder_is_needed(folder: Path) -> None:
     folder.write_text("a file where the folder should be")
-    assert kept_code.kept_code("%0 = input", lambda: b"code") == b"code"
+    assert code_cache.cached_code("%0 = input", lambda: b"code") == b"code"
 
 
 def test_files_that_were_used_least_recently_go(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for number in range(5):
-        kept_code.kept_code(f"%{number} = input", lambda: b"code")
+        code_cache.cached_code(f"%{number} = input", lambda: b"code")
     for age, file in enumerate(folder.iterdir()):
         os.utime(file, (1e9 - age, 1e9 - age))
-    kept_code.kept_code("%3 = input", refuse)
-    monkeypatch.setattr(kept_code, "MOST_KEPT", 2)
-    kept_code.kept_code("%5 = input", lambda: b"code")
+    code_cache.cached_code("%3 = input", refuse)
+    monkeypatch.setattr(code_cache, "MAX_FILES", 2)
+    code_cache.cached_code("%5 = input", lambda: b"code")
     assert len([*folder.iterdir()]) == 2
     for number in (3, 5):
-        assert kept_code.kept_code(f"%{number} = input", refuse) == b"code"
+        assert code_cache.cached_code(f"%{number} = input", refuse) == b"code"
