@@ -78,7 +78,7 @@ def sampled(flight: Flight, points: int) -> tuple[float, float]:
     wide = [revolved.wide, revolved.wide, revolved.high]
     true, around = [np.inf], [np.inf]
     for obstacle in flight.environment.obstacles:
-        away = Environment(obstacles=(obstacle,)).pieces.apart(at, at)[:, 0]
+        away = Environment(obstacles=(obstacle,)).pieces.box_distances(at, at)[:, 0]
         other = solid(obstacle)
         for k in np.flatnonzero(away < away.min() + 2.0 * revolved.reach):
             true.append(distance(other, centres[k], axes[k], body.semi_axes))
@@ -125,7 +125,7 @@ def test_no_point_of_a_certified_body_enters_an_obstacle(seed):
     places = flight.trajectory.evaluate(times)
     centres, axes = places + body.turned(at.setpoint.q_world_body)[0], so3.axes(at.setpoint.q_world_body)
     for obstacle in flight.environment.obstacles:
-        away = Environment(obstacles=(obstacle,)).pieces.apart(places, places)[:, 0]
+        away = Environment(obstacles=(obstacle,)).pieces.box_distances(places, places)[:, 0]
         for k in np.flatnonzero(away < body.revolved.reach + found.value):
             hull.setTransform(fcl.Transform(axes[k], centres[k]))
             assert gap_between(solid(obstacle), hull) >= found.bound - EXACT

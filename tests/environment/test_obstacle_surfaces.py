@@ -9,8 +9,8 @@ import pytest
 
 import aerobat as ab
 from aerobat.environment.obstacles import Obstacle
-from aerobat.environment.obstacles.shown import surfaces_around
 from aerobat.environment.obstacles.surface import Surface, flattening, surface_of
+from aerobat.environment.obstacles.visible_surfaces import surfaces_around
 
 OBSTACLES = {
     each.kind: each

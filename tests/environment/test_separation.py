@@ -115,7 +115,7 @@ def test_boxes_around_pieces_are_no_farther_than_the_pieces(seed):
     points = 3.0 * rng.normal(size=(20, 3))
     bodies, numbers = np.divmod(np.arange(20 * len(pieces)), len(pieces))
     exact = pieces.separated(numbers, points[bodies], np.zeros((len(bodies), 3, 3))).gaps
-    assert (pieces.apart(points, points).ravel() <= np.maximum(exact, 0.0) + FINE).all()
+    assert (pieces.box_distances(points, points).ravel() <= np.maximum(exact, 0.0) + FINE).all()
     near = set(zip(*map(np.ndarray.tolist, pieces.near(points, 0.0, 0.5)), strict=True))
     assert {(int(b), int(n)) for b, n, far in zip(bodies, numbers, exact, strict=True) if far < 0.49} <= near
 

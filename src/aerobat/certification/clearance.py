@@ -126,7 +126,7 @@ def enclose_clearance(path: BodyPath, pieces: Pieces) -> ClearanceEnclosure:
     if not len(path.pieces):
         return ClearanceEnclosure()
     centres, radii = path.balls
-    lower = pieces.apart(centres, centres, path.pieces.spans(path.trajectory)) - radii[:, None]
+    lower = pieces.box_distances(centres, centres, path.pieces.spans(path.trajectory)) - radii[:, None]
     first = np.argsort(lower.min(axis=0))[:FIRST_PIECES]
     pairs = _PathObstaclePairs.of(path, pieces, lower[:, first].argmin(axis=0), first).separated()
     found = pairs.nearest(ClearanceEnclosure())

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.environment import Environment
-from aerobat.environment.obstacles.shown import surfaces_around
 from aerobat.environment.obstacles.surface import Surface
+from aerobat.environment.obstacles.visible_surfaces import surfaces_around
 from aerobat.errors import SpecError
 from aerobat.evaluation.score import score
 from aerobat.flatness import reference, vehicle_of

@@ -44,14 +44,14 @@ class ObstacleMotion:
         return np.asarray(moved)
 
     @property
-    def turns(self) -> Array:
+    def velocity_jumps(self) -> Array:
         """The velocity jumps at each of `times` [m/s], (k, 3)."""
         slopes = np.diff(self.rows[:, 1:], axis=0) / np.diff(self.times)[:, None]
         return np.diff(slopes, axis=0, prepend=0.0, append=0.0) if len(self.rows) else self.rows[:, 1:]
 
     def velocity_at(self, time: float) -> Array:
         """Return the velocity [m/s] at a time [s], (3,)."""
-        return np.asarray(self.velocity + self.turns[self.times <= time].sum(axis=0))
+        return np.asarray(self.velocity + self.velocity_jumps[self.times <= time].sum(axis=0))
 
     def reach(self, begin: Array, end: Array) -> tuple[Array, Array]:
         """Return the smallest and largest displacement [m] per axis between two times (...), (..., 3)."""

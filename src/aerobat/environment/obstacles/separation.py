@@ -24,14 +24,14 @@ import numpy as np
 from aerobat.arrays import Array, Indices, Mask
 from aerobat.environment.obstacles.convex_piece import TINY, ConvexPiece, ObstacleMotion, units
 
-STEPS = 40  # limit of Newton steps; most pairs take five
-ENOUGH = 1e-11  # [m] gain below which a step is the last
-LOWEST = 4  # points of a hull in the first model: as many as touch a plane along a box's side
-ADDED = 3  # points added to the model, one by one, for hulls with more points
-SOFT = 1e-4  # [m] smoothing of lengths, whose slopes jump at zero
-LONGEST_STEP = 0.5  # [rad]
-PARTS = np.array([0.0, 1.0, 0.5, 0.25, 0.1, 0.02])  # fractions of a step that are tried
-LEAST_BEND = 0.01  # [m] smallest curvature of a gap on the sphere in the model, also where bodies overlap
+MAX_STEPS = 40  # limit of Newton steps; most pairs take five
+MIN_GAIN = 1e-11  # [m] gain below which a step is the last
+INITIAL_POINTS = 4  # points of a hull in the first model: as many as touch a plane along a box's side
+MAX_ADDED_POINTS = 3  # points added to the model, one by one, for hulls with more points
+LENGTH_SMOOTHING = 1e-4  # [m] smoothing of lengths, whose slopes jump at zero
+MAX_STEP_ANGLE = 0.5  # [rad]
+STEP_FRACTIONS = np.array([0.0, 1.0, 0.5, 0.25, 0.1, 0.02])  # fractions of a step that are tried
+MIN_CURVATURE = 0.01  # [m] smallest curvature of a gap on the sphere in the model, also where bodies overlap
 VANISHING = 1e-30  # [m²]
 
 
@@ -87,10 +87,10 @@ class Pieces:
             times: Times of the bodies [s], (m,).
         """
         over = None if times is None else (times, times)
-        bodies, pieces = np.nonzero(self.apart(centres, centres, over) < reach + within)
+        bodies, pieces = np.nonzero(self.box_distances(centres, centres, over) < reach + within)
         return bodies, pieces
 
-    def apart(self, lower: Array, upper: Array, over: tuple[Array, Array] | None = None) -> Array:
+    def box_distances(self, lower: Array, upper: Array, over: tuple[Array, Array] | None = None) -> Array:
         """Return lower bounds of the distances between boxes and all pieces [m], from the pieces' boxes.
 
         Args:
@@ -170,7 +170,7 @@ class Pieces:
                 enough.
             times: Times of the points [s], (m,).
         """
-        found = self.apart(points, points, None if times is None else (times, times))
+        found = self.box_distances(points, points, None if times is None else (times, times))
         for number, near in enumerate((found < exact_within).T):
             if near.any():
                 moved = 0.0 if times is None else self.moved(np.full(near.sum(), number), times[near])
@@ -223,11 +223,11 @@ class _Pairs:
         """Return the normals with the largest gaps, starting from these normals, (m, 3)."""
         found, gaps = normals.copy(), self.gaps(normals[:, None])[:, 0]
         rising = np.arange(len(normals))
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             better, most = self[rising]._improved(found[rising])
             gains = most - gaps[rising]
             found[rising], gaps[rising] = better, most
-            rising = rising[gains > ENOUGH]
+            rising = rising[gains > MIN_GAIN]
             if not len(rising):
                 break
         return found
@@ -240,8 +240,8 @@ class _Pairs:
         across = _across(normals)
         turns = self._nearby(normals, across).best_turns
         lengths = np.linalg.norm(turns, axis=-1, keepdims=True)
-        turns *= np.minimum(1.0, LONGEST_STEP / np.maximum(lengths, TINY))
-        tried = normals[:, None] + PARTS[:, None] * (turns[:, None] @ across)
+        turns *= np.minimum(1.0, MAX_STEP_ANGLE / np.maximum(lengths, TINY))
+        tried = normals[:, None] + STEP_FRACTIONS[:, None] * (turns[:, None] @ across)
         tried /= np.linalg.norm(tried, axis=-1, keepdims=True)
         gaps = self.gaps(tried)
         rows, best = np.arange(len(gaps)), np.argmax(gaps, axis=1)
@@ -250,17 +250,17 @@ class _Pairs:
     def _nearby(self, normals: Array, across: Array) -> _Model:
         """Return a model of the gaps near normals, for turns along two directions across each, (m, 2, 3)."""
         values, slopes = _times(self.offsets, normals), self.offsets @ np.swapaxes(across, 1, 2)
-        bend = np.zeros((len(normals), 2, 2))
+        curvature = np.zeros((len(normals), 2, 2))
         for root in (self.roundings, self.shapes):
             reach = _times(np.swapaxes(root, 1, 2), normals)
-            length = np.hypot(np.linalg.norm(reach, axis=-1), SOFT)
+            length = np.hypot(np.linalg.norm(reach, axis=-1), LENGTH_SMOOTHING)
             along = across @ root
             slope = _times(along, reach / length[:, None])
             values, slopes = values - length[:, None], slopes - slope[:, None]
             flat = along @ np.swapaxes(along, 1, 2) - slope[:, :, None] * slope[:, None]
-            bend += flat / length[:, None, None]
-        bend += np.maximum(values.min(axis=1), LEAST_BEND)[:, None, None] * np.eye(2)
-        return _Model(values, slopes, bend)
+            curvature += flat / length[:, None, None]
+        curvature += np.maximum(values.min(axis=1), MIN_CURVATURE)[:, None, None] * np.eye(2)
+        return _Model(values, slopes, curvature)
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,14 +269,14 @@ class _Model:
 
     values: Array  # v [m], (m, k)
     slopes: Array  # s [m], (m, k, 2)
-    bend: Array  # B [m], (m, 2, 2), positive definite
+    curvature: Array  # B [m], (m, 2, 2), positive definite
 
     @property
     def best_turns(self) -> Array:
         """The turns [rad] that maximize the model, (m, 2)."""
-        chosen = np.argsort(self.values, axis=1, kind="stable")[:, :LOWEST]
+        chosen = np.argsort(self.values, axis=1, kind="stable")[:, :INITIAL_POINTS]
         turns = self._of(chosen)._best()
-        for _ in range(ADDED if self.values.shape[1] > LOWEST else 0):
+        for _ in range(MAX_ADDED_POINTS if self.values.shape[1] > INITIAL_POINTS else 0):
             least = np.argmin(self.values + _times(self.slopes, turns), axis=1)
             chosen = np.concatenate([chosen, least[:, None]], axis=1)
             turns = self._of(chosen)._best()
@@ -285,27 +285,27 @@ class _Model:
     def _of(self, terms: Indices) -> _Model:
         """Return the model of some terms, (m, k)."""
         values = np.take_along_axis(self.values, terms, axis=1)
-        return _Model(values, np.take_along_axis(self.slopes, terms[..., None], axis=1), self.bend)
+        return _Model(values, np.take_along_axis(self.slopes, terms[..., None], axis=1), self.curvature)
 
     def _best(self) -> Array:
         """Return the best of all candidates, (m, 2)."""
         turns = self._candidates
         planes = (self.values[:, None] + turns @ np.swapaxes(self.slopes, 1, 2)).min(axis=-1)
-        gaps = planes - 0.5 * np.sum(turns @ self.bend * turns, axis=-1)
+        gaps = planes - 0.5 * np.sum(turns @ self.curvature * turns, axis=-1)
         return np.asarray(turns[np.arange(len(gaps)), np.argmax(gaps, axis=1)])
 
     @property
     def _candidates(self) -> Array:
         """The maxima where one, two or three of the terms are smallest, (m, c, 2)."""
-        soft = np.linalg.inv(self.bend)
-        free = self.slopes @ soft
+        inverse = np.linalg.inv(self.curvature)
+        free = self.slopes @ inverse
         pairs, triples = _choices(self.values.shape[1])
         value, slope = self._beyond(*pairs)
-        along = slope @ soft
-        needed = value + np.sum(slope * free[:, pairs[0]], axis=-1)
-        parts = needed / _away_from_zero(np.sum(slope * along, axis=-1))
+        along = slope @ inverse
+        required = value + np.sum(slope * free[:, pairs[0]], axis=-1)
+        parts = required / _safe_divisor(np.sum(slope * along, axis=-1))
         (v, a), (w, b) = self._beyond(*triples[:2]), self._beyond(*triples[::2])
-        twice = _away_from_zero(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+        twice = _safe_divisor(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
         corners = np.stack([w * a[..., 1] - v * b[..., 1], v * b[..., 0] - w * a[..., 0]], axis=-1)
         edges = free[:, pairs[0]] - parts[..., None] * along
         return np.concatenate([free, edges, corners / twice[..., None]], axis=1)
@@ -331,7 +331,7 @@ def _across(normals: Array) -> Array:
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
-def _away_from_zero(values: Array) -> Array:
+def _safe_divisor(values: Array) -> Array:
     """Return divisors, with those near zero replaced by a huge number."""
     return np.where(np.abs(values) > VANISHING, values, 1.0 / VANISHING)
 

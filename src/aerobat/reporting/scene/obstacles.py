@@ -8,8 +8,8 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.environment.obstacles import ConvexPiece
-from aerobat.environment.obstacles.shown import surfaces_around
 from aerobat.environment.obstacles.surface import Surface, beyond
+from aerobat.environment.obstacles.visible_surfaces import surfaces_around
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.glyphs import LIGHT
 from aerobat.reporting.scene.shapes import Shape

@@ -153,7 +153,7 @@ class _NearestSearch:
         begin = self._times[::ROWS_PER_BOX]
         end = self._times[np.minimum(np.arange(1, len(begin) + 1) * ROWS_PER_BOX, len(self._times)) - 1]
         over = np.broadcast_to(begin, lower.shape[:-1]), np.broadcast_to(end, lower.shape[:-1])
-        apart = self._pieces.apart(lower, upper, over)
+        apart = self._pieces.box_distances(lower, upper, over)
         return np.asarray(apart - reach[:, None, None])
 
     def _nearest_boxes(self, apart: Array) -> tuple[_Encounters, Indices]:

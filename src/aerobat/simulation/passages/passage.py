@@ -238,7 +238,7 @@ def _motion(gate: Gate) -> PlaceMotion | tuple[()]:
     """Return the motion of a moving gate; () for a fixed one."""
     if gate.motion is None:
         return ()
-    jumps = zip(gate.motion.times.tolist(), gate.motion.turns, strict=True)
+    jumps = zip(gate.motion.times.tolist(), gate.motion.velocity_jumps, strict=True)
     changes = tuple(VelocityJump(time, components(change)) for time, change in jumps)
     return PlaceMotion(components(gate.velocity), changes)
 

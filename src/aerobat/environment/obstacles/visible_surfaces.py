@@ -17,10 +17,10 @@ from aerobat.environment.obstacles.surface import Surface, beyond, surface_of
 
 # fractions of the longest side of the picture: obstacles are cut at the first, or shown whole if they end
 # within the second
-NEAR, WHOLE = 0.25, 0.5
-ALIKE = 1e-6  # [m] distance within which faces are coplanar
-LEAST_AREA = 1e-6  # [m²] smallest area of a face
-MANY = 300  # limit of pieces; with more, as in a map, each is drawn unchanged
+CUT_MARGIN, WHOLE_MARGIN = 0.25, 0.5
+FACE_TOLERANCE = 1e-6  # [m] distance within which faces are coplanar
+MIN_AREA = 1e-6  # [m²] smallest area of a face
+MAX_CUT_PIECES = 300  # limit of pieces; with more, as in a map, each is drawn unchanged
 
 
 def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surface, ...]:
@@ -32,12 +32,12 @@ def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surfa
     """
     low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max())
-    lower, upper = low - NEAR * size, high + NEAR * size
+    lower, upper = low - CUT_MARGIN * size, high + CUT_MARGIN * size
     still = [each for each in pieces if each.motion is None]
     near = [each for each in still if (each.box[0] <= upper).all() and (each.box[1] >= lower).all()]
     whole = [surface_of(piece) for piece in near]
-    parts = _apart(near, whole) if len(near) <= MANY else whole
-    margin = WHOLE * size
+    parts = _visible_parts(near, whole) if len(near) <= MAX_CUT_PIECES else whole
+    margin = WHOLE_MARGIN * size
     found = (
         part
         if (part.points >= low - margin).all() and (part.points <= high + margin).all()
@@ -48,21 +48,22 @@ def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surfa
     return tuple(surface for surface in (*found, *moving) if surface.faces)
 
 
-def _apart(pieces: Sequence[ConvexPiece], surfaces: Sequence[Surface]) -> Iterator[Surface]:
+def _visible_parts(pieces: Sequence[ConvexPiece], surfaces: Sequence[Surface]) -> Iterator[Surface]:
     """Yield the surfaces without the parts inside other pieces; a shared face belongs to the first of two."""
     solids = [_Solid.of(surface) for surface in surfaces]
     boxes = np.array([piece.box for piece in pieces]).reshape(-1, 2, 3)
     for k, surface in enumerate(surfaces):
-        touches = (boxes[:, 0] <= boxes[k, 1] + ALIKE) & (boxes[:, 1] >= boxes[k, 0] - ALIKE)
+        lower, upper = boxes[k, 0] - FACE_TOLERANCE, boxes[k, 1] + FACE_TOLERANCE
+        touches = (boxes[:, 0] <= upper) & (boxes[:, 1] >= lower)
         others = [j for j in np.flatnonzero(touches.all(axis=1)).tolist() if j != k]
         if not others:
             yield surface
             continue
         faces, edges = list(surface.faces), list(surface.edges)
         for j in others:
-            grown = ALIKE if j < k else -ALIKE
-            faces = [part for face in faces for part in solids[j].outside(face, grown)]
-            edges = [part for edge in edges for part in solids[j].outside(edge, ALIKE)]
+            offset = FACE_TOLERANCE if j < k else -FACE_TOLERANCE
+            faces = [part for face in faces for part in solids[j].outside(face, offset)]
+            edges = [part for edge in edges for part in solids[j].outside(edge, FACE_TOLERANCE)]
         yield Surface(surface.name, tuple(faces), np.array(edges).reshape(-1, 2, 3))
 
 
@@ -80,13 +81,13 @@ class _Solid:
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         return cls(normals, np.sum(normals * [face[0] for face in surface.faces], axis=1))
 
-    def outside(self, corners: Array, grown: float) -> list[Array]:
-        """Return the parts of a convex polygon or line outside the solid, enlarged by `grown` [m]."""
-        heights = corners @ self.normals.T - self.levels - grown
+    def outside(self, corners: Array, offset: float) -> list[Array]:
+        """Return the parts of a convex polygon or line outside the solid, enlarged by `offset` [m]."""
+        heights = corners @ self.normals.T - self.levels - offset
         if (heights >= 0.0).all(axis=0).any():
             return [corners]
         parts, rest = [], corners
-        for normal, level in zip(self.normals, self.levels + grown, strict=True):
+        for normal, level in zip(self.normals, self.levels + offset, strict=True):
             if not len(rest):
                 break
             part = beyond(rest, rest @ normal - level)
@@ -101,6 +102,6 @@ def _is_seen(part: Array, corners: int) -> bool:
     if len(part) < min(corners, 3):
         return False
     if corners == 2:
-        return bool(np.linalg.norm(part[1] - part[0]) > ALIKE)
+        return bool(np.linalg.norm(part[1] - part[0]) > FACE_TOLERANCE)
     spokes = part[1:] - part[0]
-    return bool(np.linalg.norm(np.cross(spokes[:-1], spokes[1:]).sum(axis=0)) / 2.0 > LEAST_AREA)
+    return bool(np.linalg.norm(np.cross(spokes[:-1], spokes[1:]).sum(axis=0)) / 2.0 > MIN_AREA)
