@@ -29,18 +29,19 @@ from aerobat.kernels.vectors import (
 )
 
 # [rad/s] highest frequency of the poles in roll and pitch that the delays of the filters allow
-_FREQUENCY = 75.0
+_MAX_FREQUENCY = 75.0
 # [s/rad] largest roll or pitch gain, as a fraction of the maximum moment per rate error: with more, weak
 # rotors saturate; with less, slow ones respond late (lab book)
-_TILT_SHARE = 0.15
+_MAX_TILT_GAIN = 0.15
 _DAMPING = 0.8  # [-] damping ratio of all poles
 # [s/rad] yaw gain, as a fraction of the maximum moment per rate error: with a quarter of it, rotors 3 % apart
 # turned vehicles by 30° within a flip; twice as much was no better (lab book)
-_YAW_SHARE = 0.04
-_INTEGRAL = 8.0  # [1/s] largest ratio of the integral gain to the proportional gain
-_INTEGRAL_SHARE = 0.125  # [-] limit of that ratio over the proportional gain, which keeps the loop damped
+_MAX_YAW_GAIN = 0.04
+_MAX_INTEGRAL_RATIO = 8.0  # [1/s] largest ratio of the integral gain to the proportional gain
+# [-] limit of that ratio over the proportional gain, which keeps the loop damped
+_MAX_INTEGRAL_FRACTION = 0.125
 # [s] smallest rotor lag in the design: with faster rotors the loop's own delays dominate
-_SHORTEST_LAG = 0.01
+_MIN_LAG = 0.01
 _MAX_INTEGRAL = 0.25  # [rad] limit of the integral of the rate error, per axis
 
 
@@ -85,17 +86,20 @@ def rate_gains(ops: Ops, airframe: Airframe) -> RateGains:
     none, and less gain where its moment is weak, because roll and pitch need the rotors.
     """
     (_, inertia), rotors = airframe.mass_properties[:2], airframe.rotors
-    lag = reduce(ops.maximum, (1.0 / rate for rate in rotors.inverse_time_constant), _SHORTEST_LAG)
+    lag = reduce(ops.maximum, (1.0 / rate for rate in rotors.inverse_time_constant), _MIN_LAG)
     roll, pitch, turn = (
         reduce(add_scalars, map(mul, (magnitude(ops, c) for c in row), rotors.max_thrust)) / inertia[k][k]
         for k, row in enumerate(rotors.allocation[1:])
     )
-    tilt = ops.minimum(_FREQUENCY * _FREQUENCY * lag, _TILT_SHARE * ops.minimum(roll, pitch))
-    yaw = ops.minimum(1.0 / (4.0 * _DAMPING * _DAMPING * lag), _YAW_SHARE * turn)
+    tilt = ops.minimum(_MAX_FREQUENCY * _MAX_FREQUENCY * lag, _MAX_TILT_GAIN * ops.minimum(roll, pitch))
+    yaw = ops.minimum(1.0 / (4.0 * _DAMPING * _DAMPING * lag), _MAX_YAW_GAIN * turn)
     frequency = ops.sqrt(tilt / lag)
     damping = ops.maximum(2.0 * _DAMPING * frequency * lag - 1.0, 0.0)
-    integral, slow = (gain * ops.minimum(_INTEGRAL, _INTEGRAL_SHARE * gain) for gain in (tilt, yaw))
-    return RateGains((tilt, tilt, yaw), (integral, integral, slow), (damping, damping, 0.0), frequency)
+    ratios = (ops.minimum(_MAX_INTEGRAL_RATIO, _MAX_INTEGRAL_FRACTION * gain) for gain in (tilt, yaw))
+    integral, yaw_integral = (gain * ratio for gain, ratio in zip((tilt, yaw), ratios, strict=True))
+    return RateGains(
+        (tilt, tilt, yaw), (integral, integral, yaw_integral), (damping, damping, 0.0), frequency
+    )
 
 
 def init(thrusts: PerRotor, gyro: Vector) -> RateLoopState:

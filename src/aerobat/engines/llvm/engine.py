@@ -34,7 +34,7 @@ from aerobat.engines.traced_loop import TracedLoop, trace_loop
 
 REGISTERS = 2  # registers of vehicles side by side, so that one need not wait for another's result
 # [bytes] that a block of two registers may keep from tick to tick: half of a first-level cache
-MAX_KEPT = 24_000
+MAX_BLOCK_STATE = 24_000
 MAX_SCALAR_VEHICLES = 4  # up to this number, vehicles are simulated one by one
 
 Function = Callable[..., None]
@@ -194,7 +194,7 @@ def target_machine() -> llvm.TargetMachine:
 def _width(kept: int) -> int:
     """Return the number of vehicles in a block, each of which keeps `kept` numbers from tick to tick."""
     together = REGISTERS * lanes()
-    return together if kept * together * np.float64().nbytes <= MAX_KEPT else lanes()
+    return together if kept * together * np.float64().nbytes <= MAX_BLOCK_STATE else lanes()
 
 
 def lanes() -> int:

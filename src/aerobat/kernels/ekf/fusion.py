@@ -64,22 +64,22 @@ def fuse(
     accepted = state._replace(
         nominal=_injected(ops, state.nominal, correction.error), covariance=pack(correction.rows)
     )
-    jumped = _jumped(ops, parameters, state, innovation, measured, past, age)
-    believed = correction.nis <= parameters.max_nis
-    count = ops.select(believed, 0.0, state.rejections + 1.0)
-    taken = ops.select(believed, True, count >= parameters.max_rejections)
-    chosen = select_tree(ops, believed, accepted, jumped)
+    restarted = _restarted(ops, parameters, state, innovation, measured, past, age)
+    consistent = correction.nis <= parameters.max_nis
+    count = ops.select(consistent, 0.0, state.rejections + 1.0)
+    fused = ops.select(consistent, True, count >= parameters.max_rejections)
+    chosen = select_tree(ops, consistent, accepted, restarted)
     after = anchored(
         chosen._replace(
             since_pose=age,
             rejections=0.0,
-            jumps=ops.select(believed, state.jumps, state.jumps + 1.0),
+            jumps=ops.select(consistent, state.jumps, state.jumps + 1.0),
             nis=correction.nis,
             accepted=1.0,
         )
     )
     rejected = anchored(state._replace(rejections=count, nis=correction.nis, accepted=0.0))
-    return select_tree(ops, arrived, select_tree(ops, taken, after, rejected), anchored(state))
+    return select_tree(ops, arrived, select_tree(ops, fused, after, rejected), anchored(state))
 
 
 def carried_back(before: EkfState, after: EkfState, past: Pose, age: Scalar) -> Pose:
@@ -94,9 +94,9 @@ def carried_back(before: EkfState, after: EkfState, past: Pose, age: Scalar) -> 
         age: time from the exposure to the fusion [s].
     """
     old, new = before.nominal, after.nominal
-    moved = add_scaled(subtract(new.position, old.position), -age, subtract(new.velocity, old.velocity))
-    turned = multiply(new.q_world_body, conjugate(old.q_world_body))
-    return Pose(add(past.position, moved), multiply(turned, past.q_world_body))
+    shift = add_scaled(subtract(new.position, old.position), -age, subtract(new.velocity, old.velocity))
+    rotation = multiply(new.q_world_body, conjugate(old.q_world_body))
+    return Pose(add(past.position, shift), multiply(rotation, past.q_world_body))
 
 
 def pose_innovation(ops: Ops, nominal: NominalState, measured: Pose, past: Pose) -> tuple[Vector, Vector]:
@@ -147,7 +147,7 @@ def _injected(ops: Ops, nominal: NominalState, error: ErrorState) -> NominalStat
     )
 
 
-def _jumped(
+def _restarted(
     ops: Ops,
     parameters: EkfParameters,
     state: EkfState,
@@ -162,18 +162,18 @@ def _jumped(
     velocity and, as gravity is known, of the accelerometer bias are increased accordingly.
     """
     nominal, angle_sq = state.nominal, dot(innovation[1], innovation[1])
-    turned = multiply(measured.q_world_body, conjugate(past.q_world_body))
+    rotation = multiply(measured.q_world_body, conjugate(past.q_world_body))
     new = nominal._replace(
         position=add(nominal.position, innovation[0]),
-        q_world_body=normalize(ops, multiply(turned, nominal.q_world_body)),
+        q_world_body=normalize(ops, multiply(rotation, nominal.q_world_body)),
     )
     rows = uncorrelated(unpack(state.covariance), "position", parameters.position_variance)
     rows = uncorrelated(rows, "rotation", parameters.attitude_variance)
-    turning = {
+    variances = {
         "velocity": angle_sq * dot(nominal.velocity, nominal.velocity),
         "accelerometer_bias": angle_sq * parameters.gravity * parameters.gravity,
     }
-    rows = add_diagonal(rows, turning)
+    rows = add_diagonal(rows, variances)
     rows = transform_part(rows, "position", lambda e: add_scaled(e.position, age, e.velocity))
     rows = transform_part(rows, "rotation", lambda e: add_scaled(e.rotation, -age, e.gyro_bias))
     return state._replace(nominal=new, covariance=pack(rows))

@@ -21,7 +21,7 @@ from aerobat.kernels.quaternions import (
 )
 from aerobat.kernels.vectors import add, add_scaled, cross, scale, subtract
 
-_SHORTEST = 1e-9  # [s] divisor in place of zero time
+_MIN_DURATION = 1e-9  # [s] divisor in place of zero time
 
 Change: TypeAlias = tuple[str, Callable[[ErrorState], Vector]]
 
@@ -48,13 +48,13 @@ def propagate(
     force = rotate(q_middle, subtract(sample.specific_force, nominal.accelerometer_bias))
     acceleration = force[0], force[1], force[2] - parameters.gravity
     middle = add_scaled(nominal.velocity, 0.5 * elapsed, acceleration)
-    moved = nominal._replace(
+    propagated = nominal._replace(
         position=add_scaled(nominal.position, elapsed, middle),
         velocity=add_scaled(nominal.velocity, elapsed, acceleration),
         q_world_body=normalize(ops, multiply(q_middle, half)),
     )
     return state._replace(
-        nominal=moved,
+        nominal=propagated,
         anchor=state.anchor._replace(elapsed=state.anchor.elapsed + elapsed),
         since_pose=state.since_pose + elapsed,
     )
@@ -89,7 +89,7 @@ def transition(ops: Ops, parameters: EkfParameters, state: EkfState) -> tuple[Ch
     nominal, anchor, elapsed = state.nominal, state.anchor, state.anchor.elapsed
     body_axes = axes(anchor.q_world_body)
     x, y, z = subtract(nominal.velocity, anchor.velocity)
-    rate = 1.0 / ops.maximum(elapsed, _SHORTEST)
+    rate = 1.0 / ops.maximum(elapsed, _MIN_DURATION)
     force = to_body(body_axes, scale(rate, (x, y, z + parameters.gravity * elapsed)))
     turn_back = axes(multiply(conjugate(nominal.q_world_body), anchor.q_world_body))
     scaled_axes = (
@@ -102,8 +102,8 @@ def transition(ops: Ops, parameters: EkfParameters, state: EkfState) -> tuple[Ch
         return add_scaled(error.position, elapsed, error.velocity)
 
     def velocity(error: ErrorState) -> Vector:
-        lost = add(cross(force, error.rotation), error.accelerometer_bias)
-        return subtract(error.velocity, to_world(scaled_axes, lost))
+        force_error = add(cross(force, error.rotation), error.accelerometer_bias)
+        return subtract(error.velocity, to_world(scaled_axes, force_error))
 
     def rotation(error: ErrorState) -> Vector:
         return add_scaled(to_world(turn_back, error.rotation), -elapsed, error.gyro_bias)
