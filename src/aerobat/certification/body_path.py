@@ -19,7 +19,7 @@ from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle.ellipsoid import Revolved
 
-INSTANT = 1e-3  # [s] largest interval between samples
+MAX_SAMPLE_STEP = 1e-3  # [s] largest interval between samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +50,8 @@ class BodyPath:
 
     @cached_property
     def sampled(self) -> tuple[Array, Array, Array]:
-        """Instants [s] at most INSTANT apart, (n,), with centres [m] and thrust axes, (n, 3) each."""
-        count = np.ceil(self.pieces.seconds(self.trajectory) / INSTANT).astype(np.intp)
+        """Instants [s] at most MAX_SAMPLE_STEP apart, (n,), with centres [m] and thrust axes, (n, 3) each."""
+        count = np.ceil(self.pieces.seconds(self.trajectory) / MAX_SAMPLE_STEP).astype(np.intp)
         rows = np.repeat(np.arange(len(count)), count)
         along = (2 * (np.arange(len(rows)) - (np.cumsum(count) - count)[rows]) + 1) / count[rows] - 1
         values = [chebyshev.evaluate(series[rows], along) for series in np.moveaxis(self.series, -1, 0)]

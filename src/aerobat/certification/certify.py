@@ -276,5 +276,5 @@ def _on_rotors(limit: Limit, vehicle: Vehicle) -> tuple[Array, Array]:
     if limit.rotor is None:
         return wrench @ vehicle.allocation, rate @ vehicle.allocation
     own = np.eye(len(vehicle.rotors))[limit.rotor]
-    share = float(np.linalg.norm(wrench))
-    return own, float(np.linalg.norm(rate)) / share * own
+    size = float(np.linalg.norm(wrench))
+    return own, float(np.linalg.norm(rate)) / size * own

@@ -35,7 +35,7 @@ def subdivide(curve: ThrustCurve, floor: float) -> Subdivision:
     """
     count = curve.trajectory.segments
     pending = Subintervals.whole(count)
-    done, left = [pending[:0]], [pending[:0]]
+    done, excluded = [pending[:0]], [pending[:0]]
     while len(pending):
         norms = curve.norms(curve.series(curve.on(pending)), pending)
         mean = norms[:, 0, 1]
@@ -45,9 +45,9 @@ def subdivide(curve: ThrustCurve, floor: float) -> Subdivision:
         hopeless = (mean + spread < floor) | (pending.seconds(curve.trajectory) < MIN_DURATION)
         hopeless |= len(good) > MAX_PIECES + 4 * count
         done.append(pending[good])
-        left.append(pending[hopeless & ~good])
+        excluded.append(pending[hopeless & ~good])
         pending = pending[~(good | hopeless)].halves()
-    pieces, rest = (Subintervals.joined(parts).in_order() for parts in (done, left))
+    pieces, rest = (Subintervals.joined(parts).in_order() for parts in (done, excluded))
     return Subdivision(pieces, _time_intervals(curve, rest))
 
 

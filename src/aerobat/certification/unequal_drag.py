@@ -38,7 +38,8 @@ from aerobat.vehicle import mixer
 QUATERNION_DEGREE = 14
 RHO = np.array([1.0, 1.4, 1.6, 1.8, 2.0, 2.3])
 HALVINGS = 8  # rounds of halving pieces on which interpolation for the mean drag is already accurate
-LARGEST_ERROR = 1e-3  # [rad] largest attitude error: first-order errors, doubled, are valid far beyond it
+# [rad] largest attitude error: first-order errors, doubled, are valid far beyond it
+MAX_ATTITUDE_ERROR = 1e-3
 
 
 def interpolated_with_unequal_drag(
@@ -213,7 +214,7 @@ class _Motion:
                 angle = 2 * growth * (angle / 2 + jump + more)
                 largest.append(angle)
             found = 2 * tilt + np.array(largest) * (1 + lever)
-        return np.where(found < LARGEST_ERROR, found, np.inf)
+        return np.where(found < MAX_ATTITUDE_ERROR, found, np.inf)
 
     @cached_property
     def _spin(self) -> Array:
@@ -252,7 +253,7 @@ class _Motion:
             jerk = kernel.angular_jerk(inverse, alpha, beta, omega, omega_dot, change)
             rate = (thrust_rate, *flatness.moment_and_rate(inertia, omega, omega_dot, jerk)[1])
         upright, wrench = self.axis(UP), (thrust, *moment)
-        found = [_weighted(share, wrench) for share in mixer(vehicle)]
+        found = [_weighted(weights, wrench) for weights in mixer(vehicle)]
         found += [thrust, upright, dot(omega, omega), dot(moment, moment)]
         for limit in columns.derived:
             measured = limit.quantity.measured

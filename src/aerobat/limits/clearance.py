@@ -26,7 +26,7 @@ from aerobat.vehicle import Ellipsoid
 
 SIZE = 0.5  # [m] size of the limit, about the width of a body; violations are fractions of it
 NEAREST = 4  # nearest pieces considered at each instant; four are enough in forests
-AWAY = 1.5  # [m] distance beyond which a piece is ignored
+IGNORED_BEYOND = 1.5  # [m] distance beyond which a piece is ignored
 # [m] distance within which the best plane is computed exactly: with 0.5 m, plans took a quarter longer
 EXACT_WITHIN = 0.2
 
@@ -100,7 +100,7 @@ class Clearance:
         revolved = self.body.revolved
         offset, shapes = revolved.turned(thrust_axes)
         centres = positions + offset
-        bodies, numbers = self.pieces.near(centres, revolved.reach, AWAY, times)
+        bodies, numbers = self.pieces.near(centres, revolved.reach, IGNORED_BEYOND, times)
         found = self.pieces.separated(numbers, centres[bodies], shapes[bodies], exact_within, times[bodies])
         return bodies, numbers, found
 

@@ -16,7 +16,7 @@ from aerobat.problem.condition import ForceBalance
 from aerobat.vehicle import Vehicle
 
 HALVING_RESERVE = 0.15  # reserve for which `effective_reserve` keeps half of a small room
-SMALLEST_SIZE = 1e-3  # in SI units: a smaller bound gets size 1
+MIN_SIZE = 1e-3  # in SI units: a smaller bound gets size 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,4 +115,4 @@ def size_of(lower: float, upper: float) -> float:
     if -inf < lower < upper < inf:
         return upper - lower
     largest = max((abs(end) for end in (lower, upper) if abs(end) < inf), default=0.0)
-    return largest if largest > SMALLEST_SIZE else 1.0
+    return largest if largest > MIN_SIZE else 1.0

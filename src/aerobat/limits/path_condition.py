@@ -14,7 +14,7 @@ from math import inf
 import numpy as np
 
 from aerobat.flatness.references import has_unequal_drag
-from aerobat.limits.limit import SMALLEST_SIZE, Asked, Limit
+from aerobat.limits.limit import MIN_SIZE, Asked, Limit
 from aerobat.limits.quantity import PATH_SHAPE, UPRIGHT, PathQuantity
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.limits import UNITS
@@ -51,5 +51,5 @@ def limit_of(condition: Condition, balance: ForceBalance) -> Limit:
         lower=bound.lower,
         upper=bound.upper,
         fields=(FIELD, FIELD),
-        size=bound.scale if bound.scale > SMALLEST_SIZE else 1.0,
+        size=bound.scale if bound.scale > MIN_SIZE else 1.0,
     )

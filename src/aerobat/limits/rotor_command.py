@@ -15,6 +15,6 @@ def limits(asked: Asked) -> Iterator[Limit]:
     lags = () if asked.vehicle is None else asked.vehicle.lags.tolist()
     for thrust, lag in zip(rotor_thrust.limits(asked), lags, strict=True):
         if lag > 0.0:
-            share = thrust.quantity.measured[WRENCH]
-            command = PathQuantity.of_wrench(share, lag * share)
+            weights = thrust.quantity.measured[WRENCH]
+            command = PathQuantity.of_wrench(weights, lag * weights)
             yield replace(thrust, name="command", quantity=command, is_implied=False)

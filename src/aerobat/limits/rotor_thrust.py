@@ -11,7 +11,7 @@ from aerobat.vehicle import mixer
 
 FIELDS = ("min_thrust", "max_thrust")
 # hover thrust, as a fraction of the maximum, below which the reserve at the lower end is reduced
-_STRONG = 0.25
+_LOW_HOVER = 0.25
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
@@ -21,12 +21,12 @@ def limits(asked: Asked) -> Iterator[Limit]:
         return
     # a reserve as large as hover thrust would prevent sinking
     hover = asked.environment.gravity / vehicle.max_specific_thrust
-    room = hover if hover < _STRONG else inf
-    for i, (rotor, share) in enumerate(zip(vehicle.rotors, mixer(vehicle), strict=True)):
+    room = hover if hover < _LOW_HOVER else inf
+    for i, (rotor, weights) in enumerate(zip(vehicle.rotors, mixer(vehicle), strict=True)):
         yield Limit(
             name="thrust",
             unit="N",
-            quantity=PathQuantity.of_wrench(share),
+            quantity=PathQuantity.of_wrench(weights),
             lower=rotor.min_thrust,
             upper=rotor.max_thrust,
             fields=FIELDS,

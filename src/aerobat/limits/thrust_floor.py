@@ -12,7 +12,7 @@ from math import inf
 from aerobat.limits.limit import Asked, Limit
 from aerobat.limits.quantity import SPECIFIC_THRUST, PathQuantity
 
-FRACTION = 0.02  # of the largest specific thrust; with less, programs of fast flips diverged
+MIN_FRACTION = 0.02  # of the largest specific thrust; with less, programs of fast flips diverged
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
@@ -23,7 +23,7 @@ def limits(asked: Asked) -> Iterator[Limit]:
         name="specific thrust",
         unit="m/s²",
         quantity=PathQuantity.of_measure(SPECIFIC_THRUST),
-        lower=FRACTION * asked.vehicle.max_specific_thrust,
+        lower=MIN_FRACTION * asked.vehicle.max_specific_thrust,
         upper=inf,
         fields=("", ""),
         size=asked.environment.gravity,

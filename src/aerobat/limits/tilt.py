@@ -18,7 +18,8 @@ from aerobat.problem.condition import Condition, Quantity
 from aerobat.so3 import UP
 
 FIELD = "limits.max_tilt"
-STEEPEST = radians(86.0)  # largest tilt for which the pyramid is used; beyond, its faces are almost vertical
+# largest tilt for which the pyramid is used; beyond, its faces are almost vertical
+MAX_PYRAMID_TILT = radians(86.0)
 
 
 def limits(asked: Asked) -> Iterator[Limit]:
@@ -38,8 +39,8 @@ def limits(asked: Asked) -> Iterator[Limit]:
 
 
 def _pyramid(asked: Asked, tilt: float) -> Iterator[Limit]:
-    """Yield the faces of the pyramid inside the cone of a tilt [rad]; none for tilts above STEEPEST."""
-    if tilt <= STEEPEST:
+    """Yield the faces of the pyramid inside the cone of a tilt [rad]; none above MAX_PYRAMID_TILT."""
+    if tilt <= MAX_PYRAMID_TILT:
         for axis in (*np.eye(3)[:2], *-np.eye(3)[:2]):
             face = Condition(Quantity.SPECIFIC_THRUST, axis - tan(tilt) / sqrt(2.0) * UP, upper=0.0)
             yield limit_of(face, asked.balance)

@@ -41,15 +41,15 @@ def passage_findings(
 
 def waypoint_findings(trajectory: Trajectory, waypoints: Sequence[PlannedWaypoint]) -> list[Finding]:
     """Return the findings about each waypoint: the distance from its centre."""
-    return [_met(trajectory, waypoint) for waypoint in waypoints]
+    return [_distance_finding(trajectory, waypoint) for waypoint in waypoints]
 
 
-def _met(trajectory: Trajectory, waypoint: PlannedWaypoint) -> Finding:
+def _distance_finding(trajectory: Trajectory, waypoint: PlannedWaypoint) -> Finding:
     ball, time = waypoint.ball, min(waypoint.time, trajectory.duration)
     distance = float(np.linalg.norm(trajectory.evaluate(time) - ball.centre))
     verdict = Verdict.HOLDS if distance <= ball.radius + PASSAGE_TOLERANCE else Verdict.VIOLATED
-    asked = waypoint.time, ball.radius, verdict
-    return Finding("distance", "m", Side.MAX, distance, distance, *asked, waypoint=waypoint.name)
+    judged = waypoint.time, ball.radius, verdict
+    return Finding("distance", "m", Side.MAX, distance, distance, *judged, waypoint=waypoint.name)
 
 
 @dataclass(frozen=True)
