@@ -11,7 +11,7 @@ from aerobat.errors import SpecError
 
 MAX_GAP = 0.05  # [s] between IMU samples; longer means do not resolve a turning vehicle
 MAX_AGE = 0.2  # [s] of a pose on arrival; the filter relates the errors then and now to first order
-_UNIT = 1e-2  # [-] error of a quaternion's norm: the rounding of a few decimals
+_NORM_TOLERANCE = 1e-2  # [-] error of a quaternion's norm: the rounding of a few decimals
 
 
 @validated
@@ -65,7 +65,7 @@ class SensorLog:
 
     def _check_attitudes(self) -> None:
         norms = np.linalg.norm(self.q_world_body, axis=-1)
-        wrong = np.flatnonzero(np.abs(norms - 1.0) > _UNIT)
+        wrong = np.flatnonzero(np.abs(norms - 1.0) > _NORM_TOLERANCE)
         if wrong.size:
             raise SpecError(
                 f"q_world_body must be unit quaternions (w, x, y, z); that of pose {wrong[0]} is of the norm "

@@ -36,7 +36,7 @@ from aerobat.simulation.passages.passage import PerFlight
 from aerobat.vehicle import Vehicle, as_vehicle
 
 # [m] median distance from the set-points that shows another path; clock differences make less
-OTHER_PATH = 0.5
+MAX_MEDIAN_DISTANCE = 0.5
 COASTING = 0.1  # [s] without a pose from which a filter coasts: several periods of any motion capture
 _CONTACT_OUTCOMES = {  # outcomes of contacts detected by the plant
     Contact.GROUND: Outcome.TOUCHED_GROUND,
@@ -213,11 +213,11 @@ def _failures(judged: Iterable[Passage | WaypointPassage | StageAttitude]) -> It
     yield from (each.failure for each in judged if each.failure is not None)
 
 
-def _require_own_plan(times: Array, asked: Array, plan: Plan) -> None:
+def _require_own_plan(times: Array, setpoints: Array, plan: Plan) -> None:
     """Raise SpecError for a plan whose path is not that of the set-points (T, 3) at these times [s]."""
     path = plan.trajectory.evaluate(np.clip(times, 0.0, plan.duration))
-    off = float(np.median(np.linalg.norm(asked - path, axis=1)))
-    if off > OTHER_PATH:
+    off = float(np.median(np.linalg.norm(setpoints - path, axis=1)))
+    if off > MAX_MEDIAN_DISTANCE:
         raise SpecError(
             f"goal: the plan's path lies {length(off)} from the flight's set-points half of the time; give "
             "the flight's own plan"
