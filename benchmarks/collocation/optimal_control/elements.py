@@ -144,13 +144,13 @@ class Elements:
         return ElementFunction(ca.Function("distance", [z, ball], [ca.sumsqr(distance)]))
 
     def room_in_gate(self, parameters: int) -> ElementFunction:
-        """The values of `OpeningAhead.room` of a scaled state, by so many parameters of an opening."""
+        """The values of `OpeningAhead.clearances` of a scaled state, by so many parameters of an opening."""
         ca, ops = import_casadi(), SymbolicOps()
         z, opening = ca.SX.sym("z", STATES), ca.SX.sym("opening", parameters)
         state = z * STATE_SCALE
         position, velocity, attitude = (components(state[part]) for part in (POSITION, VELOCITY, ATTITUDE))
         extent = extent_of_attitude(ops, self.task.vehicle.bounding_ellipsoid, axes(attitude))
-        values = OpeningAhead.of_parameters(components(opening)).room(ops, position, velocity, extent)
+        values = OpeningAhead.of_parameters(components(opening)).clearances(ops, position, velocity, extent)
         return ElementFunction(ca.Function("room", [z, opening], [ca.vertcat(*values)]))
 
     @cached_property
