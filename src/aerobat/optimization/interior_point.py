@@ -30,8 +30,8 @@ from aerobat.arrays import Array
 from aerobat.optimization.deadline import out_of_time
 
 _BOUND_PUSH = 1e-2  # distance of the start from the bounds of the box, as a fraction of its width
-_NEARLY = 0.99  # fraction to the boundary: longest step towards a zero multiplier or the edge of the box
-_LEAST_SLACK = 0.1  # smallest fraction of a slack that a step leaves
+_FRACTION_TO_BOUNDARY = 0.99  # longest step towards a zero multiplier or the edge of the box
+_MIN_SLACK_FRACTION = 0.1  # smallest fraction of a slack that a step leaves
 _BARRIER_SOLVED = 10.0  # μ is decreased when the error of the barrier problem is below this multiple of μ
 _BARRIER_FALL = 0.2  # factor of μ at each decrease
 _BARRIER_POWER = 1.5  # exponent of μ at each decrease; the smaller of the two results is used
@@ -47,7 +47,8 @@ _CORRECTIONS = 3  # second-order corrections in a row
 _SLOW_CORRECTION = 0.99  # a correction that leaves a larger fraction of the violation is the last one
 _ARMIJO = 1e-4  # sufficient decrease (Armijo), as a fraction of the predicted decrease
 _LEAST_WEIGHT = 1e-3  # smallest weight of the violation in the merit function
-_SHARE = 0.5  # fraction of the decrease of the weighted violation by which the barrier function may rise
+# fraction of the decrease of the weighted violation by which the barrier function may rise
+_PENALTY_FRACTION = 0.5
 _ROUNDING = 1e-12  # increase of the merit function that counts as rounding
 _CORRIDOR = 1e10  # largest factor between s z and μ
 _EQUALITY_WEIGHT = 1e-2  # weight of EᵀE added to the matrix, relative to its largest entry
@@ -141,12 +142,12 @@ class _Iterate:
 
     def dual_residual(self, cost: Array) -> Array:
         """Return the gradient of the Lagrangian, (n,)."""
-        if self._residual is None:
+        if self._dual_residual is None:
             rows = self.point.rows.transposed(self.z) + self.point.equality_rows.T @ self.y
-            self._residual = np.asarray(cost + rows - self.z_lower + self.z_upper)
-        return self._residual
+            self._dual_residual = np.asarray(cost + rows - self.z_lower + self.z_upper)
+        return self._dual_residual
 
-    _residual: Array | None = None
+    _dual_residual: Array | None = None
 
 
 @dataclass(eq=False)
@@ -208,12 +209,12 @@ class _InteriorPoint:
 
     def run(self, start: Array, multipliers: Array | None) -> InteriorPointResult:
         """Iterate from a start until convergence or a limit."""
-        iterate, costs, jammed = self._begun(start, multipliers), [], False
+        iterate, costs, jammed = self._initial_iterate(start, multipliers), [], False
         if not np.isfinite(iterate.point.inequalities).all():
             return InteriorPointResult(iterate.x, False, 0, iterate.z)  # no step can be computed from here
         for iteration in range(self._settings.iterations):
             costs.append(float(self._cost @ iterate.x))
-            if self._error(iterate, 0.0) < self._settings.tolerance or self._stands_still(iterate, costs):
+            if self._error(iterate, 0.0) < self._settings.tolerance or self._has_flat_cost(iterate, costs):
                 return InteriorPointResult(iterate.x, True, iteration, iterate.z)
             if out_of_time():
                 return InteriorPointResult(iterate.x, False, iteration, iterate.z)
@@ -224,10 +225,10 @@ class _InteriorPoint:
                 return InteriorPointResult(iterate.x, False, iteration, iterate.z)
             else:
                 jammed = True
-                self._begin_anew(iterate)
+                self._restart(iterate)
         return InteriorPointResult(iterate.x, False, self._settings.iterations, iterate.z)
 
-    def _begun(self, start: Array, multipliers: Array | None) -> _Iterate:
+    def _initial_iterate(self, start: Array, multipliers: Array | None) -> _Iterate:
         """Return the first iterate: the start inside the box, with slacks and multipliers that match μ."""
         push = _BOUND_PUSH * (self._upper - self._lower)
         x = np.clip(start, self._lower + push, self._upper - push)
@@ -264,13 +265,13 @@ class _InteriorPoint:
         )
         return float(max(errors))
 
-    def _stands_still(self, at: _Iterate, costs: list[float]) -> bool:
+    def _has_flat_cost(self, at: _Iterate, costs: list[float]) -> bool:
         """Return True where the cost no longer changes, at a small violation and the final μ."""
         recent = costs[-_ITERATIONS_FLAT:]
         still = len(costs) > _ITERATIONS_FLAT and max(recent) - min(recent) < self._settings.gain
         at_end = self._barrier <= self._settings.least_barrier
-        missed = max(float(at.point.inequalities.max(initial=0.0)), _largest(at.point.equalities))
-        return still and at_end and missed < self._settings.violation
+        violation = max(float(at.point.inequalities.max(initial=0.0)), _largest(at.point.equalities))
+        return still and at_end and violation < self._settings.violation
 
     def _lower_barrier(self, at: _Iterate) -> None:
         least = self._settings.least_barrier
@@ -289,40 +290,40 @@ class _InteriorPoint:
             if found is not None:
                 self._move(at, *found)
                 if found[1] < _JAMMED:
-                    self._begin_anew(at)
+                    self._restart(at)
                 return True
             self._damping *= _JUMP
         return False
 
-    def _begin_anew(self, at: _Iterate) -> None:
+    def _restart(self, at: _Iterate) -> None:
         """Move slacks away from zero, and reset multipliers to match μ, where steps have become too short."""
         at.slacks = np.maximum(at.slacks, self._settings.least_slack)
-        at.z, at._residual = self._barrier / at.slacks, None
+        at.z, at._dual_residual = self._barrier / at.slacks, None
         self._damping = self._settings.damping
 
     def _accepted(
         self, at: _Iterate, equations: _Equations, before: _Value
     ) -> tuple[_Step, float, _Trial] | None:
         """Return a step, its length and its trial point, corrected or shortened; None if it is rejected."""
-        missed = at.point.inequalities + at.slacks
-        step = equations.step(missed, at.point.equalities)
-        promised, length = self._promised(at, step), self._longest(at, step)
+        residual = at.point.inequalities + at.slacks
+        step = equations.step(residual, at.point.equalities)
+        predicted, length = self._predicted_change(at, step), self._longest(at, step)
         if length < _SHORT and self._damping < _MOST_DAMPING:
             return None
         for halvings in range(_BACKTRACKS):
             trial = self._tried(at, step, length)
-            if self._accepts(before, trial.value, promised, length):
+            if self._accepts(before, trial.value, predicted, length):
                 self._adapt(is_whole=not halvings)
                 return step, length, trial
             if not halvings and trial.value.violation >= before.violation:
-                corrected = self._corrected(at, equations, trial, before, step, promised)
+                corrected = self._corrected(at, equations, trial, before, step, predicted)
                 if corrected is not None:
                     self._adapt(is_whole=True)
                     return corrected
             length *= 0.5
         return None
 
-    def _accepts(self, before: _Value, after: _Value, promised: float, length: float) -> bool:
+    def _accepts(self, before: _Value, after: _Value, predicted: float, length: float) -> bool:
         """Return True where a step lowers the merit function enough (Armijo condition).
 
         The weight of the violation is raised first where the predicted decrease needs it.
@@ -330,14 +331,14 @@ class _InteriorPoint:
         Args:
             before: Violation and barrier function at the start of the step.
             after: Violation and barrier function at its end.
-            promised: Predicted change of the barrier function for a whole step.
+            predicted: Predicted change of the barrier function for a whole step.
             length: Length of the step, 1 for a whole one.
         """
-        if promised > 0.0 and before.violation > 0.0:
-            least = promised / (_SHARE * before.violation)
+        if predicted > 0.0 and before.violation > 0.0:
+            least = predicted / (_PENALTY_FRACTION * before.violation)
             self._violation_weight = max(self._violation_weight, least)
         merits = [each.barrier + self._violation_weight * each.violation for each in (before, after)]
-        fall = min(promised - self._violation_weight * before.violation, 0.0)
+        fall = min(predicted - self._violation_weight * before.violation, 0.0)
         return merits[1] <= merits[0] + _ARMIJO * length * fall + _ROUNDING
 
     def _adapt(self, is_whole: bool) -> None:
@@ -354,7 +355,7 @@ class _InteriorPoint:
         trial: _Trial,
         before: _Value,
         step: _Step,
-        promised: float,
+        predicted: float,
     ) -> tuple[_Step, float, _Trial] | None:
         """Return a step with second-order correction if it is accepted, else None.
 
@@ -364,20 +365,20 @@ class _InteriorPoint:
             trial: The rejected trial point of the step.
             before: Violation and barrier function at the start.
             step: The step to correct.
-            promised: Predicted change of the barrier function for the step.
+            predicted: Predicted change of the barrier function for the step.
         """
         longest = length = self._longest(at, step)
-        missed, equal = at.point.inequalities + at.slacks, at.point.equalities
+        residual, equal = at.point.inequalities + at.slacks, at.point.equalities
         violation = np.inf
         for _ in range(_CORRECTIONS):
             if not np.isfinite(trial.point.inequalities).all():
                 return None
-            missed = length * missed + trial.point.inequalities + at.slacks + length * step.slacks
+            residual = length * residual + trial.point.inequalities + at.slacks + length * step.slacks
             equal = length * equal + trial.point.equalities
-            step = equations.step(missed, equal)
+            step = equations.step(residual, equal)
             length = self._longest(at, step)
             trial = self._tried(at, step, length)
-            if self._accepts(before, trial.value, promised, longest):
+            if self._accepts(before, trial.value, predicted, longest):
                 return step, length, trial
             if trial.value.violation > _SLOW_CORRECTION * violation:
                 return None
@@ -391,18 +392,18 @@ class _InteriorPoint:
         """
         x = at.x + length * step.x
         point = self._program.at(x)
-        falling = np.maximum(at.slacks + length * step.slacks, _LEAST_SLACK * at.slacks)
+        falling = np.maximum(at.slacks + length * step.slacks, _MIN_SLACK_FRACTION * at.slacks)
         slacks = np.maximum(falling, -point.inequalities)
         return _Trial(x, slacks, point, self._value(x, slacks, point))
 
     def _value(self, x: Array, slacks: Array, point: ConstrainedPoint) -> _Value:
         """Return the violation (infinite where it is not a number) and the barrier function."""
-        missed = float(np.abs(point.inequalities + slacks).sum() + np.abs(point.equalities).sum())
+        violation = float(np.abs(point.inequalities + slacks).sum() + np.abs(point.equalities).sum())
         logarithms = np.log(slacks).sum() + np.log((x - self._lower) * (self._upper - x)).sum()
         barrier = float(self._cost @ x - self._barrier * logarithms)
-        return _Value(missed if np.isfinite(missed) else np.inf, barrier)
+        return _Value(violation if np.isfinite(violation) else np.inf, barrier)
 
-    def _promised(self, at: _Iterate, step: _Step) -> float:
+    def _predicted_change(self, at: _Iterate, step: _Step) -> float:
         lower, upper = at.x - self._lower, self._upper - at.x
         along = (step.slacks / at.slacks).sum() + (step.x / lower).sum() - (step.x / upper).sum()
         return float(self._cost @ step.x - self._barrier * along)
@@ -418,15 +419,15 @@ class _InteriorPoint:
         by_upper = self._barrier / upper - at.z_upper + at.z_upper / upper * step.x
         dual = min(_to_zero(at.z, step.z), _to_zero(at.z_lower, by_lower), _to_zero(at.z_upper, by_upper))
         at.x, at.slacks, at.point, _ = trial
-        at.y, at._residual = at.y + length * step.y, None
+        at.y, at._dual_residual = at.y + length * step.y, None
         at.z = self._near_path(at.z + dual * step.z, at.slacks)
         at.z_lower = self._near_path(at.z_lower + dual * by_lower, at.x - self._lower)
         at.z_upper = self._near_path(at.z_upper + dual * by_upper, self._upper - at.x)
 
     def _near_path(self, multipliers: Array, distances: Array) -> Array:
         """Return the multipliers, clipped so that their products with `distances` stay near μ."""
-        fitting = self._barrier / distances
-        return np.clip(multipliers, fitting / _CORRIDOR, fitting * _CORRIDOR)
+        central = self._barrier / distances
+        return np.clip(multipliers, central / _CORRIDOR, central * _CORRIDOR)
 
 
 class _Equations:
@@ -456,17 +457,17 @@ class _Equations:
         _diagonal(self._schur)[:] += 1e-14
         return True
 
-    def step(self, missed: Array, equal: Array) -> _Step:
-        """Return the step that removes the residuals `missed` of c + s (q,) and `equal` of e (p,)."""
+    def step(self, residual: Array, equal: Array) -> _Step:
+        """Return the step that removes `residual` = c + s (q,) and `equal` = e (p,)."""
         at = self._at
-        sigma, fitting = at.z / at.slacks, self._barrier / at.slacks
-        right = -self._residual - at.point.rows.transposed(fitting + sigma * missed)
+        sigma, central = at.z / at.slacks, self._barrier / at.slacks
+        right = -self._residual - at.point.rows.transposed(central + sigma * residual)
         right -= self._weight * (self._equal.T @ equal)
         x, _ = dpotrs(self._factor, right)
         y = np.linalg.solve(self._schur, self._equal @ x + equal)
         x = x - self._moved @ y
-        slacks = -missed - at.point.rows.times(x)
-        return _Step(x, slacks, fitting - at.z - sigma * slacks, y)
+        slacks = -residual - at.point.rows.times(x)
+        return _Step(x, slacks, central - at.z - sigma * slacks, y)
 
 
 def _largest(values: Array) -> float:
@@ -476,7 +477,7 @@ def _largest(values: Array) -> float:
 def _to_zero(values: Array, changes: Array) -> float:
     """Return the step length, at most 1, that keeps positive values positive."""
     fall = float((-changes / values).max(initial=0.0))
-    return _NEARLY / fall if fall > _NEARLY else 1.0
+    return _FRACTION_TO_BOUNDARY / fall if fall > _FRACTION_TO_BOUNDARY else 1.0
 
 
 def _diagonal(matrix: Array) -> Array:

@@ -36,13 +36,13 @@ def improved_in_windows(
     slots = answer.slots or start or evenly_spread(program)
     if answer.status in ("optimal", "infeasible") or slots is None or not program.is_totally_ordered:
         return answer
-    search = _Windows(program, slots)
+    search = _MovingWindowSearch(program, slots)
     search.run()
     spent = replace(answer, nodes=answer.nodes + search.nodes, time=answer.time + search.time)
     best = search.best
     if best is None or not best.cost <= answer.cost:
         return spent
-    status: Status = "locally optimal" if search.settled else "time_limit"
+    status: Status = "locally optimal" if search.converged else "time_limit"
     bound = min(answer.bound, best.cost)
     return replace(best, status=status, bound=bound, nodes=spent.nodes, time=spent.time)
 
@@ -74,7 +74,7 @@ def _latest(program: AssignmentProgram) -> list[int] | None:
     return latest
 
 
-class _Windows:
+class _MovingWindowSearch:
     """Windows that move along one program, and the best result so far."""
 
     def __init__(self, program: AssignmentProgram, slots: Sequence[int]) -> None:
@@ -82,7 +82,7 @@ class _Windows:
         self._slots = tuple(slots)
         self._search = solver("builtin")
         self.best: AssignmentResult | None = None
-        self.settled = False
+        self.converged = False
         self.nodes = 0
         self.time = 0.0
 
@@ -101,7 +101,7 @@ class _Windows:
             proven = proven and result.status == "optimal"
             unchanged += 1
             if unchanged == len(firsts):
-                self.settled = proven
+                self.converged = proven
                 return
 
     def _solved(self, first: int) -> AssignmentResult:

@@ -118,8 +118,8 @@ class LeastDistanceQP:
             len(rows) <= rows.shape[1] and np.linalg.svd(rows, compute_uv=False)[-1] > _INDEPENDENT
         ):
             return np.zeros(0, dtype=np.intp)
-        missed = rows @ np.linalg.lstsq(rows, target, rcond=_INDEPENDENT)[0] - target
-        if np.abs(missed).max() > max(_CONTRADICTION * np.abs(target).max(), _TOLERANCE):
+        residual = rows @ np.linalg.lstsq(rows, target, rcond=_INDEPENDENT)[0] - target
+        if np.abs(residual).max() > max(_CONTRADICTION * np.abs(target).max(), _TOLERANCE):
             return None
         basis = np.zeros((0, rows.shape[1]))
         redundant = []

@@ -115,7 +115,7 @@ class NullSpace:
         """Return the program's targets and the bounds (m,) of its range rows, reduced to the null space."""
         target = np.concatenate([program.target[self._equalities], lower[self._implicit_equalities]])
         target = (target - self._unconstrained_equality) * self._equality_scale
-        missed = np.abs(self._residual_projector @ target)
+        residual = np.abs(self._residual_projector @ target)
         norm = float(np.linalg.norm(self._pseudo_inverse @ target))
         offset = np.append(self._unconstrained_rows + self._rows_from_target @ target, 0.0)
         scale = self._row_norms * np.hypot(norm, self._w_offset_norm)
@@ -125,7 +125,7 @@ class NullSpace:
         fits = (low <= slack) & (high >= -slack) | ~self.constant
         low = np.where(self.constant, -inf, low)
         high = np.where(self.constant, inf, high)
-        max_missed = _CONSISTENCY_TOLERANCE * np.abs(target).max(initial=0.0)
+        max_residual = _CONSISTENCY_TOLERANCE * np.abs(target).max(initial=0.0)
         return ReducedBounds(
             lower=low,
             upper=high,
@@ -134,7 +134,7 @@ class NullSpace:
             slack=slack,
             x_offset=self._unconstrained_x + self._x_from_target @ target,
             min_norm=max(norm, low.max(initial=0.0), -high.min(initial=0.0)),
-            consistent=bool(fits.all() and (missed <= max_missed).all()),
+            consistent=bool(fits.all() and (residual <= max_residual).all()),
         )
 
     def normalized(self, bound: Array, row_offset: Array, rows: Indices | slice = slice(None)) -> Array:
