@@ -310,7 +310,7 @@ def test_a_plan_whose_own_flight_touches_the_frame_does_not_fly_and_says_where()
     plan = ab.Plan(problem, path, "by hand", stages=placed, vehicle=QUAD)
     assert plan.flyability is not None
     assert not plan.flies
-    assert plan.flyability.lingers
+    assert plan.flyability.misses_gate
     assert not plan.flyability.wants_reserve
     assert "1.3 cm into its lower edge at 0.50 s" in str(plan.flyability)
     clearance = ab.score(ab.fly(plan), plan).passages[0].clearance

@@ -99,11 +99,11 @@ def test_slopes_and_second_derivatives_are_differences(problem: Problem, lag: fl
 def test_variables_of_a_path_give_the_path_and_others_meet_its_ends() -> None:
     near = program(MOVING, QUAD, 6)
     spline = near.spline
-    begun = spline.trajectory(spline.start)
-    again = replace(spline, begun=begun)
-    times = np.linspace(0.0, begun.duration, 50)
+    initial = spline.trajectory(spline.start)
+    again = replace(spline, initial=initial)
+    times = np.linspace(0.0, initial.duration, 50)
     np.testing.assert_allclose(
-        again.trajectory(again.start).evaluate(times), begun.evaluate(times), atol=1e-9
+        again.trajectory(again.start).evaluate(times), initial.evaluate(times), atol=1e-9
     )
     moved = spline.trajectory(spline.start + 0.1 * np.random.default_rng(1).normal(size=spline.size))
     for time, state in ((0.0, MOVING.start), (moved.duration, MOVING.goal)):
@@ -118,17 +118,17 @@ def test_variables_of_a_path_give_the_path_and_others_meet_its_ends() -> None:
 def test_a_program_with_other_places_takes_all_multipliers_over(seed: int) -> None:
     """Each place's are shared by those beside it; those of the same place stay as they are."""
     near = program(COURSE, QUAD, 6)
-    rng, kinds = np.random.default_rng(seed), near.counts.shape[-1]
+    rng, kinds = np.random.default_rng(seed), near.enforced.shape[-1]
     peaks = rng.uniform(size=(len(near.fractions), 1))
     ends = np.broadcast_to([0.0, 1.0], (len(near.fractions), 2))
     others = replace(near, fractions=np.sort(np.hstack([near.fractions, peaks, ends]), axis=1))
-    known = Multipliers(rng.uniform(size=near.counts.size + 3), near.fractions)
+    known = Multipliers(rng.uniform(size=near.enforced.size + 3), near.fractions)
     np.testing.assert_array_equal(near.at_its_places(known), known.values)
     found = others.at_its_places(known)
-    at_places = found[: others.counts.size].reshape(len(near.fractions), -1, kinds)
-    expected = known.values[: near.counts.size].reshape(len(near.fractions), -1, kinds)
+    at_places = found[: others.enforced.size].reshape(len(near.fractions), -1, kinds)
+    expected = known.values[: near.enforced.size].reshape(len(near.fractions), -1, kinds)
     np.testing.assert_allclose(at_places.sum(axis=1), expected.sum(axis=1))
-    np.testing.assert_array_equal(found[others.counts.size :], known.values[near.counts.size :])
+    np.testing.assert_array_equal(found[others.enforced.size :], known.values[near.enforced.size :])
 
 
 @given(fraction=st.floats(0.0, 1.0), segment=st.integers(0, 5), order=st.integers(0, 5))

@@ -66,7 +66,7 @@ class OwnFlight:
         return not self.defects
 
     @property
-    def lingers(self) -> bool:
+    def misses_gate(self) -> bool:
         """True if the flight misses a gate: not crossed completely, or with its frame touched."""
         return any(passage.is_missed for passage in self.passages)
 
@@ -114,7 +114,7 @@ class Flyability(OwnFlight):
                 "allow the gates more attitude_tolerance_deg"
             )
         found = []
-        if self.lingers:
+        if self.misses_gate:
             found.append("ask more speed of the passage or widen the opening")
         if self.wants_reserve:
             found.append("keep more reserve for the controller")

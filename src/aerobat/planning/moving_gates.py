@@ -26,7 +26,8 @@ from aerobat.vehicle import Vehicle
 
 P = TypeVar("P")
 ROUNDS = 12  # largest number of rounds; a gate with a fifth of the vehicle's speed takes three
-SETTLED = 5e-3  # change of gates' positions at which rounds end [m]: planners' durations vary by as much
+# change of gates' positions below which rounds end [m]: planners' durations vary by as much
+POSITION_TOLERANCE = 5e-3
 STEPS = 6  # steps of Newton's method for the time of crossing
 
 
@@ -46,7 +47,7 @@ def through_moving_gates(method: PlanMethod[P]) -> PlanMethod[P]:
             for _ in range(ROUNDS):
                 found = method(self, replace(problem, gates=gates), vehicle, progress)
                 planned, gates = gates, as_passed(problem.gates, found.stages)
-                if _farthest(planned, gates) < SETTLED:
+                if _farthest(planned, gates) < POSITION_TOLERANCE:
                     crossing = _crossing(found, problem, moving)
                     if crossing.certificate is None or crossing.certified:
                         return crossing

@@ -42,7 +42,7 @@ FINISHED = 3  # certified paths of which the best is kept; later ones only while
 # processor time [s] for one program with more intervals (with nine stages, such a program takes 4 s), or for
 # the other starts beside routes around obstacles
 MORE_TIME = 10.0
-RAISED = (0.25, 0.5, 0.75, 1.0)  # fractions of the reserve, raised step by step
+RESERVE_FRACTIONS = (0.25, 0.5, 0.75, 1.0)  # fractions of the reserve, raised step by step
 RAISING_TIME = 40.0  # processor time [s] for raising it; two flips in a row take half of that
 ROUGH_TIME = 0.5  # fraction of the remaining time for rough rounds, where there is a time limit
 
@@ -110,15 +110,15 @@ class MultiStart:
     def _fastest(self) -> Plan | None:
         """Return the fastest plan from all starts, which may be the plan of a start."""
         best, known = self._around(), list[Plan]()
-        for refinement, begun in self._batches() if best is None else ():
-            known += [plan for plan, _ in begun if plan is not None]
-            found = self._with_or_without_rooms(refinement, [path for _, path in begun])
+        for refinement, batch in self._batches() if best is None else ():
+            known += [plan for plan, _ in batch if plan is not None]
+            found = self._with_or_without_rooms(refinement, [path for _, path in batch])
             best = min(filter(None, (best, found)), key=_Found.rank, default=None)
             if out_of_time() or (best is not None and best.path.is_clear):
                 break
         if best is not None and self._lacks_places and not out_of_time():
             best = self._faster(best)
-        return self._or_begun_from(None if best is None else self._plan(best), known)
+        return self._or_known(None if best is None else self._plan(best), known)
 
     @property
     def _lacks_places(self) -> bool:
@@ -135,39 +135,39 @@ class MultiStart:
         with within_time(RAISING_TIME, processor):
             for planner in chain([guess], (planner for planner, _ in more)):
                 with suppress(Infeasible):
-                    begun = WarmStart.of(planner.plan(task.problem, task.vehicle), task.stages)
-                    found = self._finished(self.refinement, self._at_reserve(begun), best)
+                    start = WarmStart.of(planner.plan(task.problem, task.vehicle), task.stages)
+                    found = self._finished(self.refinement, self._at_reserve(start), best)
                     if found is not None and found is not best:
                         return found
                 if out_of_time():
                     break
         return best
 
-    def _at_reserve(self, begun: WarmStart) -> list[RefinedPath]:
+    def _at_reserve(self, start: WarmStart) -> list[RefinedPath]:
         """Return the rough path from a start without reserve, after steps with rising reserve (continuation).
 
         Return no path if its constraint violations are too large after the last step.
         """
-        for share in RAISED:
-            task = replace(self._task, reserve=share * self._task.reserve)
+        for fraction in RESERVE_FRACTIONS:
+            task = replace(self._task, reserve=fraction * self._task.reserve)
             refinement = replace(self.refinement, task=task)
-            rough = refinement.rough(begun, self._least_segments)
-            begun = rough.path
+            rough = refinement.rough(start, self._least_segments)
+            start = rough.path
         return [rough] if refinement.is_promising(rough) else []
 
-    def _or_begun_from(self, found: Plan | None, begun: Sequence[Plan]) -> Plan | None:
+    def _or_known(self, found: Plan | None, known: Sequence[Plan]) -> Plan | None:
         """Return the plan found, or a better certified plan among the starts that keeps the reserve."""
         task = self._task
-        plans = (plan if plan.vehicle == task.vehicle else plan.for_vehicle(task.vehicle) for plan in begun)
+        plans = (plan if plan.vehicle == task.vehicle else plan.for_vehicle(task.vehicle) for plan in known)
         kept = [plan for plan in plans if plan.certified and plan.keeps(task.reserve)]
-        known = min(kept, key=self._priced, default=None)
-        if known is None or (
-            found is not None and found.certified and self._priced(found) <= self._priced(known)
+        best = min(kept, key=self._priced, default=None)
+        if best is None or (
+            found is not None and found.certified and self._priced(found) <= self._priced(best)
         ):
             return found
-        said = f"{self.planner} found none better than the path that it began from, {known.planner}'s"
+        said = f"{self.planner} found none better than the path that it began from, {best.planner}'s"
         attempts = tuple(self.refinement.recorder.attempts)
-        return replace(known, planner=self.planner, attempts=attempts, rescue=said)
+        return replace(best, planner=self.planner, attempts=attempts, rescue=said)
 
     def _around(self) -> _Found | None:
         """Return the fastest path around obstacles; None without obstacles, or if no route leads to one."""
@@ -183,8 +183,8 @@ class MultiStart:
         if best is None or is_course(self._task.stages) or not count:
             return best
         with suppress(Infeasible), within_time(MORE_TIME, processor):
-            _, begun = next(self._batches())
-            rough = self._rough(refinement, [path for _, path in begun[:count]])
+            _, batch = next(self._batches())
+            rough = self._rough(refinement, [path for _, path in batch[:count]])
             best = self._finished(refinement, rough, best)
         return best
 
@@ -192,16 +192,16 @@ class MultiStart:
         """Yield batches of starts, each with its refinement; later batches are tried if earlier ones fail.
 
         A batch fails if it leads to no certified path that is clear of gates' frames. The closed forms of a
-        course are tried with a hasty refinement first.
+        course are tried with a refinement that gives up early first.
         """
         task = self._task
         if self.start is not None:
             yield self.refinement, [(self.start, WarmStart.of(self.start, task.stages))]
         guess = replace(self.guess, reserve=task.reserve)
         if is_course(task.stages):
-            hasty = replace(self.refinement, hasty=True)
+            quick = replace(self.refinement, gives_up_early=True)
             for start in closed_forms(task, (1.0, *SLOWER_PACES)):
-                yield hasty, [start]
+                yield quick, [start]
             for each in chain(starts(task, guess), closed_forms(task, SLOWER_PACES), self._of_more(guess)):
                 yield self.refinement, [each]
             return
@@ -218,8 +218,8 @@ class MultiStart:
     def _of_more(self, guess: Miqp) -> Iterator[_Start]:
         """Yield starts from mixed-integer plans with more intervals; none for closed courses."""
         task = self._task
-        ways = () if task.stages.closed else with_more_intervals(guess, task.problem, task.vehicle)
-        for planner, _ in ways:
+        planners = () if task.stages.closed else with_more_intervals(guess, task.problem, task.vehicle)
+        for planner, _ in planners:
             try:
                 with within_time(MORE_TIME, processor):
                     plan = planner.plan(task.problem, task.vehicle)
@@ -251,10 +251,10 @@ class MultiStart:
                 best = min(certified, key=_Found.rank)
         return best
 
-    def _rough(self, refinement: Refinement, begun: Sequence[WarmStart]) -> list[RefinedPath]:
+    def _rough(self, refinement: Refinement, batch: Sequence[WarmStart]) -> list[RefinedPath]:
         """Return the rough paths from starts, fastest first, without those that rounds cannot repair."""
         found: list[RefinedPath] = []
-        for path in begun:
+        for path in batch:
             known = min(map(_duration, found), default=inf)
             rough = refinement.rough(path, self._least_segments, known)
             if refinement.is_promising(rough):
@@ -319,19 +319,19 @@ class _Found:
         return priced_duration(self.path.refinement.task, refined.path.trajectory)
 
 
-def _likeliest(begun: _Start) -> tuple[bool, bool, float]:
+def _likeliest(start: _Start) -> tuple[bool, bool, float]:
     """Return the sort key of starts: certified plans, other plans, other paths; each kind shortest first."""
-    plan, path = begun
+    plan, path = start
     return plan is None, plan is None or not plan.certified, path.trajectory.duration
 
 
-def _varied(begun: Sequence[_Start]) -> Iterator[_Start]:
+def _varied(batch: Sequence[_Start]) -> Iterator[_Start]:
     """Yield starts without end: the given ones, slower ones where rotors were ignored, then random paces.
 
     Each start that nearly lies in a vertical plane is followed by a copy that is bent out of the plane.
     """
     sources: list[_Start] = []
-    for plan, path in begun:
+    for plan, path in batch:
         sources.append((plan, path))
         if plan is None or plan.vehicle is None:
             sources.append((None, path.time_scaled(SLOWER)))

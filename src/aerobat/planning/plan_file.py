@@ -41,8 +41,8 @@ from aerobat.vehicle import Vehicle
 
 FORMAT = "aerobat-plan-1"  # gets another number where content is removed or changes its meaning
 REVISION = 6  # of the format: increased by one where content is added
-WORKED_OUT = {"certificate", "flyability", "assessment"}  # computed from a plan's path, never read
-ASKED_FOR = {"recoveries", "opinion", "tube"}  # results that take seconds, read from files with a digest only
+RECOMPUTED = {"certificate", "flyability", "assessment"}  # computed from a plan's path, never read
+ON_REQUEST = {"recoveries", "opinion", "tube"}  # take seconds, read from files with a digest only
 MAX_EVIDENCE = 2**23  # largest document [bytes]; a plan through twenty gates has some hundred thousand
 FRAMES = {
     "world": "ENU: x east, y north, z up [m]",
@@ -120,7 +120,7 @@ def read_plan_file(path: PathName) -> tuple[Problem, Trajectory, Vehicle | None,
         raise SpecError(f"plan file {path}: it holds {found}, not {FORMAT}; plan again and save that")
     if "digest" in content and str(content["digest"]) != digest_of(content):
         raise SpecError(f"plan file {path}: it was changed after it was written; plan again and save that")
-    left_out = WORKED_OUT if "digest" in content else WORKED_OUT | ASKED_FOR
+    left_out = RECOMPUTED if "digest" in content else RECOMPUTED | ON_REQUEST
     try:
         text = content["document"].tobytes()
         if len(text) > MAX_EVIDENCE:

@@ -25,7 +25,7 @@ from aerobat.vehicle import Vehicle
 # thrust-to-weight ratio assumed without a vehicle, where stages ask a fraction of its thrust: that of a
 # hexarotor of the paper's class
 ASSUMED_THRUST_TO_WEIGHT = 5.0
-SHARE = 0.5  # fraction of the room in a narrow passage that is kept as clearance
+CLEARANCE_FRACTION = 0.5  # fraction of the room in a narrow passage that is kept as clearance
 KEPT_INSIDE = 0.1  # largest reduction of a ball's radius, relative: lab flights have errors of half of that
 RATES = {Quantity.POSITION: Quantity.VELOCITY, Quantity.VELOCITY: Quantity.ACCELERATION}
 ROUNDING = 1e-9  # relative difference of limits or directions below which they are equal
@@ -70,7 +70,7 @@ class Task:
 
     def with_room(self, room: float) -> Task:
         """Return the task with its clearance reduced to a share of `room` [m], where that is less."""
-        return replace(self, clearance=min(self.clearance, max(SHARE * room, LEAST_CLEARANCE)))
+        return replace(self, clearance=min(self.clearance, max(CLEARANCE_FRACTION * room, LEAST_CLEARANCE)))
 
     def with_stages(self, stages: Iterable[Stage]) -> Task:
         """Return the task with other stages, which are ordered if the present ones are."""

@@ -69,7 +69,7 @@ class TimeOptimal(Planner):
         refinement = Refinement.of(task, Recorder(progress))
         return MultiStart(
             planner="time-optimal",
-            refinement=replace(refinement, close=is_course(task.stages)),
+            refinement=replace(refinement, high_accuracy=is_course(task.stages)),
             starts=self.starts,
             segments=self.segments,
             leg_segments=LEG_SEGMENTS,

@@ -21,11 +21,11 @@ from aerobat.environment.obstacles import Pieces
 from aerobat.vehicle import Ellipsoid
 
 CELLS = 25_000  # approximate number of cells, with which a shortest path takes 0.1 s
-FINEST = 0.1  # least side of a cell [m]
-AROUND = 3.0  # margin of the grid around the positions to pass [m]
-LOOKED_WITHIN = 1.2  # distance [m] from a piece within which it is exact; farther away its box is used
+MIN_CELL_SIZE = 0.1  # least side of a cell [m]
+GRID_MARGIN = 3.0  # margin of the grid around the positions to pass [m]
+EXACT_WITHIN = 1.2  # distance [m] from a piece within which it is exact; farther away its box is used
 ROOM = 0.15  # distance [m] beyond the body's reach within which cells cost more
-CLOSE = 4.0  # added cost per metre where the body on its side just fits
+CLEARANCE_COST = 4.0  # added cost per metre where the body on its side just fits
 STEPS = np.array([step for step in product((-1, 0, 1), repeat=3) if step > (0, 0, 0)])
 
 
@@ -54,8 +54,8 @@ class Cells:
             upper: Upper corner of the allowed volume [m], infinite where it is open.
             duration: Expected duration from the first position to the last [s].
         """
-        low = np.maximum(places.min(axis=0) - AROUND, lower)
-        high = np.minimum(places.max(axis=0) + AROUND, upper)
+        low = np.maximum(places.min(axis=0) - GRID_MARGIN, lower)
+        high = np.minimum(places.max(axis=0) + GRID_MARGIN, upper)
         return cls(pieces, body, low, high, places[[0, -1]], duration)
 
     @property
@@ -66,7 +66,7 @@ class Cells:
     @cached_property
     def step(self) -> float:
         """The approximate length of a cell's side [m]."""
-        return max(FINEST, float((np.prod(self.upper - self.lower) / CELLS) ** (1.0 / 3.0)))
+        return max(MIN_CELL_SIZE, float((np.prod(self.upper - self.lower) / CELLS) ** (1.0 / 3.0)))
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -95,7 +95,7 @@ class Cells:
     @cached_property
     def clearance(self) -> Array:
         """Lower bounds on the distances of all centres to the nearest piece [m], (n,)."""
-        return self.distances(self.centres, LOOKED_WITHIN)
+        return self.distances(self.centres, EXACT_WITHIN)
 
     @cached_property
     def free(self) -> Mask:
@@ -106,7 +106,7 @@ class Cells:
     def cost(self) -> Array:
         """The cost of a metre through a cell, (n,)."""
         close = (self.room - self.clearance) / (self.room - self.body.revolved.high)
-        return 1.0 + CLOSE * np.clip(close, 0.0, 1.0)
+        return 1.0 + CLEARANCE_COST * np.clip(close, 0.0, 1.0)
 
     def cell(self, points: Array) -> Indices:
         """Return the cells (...) that contain points [m] (..., 3), or are nearest to points outside."""
@@ -120,7 +120,7 @@ class Cells:
         away = np.linalg.norm(self.centres - place, axis=1)
         return int(np.argmin(np.where(self.free, away, np.inf)))
 
-    def way(self, begin: int, end: int, factor: Array) -> Indices | None:
+    def cheapest_path(self, begin: int, end: int, factor: Array) -> Indices | None:
         """Return the cells (k,) of the cheapest route between two cells, with costs times `factor` (n,).
 
         Return None where there is no route.

@@ -71,8 +71,8 @@ def _quickly_refined(
     for guess in batch:
         own = known.setdefault(guess.task.clearance, replace(refinement, task=guess.task))
         count = _segments(guess.path, segments)
-        begun = _begun(refinement, guess, segments, stretch)
-        path = _quick(own, begun, segments, stretch) if count < LONG else own.rough(begun, count)
+        start = _start_path(refinement, guess, segments, stretch)
+        path = _quick(own, start, segments, stretch) if count < LONG else own.rough(start, count)
         if own.is_promising(path):
             yield _Rough(own, path)
         if out_of_time():
@@ -80,13 +80,13 @@ def _quickly_refined(
 
 
 def _segments(guess: WarmStart, segments: int) -> int:
-    begun = guess.trajectory
-    return min(max(segments, begun.segments, ceil(begun.duration / LONGEST)), MAX_SEGMENTS)
+    start = guess.trajectory
+    return min(max(segments, start.segments, ceil(start.duration / LONGEST)), MAX_SEGMENTS)
 
 
 def _quick(refinement: Refinement, guess: WarmStart, segments: int, stretch: float) -> RefinedPath:
-    begun = knots_at_stages(guess, min(segments, QUICK_SEGMENTS))
-    return Rounds(refinement, begun, QUICK, QUICK_PLACES, stretch=stretch).solve().source
+    start = knots_at_stages(guess, min(segments, QUICK_SEGMENTS))
+    return Rounds(refinement, start, QUICK, QUICK_PLACES, stretch=stretch).solve().source
 
 
 def _refined_roughly(quick: Sequence[_Rough], segments: int) -> Iterator[_Rough]:
@@ -102,10 +102,10 @@ def _refined_roughly(quick: Sequence[_Rough], segments: int) -> Iterator[_Rough]
             return
 
 
-def _begun(refinement: Refinement, guess: Guess, segments: int, stretch: float) -> WarmStart:
+def _start_path(refinement: Refinement, guess: Guess, segments: int, stretch: float) -> WarmStart:
     """Return the path of a guess, first refined with the body on its side where walls require that."""
     if guess.turned is None:
         return guess.path
-    begun = replace(guess.path, stages=guess.turned.stages.stages)
+    start = replace(guess.path, stages=guess.turned.stages.stages)
     turned = Refinement.of(guess.turned, refinement.recorder, refinement.still_ends)
-    return replace(_quick(turned, begun, segments, stretch).path, stages=guess.path.stages)
+    return replace(_quick(turned, start, segments, stretch).path, stages=guess.path.stages)

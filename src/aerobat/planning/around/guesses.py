@@ -13,9 +13,9 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.planning.around.cells import Cells
-from aerobat.planning.around.routes import Leg, Way, routes, straightened
+from aerobat.planning.around.routes import GridRoute, Leg, routes, straightened
 from aerobat.planning.polynomial.knots import start_along_normals
-from aerobat.planning.task import SHARE, Task
+from aerobat.planning.task import CLEARANCE_FRACTION, Task
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.condition import Attitude, Quantity, fixed
 from aerobat.problem.gate import Gate
@@ -23,13 +23,14 @@ from aerobat.problem.stage import Stage
 
 ROUTES = 4  # number of routes; the refinement takes the fastest
 BEFORE = 0.3  # distance [m] beyond the body's reach at which the flight along a wall gate's normal begins
-CLOSEST = 0.5  # least distance [m] between the corners of a route
+MIN_CORNER_DISTANCE = 0.5  # least distance [m] between the corners of a route
 # (slack of straight lines in cells, factor on the closed form's duration), tried in turn: slow starts lead
 # through slits, starts without slack through windows
 STARTS = ((0.1, 1.4), (0.0, 1.4), (0.1, 1.8), (0.0, 1.0))
 SIDEWAYS = (0.1, 2.6)  # the first start of a body on its side: slow ones lead through narrow slits soonest
-HURRIED = 0.5  # fraction of the thrust that accelerates the vehicle in the expected duration
-LATE = (1.0, 1.4, 0.7)  # factors on the expected duration: routes pass behind moving obstacles, or in front
+EXPECTED_THRUST_FRACTION = 0.5  # fraction of the thrust that accelerates the vehicle in the expected duration
+# factors on the expected duration: routes pass behind moving obstacles, or in front
+PASSING_TIME_FACTORS = (1.0, 1.4, 0.7)
 BOTH_WAYS = 0.5  # z component of a gate's `up` axis below which both ways to turn the body are tried
 TOLERANCE = 0.1  # attitude tolerance of a body on its side in the first refinement [rad]
 ROOMS = 101  # number of clearances, from zero on, among which the largest that wall gates leave is found
@@ -63,13 +64,13 @@ def guesses(task: Task, count: int = ROUTES) -> Iterator[list[Guess]]:
     lower, upper = task.problem.path_limits.of(0)
     corners = np.array([point for leg in legs for point in leg])
     pieces = task.environment.pieces
-    hurried = _hurried(task, corners)
+    duration = _expected_duration(task, corners)
     grids = [
-        Cells.around(pieces, task.vehicle.bounding_ellipsoid, corners, lower, upper, late * hurried)
-        for late in (LATE if pieces.moving else LATE[:1])
+        Cells.around(pieces, task.vehicle.bounding_ellipsoid, corners, lower, upper, factor * duration)
+        for factor in (PASSING_TIME_FACTORS if pieces.moving else PASSING_TIME_FACTORS[:1])
     ]
     in_holes, thin = _room_in_holes(task), min(task.vehicle.bounding_ellipsoid.revolved[:2])
-    found = [(grid, way) for grid in grids for way in routes(grid, legs, ceil(count / len(grids)))]
+    found = [(grid, route) for grid in grids for route in routes(grid, legs, ceil(count / len(grids)))]
     turns = _turned(task) if found else ()
     for turned, (slack, pace) in product(turns, (SIDEWAYS, *STARTS) if any(turns) else STARTS):
         paths = []
@@ -84,7 +85,7 @@ def _room_in_holes(task: Task) -> float:
     """Return the distance [m] that the body can keep from all wall gates' edges, up to the needed one."""
     holes = [gate.opening for gate in (_in_wall(task, stage) for stage in task.stages.stages) if gate]
     small, large = sorted(task.vehicle.bounding_ellipsoid.revolved[:2])
-    rooms: list[float] = np.linspace(0.0, task.clearance / SHARE, ROOMS).tolist()
+    rooms: list[float] = np.linspace(0.0, task.clearance / CLEARANCE_FRACTION, ROOMS).tolist()
 
     def is_too_much(room: float) -> bool:
         return not all(hole.admits_turned(small + room, large + room) for hole in holes)
@@ -92,24 +93,24 @@ def _room_in_holes(task: Task) -> float:
     return rooms[max(bisect(rooms, False, key=is_too_much) - 1, 0)]
 
 
-def _hurried(task: Task, corners: Array) -> float:
+def _expected_duration(task: Task, corners: Array) -> float:
     """Return the expected duration [s] along corners (k, 3): rest to rest by thrust, or at the top speed."""
     _, greatest = task.problem.path_limits.of(1)
-    way = np.diff(corners, axis=0)
-    length = float(np.linalg.norm(way, axis=1).sum())
-    at_speed = float((np.abs(way) / greatest).max(axis=1).sum())
-    return max(2.0 * sqrt(length / (HURRIED * task.vehicle.max_specific_thrust)), at_speed)
+    steps = np.diff(corners, axis=0)
+    length = float(np.linalg.norm(steps, axis=1).sum())
+    at_speed = float((np.abs(steps) / greatest).max(axis=1).sum())
+    return max(2.0 * sqrt(length / (EXPECTED_THRUST_FRACTION * task.vehicle.max_specific_thrust)), at_speed)
 
 
-def _different(found: Iterable[tuple[Cells, Way]], slack: float) -> Iterator[tuple[list[Array], float]]:
+def _different(found: Iterable[tuple[Cells, GridRoute]], slack: float) -> Iterator[tuple[list[Array], float]]:
     """Yield each route's corners and clearance [m], without routes whose corners an earlier route has."""
     known: list[Array] = []
-    for grid, way in found:
-        legs = [straightened(grid, leg, slack) for leg in way.legs]
+    for grid, route in found:
+        legs = [straightened(grid, leg, slack) for leg in route.legs]
         corners = np.concatenate(legs)
-        if not any(len(x) == len(corners) and np.abs(x - corners).max() < CLOSEST for x in known):
+        if not any(len(x) == len(corners) and np.abs(x - corners).max() < MIN_CORNER_DISTANCE for x in known):
             known.append(corners)
-            yield legs, way.clearance
+            yield legs, route.clearance
 
 
 def _places(task: Task) -> list[Leg] | None:
@@ -143,10 +144,10 @@ def _along(task: Task, route: Sequence[Array]) -> WarmStart:
 
 
 def _inner(leg: Array) -> list[Array]:
-    """Return the inner corners of a leg, without those closer than CLOSEST to another or to an end."""
+    """Return the inner corners of a leg, MIN_CORNER_DISTANCE or more from each other and from its ends."""
     kept = [leg[0]]
     for point in leg[1:-1]:
-        if min(np.linalg.norm(point - kept[-1]), np.linalg.norm(point - leg[-1])) > CLOSEST:
+        if min(np.linalg.norm(point - kept[-1]), np.linalg.norm(point - leg[-1])) > MIN_CORNER_DISTANCE:
             kept.append(point)
     return kept[1:]
 

@@ -14,25 +14,25 @@ from typing import NamedTuple
 import numpy as np
 
 from aerobat.arrays import Array, Indices
-from aerobat.planning.around.cells import LOOKED_WITHIN, Cells
+from aerobat.planning.around.cells import EXACT_WITHIN, Cells
 
-BETWEEN = LOOKED_WITHIN  # largest distance [m] of a route from obstacles at which a curtain is drawn
-WIDE = 4.0  # largest distance [m] of a curtain's cells from the route
+BETWEEN = EXACT_WITHIN  # largest distance [m] of a route from obstacles at which a curtain is drawn
+CURTAIN_RADIUS = 4.0  # largest distance [m] of a curtain's cells from the route
 DETOUR = 1.5  # cost of passing a curtain, as a length [m]
-LOOKED_AT = 24  # samples of a straight line that is tested for collision
-COMPARED = 20  # samples of two routes that are compared
+LINE_SAMPLES = 24  # samples of a straight line that is tested for collision
+ROUTE_SAMPLES = 20  # samples of two routes that are compared
 
 Leg = tuple[Array, Array]  # its two ends [m]
 
 
-class Way(NamedTuple):
+class GridRoute(NamedTuple):
     """A route through positions."""
 
     legs: tuple[Array, ...]  # the points of each leg [m], cell by cell, both ends included, (k, 3)
     clearance: float  # [m] the least distance of the route's cells to a piece
 
 
-def routes(grid: Cells, legs: Sequence[Leg], count: int) -> Iterator[Way]:
+def routes(grid: Cells, legs: Sequence[Leg], count: int) -> Iterator[GridRoute]:
     """Yield distinct routes, the cheapest first; none where a leg has no route.
 
     Args:
@@ -44,18 +44,18 @@ def routes(grid: Cells, legs: Sequence[Leg], count: int) -> Iterator[Way]:
     factor = np.ones(len(grid.centres))
     known: list[Array] = []
     for _ in range(count):
-        found = [grid.way(begin, end, factor) for begin, end in ends]
-        ways = [way for way in found if way is not None]
-        if len(ways) < len(found):
+        found = [grid.cheapest_path(begin, end, factor) for begin, end in ends]
+        paths = [path for path in found if path is not None]
+        if len(paths) < len(found):
             return
-        whole = np.concatenate(ways)
+        whole = np.concatenate(paths)
         points = grid.centres[whole]
         if not any(_is_alike(grid, points, other) for other in known):
             flown = (
-                np.concatenate([[begin], grid.centres[way[1:-1]], [end]])
-                for (begin, end), way in zip(legs, ways, strict=True)
+                np.concatenate([[begin], grid.centres[path[1:-1]], [end]])
+                for (begin, end), path in zip(legs, paths, strict=True)
             )
-            yield Way(tuple(flown), float(grid.clearance[whole].min()))
+            yield GridRoute(tuple(flown), float(grid.clearance[whole].min()))
             known.append(points)
         factor = _with_curtains(grid, whole, factor)
 
@@ -87,17 +87,18 @@ def _is_straight(grid: Cells, points: Array, slack: float) -> bool:
     return bool((line >= np.minimum(beside, grid.room) - slack * grid.step).all())
 
 
-def _with_curtains(grid: Cells, way: Indices, factor: Array) -> Array:
+def _with_curtains(grid: Cells, path: Indices, factor: Array) -> Array:
     """Return the cost factors, raised in curtains across a route where it passes between obstacles."""
-    clearance, points = grid.clearance[way], grid.centres[way]
+    clearance, points = grid.clearance[path], grid.centres[path]
     factor = factor.copy()
-    for k in range(1, len(way) - 1):
+    for k in range(1, len(path) - 1):
         if clearance[k] > min(clearance[k - 1], clearance[k + 1], BETWEEN):
             continue
         along = points[k + 1] - points[k - 1]
         along /= max(float(np.linalg.norm(along)), 1e-9)
         offset = grid.centres - points[k]
-        near = (np.abs(offset @ along) <= grid.step) & (np.linalg.norm(offset, axis=1) < WIDE) & grid.free
+        distance = np.linalg.norm(offset, axis=1)
+        near = (np.abs(offset @ along) <= grid.step) & (distance < CURTAIN_RADIUS) & grid.free
         cells = np.flatnonzero(near)
         lines = _line(points[k], grid.centres[cells])
         seen = grid.free[grid.cell(lines)].all(axis=0)
@@ -112,12 +113,12 @@ def _is_alike(grid: Cells, route: Array, other: Array) -> bool:
 
 
 def _spaced(points: Array) -> Array:
-    """Return points evenly spaced along a route, (COMPARED, 3)."""
+    """Return points evenly spaced along a route, (ROUTE_SAMPLES, 3)."""
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    at = np.linspace(0.0, length[-1], COMPARED)
+    at = np.linspace(0.0, length[-1], ROUTE_SAMPLES)
     return np.column_stack([np.interp(at, length, points[:, axis]) for axis in range(3)])
 
 
 def _line(begin: Array, end: Array) -> Array:
-    """Return points along straight lines, (LOOKED_AT, ..., 3)."""
-    return np.linspace(np.broadcast_to(begin, end.shape), end, LOOKED_AT)
+    """Return points along straight lines, (LINE_SAMPLES, ..., 3)."""
+    return np.linspace(np.broadcast_to(begin, end.shape), end, LINE_SAMPLES)

@@ -28,7 +28,7 @@ from aerobat.so3 import UP
 from aerobat.vehicle import Vehicle
 
 PARALLEL = 1e-9  # distance from 1 of the cosine between two directions that count as one [-]
-AT_ONCE = 1e9  # deceleration [m/s²] that stands for no need to stop, at a goal with free velocity
+INSTANT_STOP = 1e9  # deceleration [m/s²] that stands for no need to stop, at a goal with free velocity
 MANY_ROTORS = 12  # number of rotors above which moments are bounded axis by axis: vertices are too many
 HALVINGS = 3  # bisections of the interval of durations, which bound the speed
 
@@ -106,7 +106,7 @@ def _along(vector: Array, direction: Array) -> float:
     return factor if abs(factor) >= (1.0 - PARALLEL) * float(np.linalg.norm(vector)) else 0.0
 
 
-class _Turn(Enum):
+class _Relation(Enum):
     """The relation of a motion along a line to a position that a stage asks."""
 
     ABOVE = "at or beyond it"
@@ -118,7 +118,7 @@ class _Turn(Enum):
 class _Place:
     """A position on a line that is met in its order; ABOVE and BELOW are reversals at zero speed."""
 
-    turn: _Turn
+    relation: _Relation
     position: float  # [m]
     velocity: float = 0.0  # [m/s]
     is_passed: bool = False  # whether the velocity there is free, as at a goal with free velocity
@@ -127,7 +127,7 @@ class _Place:
     def of_end(cls, end: EndState, direction: Array) -> _Place:
         """Return the position at which a motion begins or ends."""
         position, velocity = (float(vector @ direction) for vector in (end.position, end.velocity))
-        return cls(_Turn.AT, position, velocity, end.free_velocity)
+        return cls(_Relation.AT, position, velocity, end.free_velocity)
 
 
 @dataclass(frozen=True)
@@ -211,13 +211,14 @@ def _leg(a: _Place, b: _Place, up: DampedPoint, down: DampedPoint) -> float:
     """Return the least time [s] from one position to another; -inf where they do not require that motion."""
     distance = b.position - a.position
     if b.is_passed:
-        up, down = replace(up, backward=AT_ONCE), replace(down, backward=AT_ONCE)
+        up, down = replace(up, backward=INSTANT_STOP), replace(down, backward=INSTANT_STOP)
     if distance == 0.0:
-        return up.least_time(0.0, a.velocity, b.velocity) if a.turn is b.turn is _Turn.AT else -inf
+        is_met = a.relation is b.relation is _Relation.AT
+        return up.least_time(0.0, a.velocity, b.velocity) if is_met else -inf
     if distance > 0.0:
-        blocked = a.turn is _Turn.ABOVE or b.turn is _Turn.BELOW
+        blocked = a.relation is _Relation.ABOVE or b.relation is _Relation.BELOW
         return -inf if blocked else up.least_time(distance, a.velocity, b.velocity)
-    blocked = a.turn is _Turn.BELOW or b.turn is _Turn.ABOVE
+    blocked = a.relation is _Relation.BELOW or b.relation is _Relation.ABOVE
     return -inf if blocked else down.least_time(-distance, -a.velocity, -b.velocity)
 
 
@@ -228,22 +229,22 @@ def _places(stage: Stage, direction: Array) -> tuple[_Place, ...]:
     if stage.ball is not None:
         middle = float(stage.ball.centre @ direction)
         lower, upper = max(lower, middle - stage.ball.radius), min(upper, middle + stage.ball.radius)
-    found = [_Place(_Turn.ABOVE, lower), _Place(_Turn.BELOW, upper)]
+    found = [_Place(_Relation.ABOVE, lower), _Place(_Relation.BELOW, upper)]
     if lower == upper and slow == fast:
-        found.append(_Place(_Turn.AT, lower, slow))
+        found.append(_Place(_Relation.AT, lower, slow))
     return tuple(place for place in found if abs(place.position) < inf)
 
 
 def _range(quantity: Quantity, conditions: Sequence[Condition], direction: Array) -> tuple[float, float]:
     """Return the bounds that conditions set on a quantity along a direction."""
     lower, upper = -inf, inf
-    asked = [c for c in conditions if c.quantity is quantity]
-    for condition in asked:
+    matching = [c for c in conditions if c.quantity is quantity]
+    for condition in matching:
         factor = _along(condition.direction, direction)
         if factor != 0.0:
             ends = sorted((condition.lower / factor, condition.upper / factor))
             lower, upper = max(lower, ends[0]), min(upper, ends[1])
-    fixed = [c for c in asked if c.lower == c.upper]
+    fixed = [c for c in matching if c.lower == c.upper]
     if lower < upper and len(fixed) == 3:
         rows = np.array([c.direction for c in fixed])
         if np.linalg.matrix_rank(rows) == 3:

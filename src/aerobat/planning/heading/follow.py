@@ -24,21 +24,21 @@ from aerobat.planning.task import Task
 from aerobat.problem.heading import Heading, HeadingMode
 from aerobat.states import FlatState
 
-SHARE = 0.5  # fraction of the path's reserve that stays for the controller; turning may use the rest
+RESERVE_FRACTION = 0.5  # fraction of the path's reserve that stays for the controller; the rest is for yaw
 # fractions of each part at which limits are evaluated: not at its knots, and denser near them, where limits
 # change fast
 PLACES = 0.5 - 0.5 * np.cos(np.pi * np.array([0.006, *np.arange(1, 8) / 8, 0.994]))
 SPANS = np.diff(0.5 * (PLACES[1:] + PLACES[:-1]), prepend=0.0, append=1.0)  # quadrature weights of PLACES
 SMOOTH = 1e-6  # weight [s⁶] of the squared third derivative: smooths required turns above about 10 rad/s
-ASKED = 0.3  # weight of the required heading below which it is ignored; the full weight is 1
-AT_ITS_END = 0.5  # distance from a limit, relative to its size, within which a step takes it into account
+MIN_HEADING_WEIGHT = 0.3  # weight of the required heading below which it is ignored; the full weight is 1
+ACTIVE_DISTANCE = 0.5  # distance from a limit, relative to its size, within which a step respects it
 SLACK = 1e-3  # constraint violation at samples that counts as none, relative to the limit's size
 REACH, LEAST_REACH = 0.6, 2e-3  # largest yaw change of the first step, and the one at which steps end [rad]
 ROUNDS = 60  # largest number of steps
 SMOOTHER = (1.0, 30.0, 1000.0)  # factors on SMOOTH of the unconstrained optima at which searches start
 PART = 0.4  # scale of the smoother optima, which are starts too: the whole turns may violate limits by far
 RESTORED = 0.5  # fraction of a constraint violation that one step removes
-ENOUGH = 1e-4  # relative decrease of the cost below which steps end
+MIN_DECREASE = 1e-4  # relative decrease of the cost below which steps end
 # (additional reserve as a fraction of limits' sizes, factor on the turn), tried in turn until certified
 WHOLE = tuple((more, 1.0) for more in (0.0, 0.005, 0.01, 0.02, 0.04, 0.08))
 TRIES = (*WHOLE, (0.08, 0.6), (0.08, 0.3), (0.08, 0.0))
@@ -47,8 +47,8 @@ TRIES = (*WHOLE, (0.08, 0.6), (0.08, 0.3), (0.08, 0.0))
 def with_heading(plan: Plan, reserve: float) -> Plan:
     """Return a plan whose body follows its problem's heading; plans with a free heading are unchanged.
 
-    The first of TRIES that leaves the rotors SHARE of the reserve is taken, else the first that is certified.
-    Raises Infeasible where the heading's tolerance is not kept.
+    The first of TRIES that leaves the rotors RESERVE_FRACTION of the reserve is taken, else the first that is
+    certified. Raises Infeasible where the heading's tolerance is not kept.
 
     Args:
         plan: A plan without yaw.
@@ -59,9 +59,9 @@ def with_heading(plan: Plan, reserve: float) -> Plan:
         return plan
     spline, tried = YawSpline.along(plan.trajectory), []
     for more, left in TRIES:
-        task = Task.of(plan.problem, plan.vehicle, SHARE * reserve + more)
+        task = Task.of(plan.problem, plan.vehicle, RESERVE_FRACTION * reserve + more)
         found = _turned(plan, spline, _YawProgram(task, heading, spline).best(left))
-        if found.keeps(SHARE * reserve) or not plan.certified:
+        if found.keeps(RESERVE_FRACTION * reserve) or not plan.certified:
             break
         tried.append(found)
     else:
@@ -100,7 +100,7 @@ def heading_error(plan: Plan) -> HeadingError | None:
     times = YawSpline.along(plan.trajectory).times(PLACES)
     limits = YawLimits(Task.of(plan.problem, plan.vehicle), plan.trajectory, times)
     angle, weight = _asked(heading, limits)
-    off = np.where(weight >= ASKED, np.abs(angle), -inf)
+    off = np.where(weight >= MIN_HEADING_WEIGHT, np.abs(angle), -inf)
     if off.max() < 0.0:
         return None
     worst = int(off.argmax())
@@ -148,12 +148,12 @@ class _YawProgram:
     def _target(self) -> tuple[Array, Array]:
         """The required yaw [rad], without jumps of 2π, and its weight, (m,) each."""
         angle, weight = _asked(self.heading, self._limits)
-        known = np.flatnonzero(weight >= ASKED)
+        known = np.flatnonzero(weight >= MIN_HEADING_WEIGHT)
         if not len(known):
             return np.zeros_like(angle), np.zeros_like(weight)
         steady = np.interp(np.arange(len(angle)), known, np.unwrap(angle[known]))
         steady -= 2 * np.pi * np.round(steady[0] / (2 * np.pi))
-        return steady, np.where(weight >= ASKED, weight, 0.0)
+        return steady, np.where(weight >= MIN_HEADING_WEIGHT, weight, 0.0)
 
     @cached_property
     def _ends(self) -> tuple[Array, Array]:
@@ -225,7 +225,7 @@ class _YawProgram:
         for _ in range(ROUNDS):
             yaw = self._yaw(x)
             excess, (gradient, hessian) = limits.excess(yaw), self._slopes(yaw)
-            at, which = np.nonzero(excess > -AT_ITS_END)
+            at, which = np.nonzero(excess > -ACTIVE_DISTANCE)
             slopes = limits.slopes(yaw)[:, at, which]
             linear = sum(slope[:, None] * each[at] for slope, each in zip(slopes, self._rows, strict=True))
             near = excess[at, which]
@@ -238,7 +238,7 @@ class _YawProgram:
                 break
             tried = self._rank(x + step)
             if tried < rank:
-                gained = rank[0] > tried[0] or rank[1] - tried[1] > ENOUGH * rank[1]
+                gained = rank[0] > tried[0] or rank[1] - tried[1] > MIN_DECREASE * rank[1]
                 x, rank, reach = x + step, tried, 2.0 * reach
             else:
                 gained, reach = True, min(reach, float(np.abs(step[is_yaw]).max(initial=0.0))) / 4.0

@@ -140,7 +140,7 @@ class Miqp(Planner):
             least: A lower bound on the duration of any motion [s].
         """
         task, recorder = attempts.task, attempts.recorder
-        whole = replace(Refinement.of(task, recorder), grows=self.flies)
+        whole = replace(Refinement.of(task, recorder), adds_segments=self.flies)
         segments = segments_for(task.stages, self.segments)
         found: Judged[RefinedPath] | Judged[Placement] | None = None
         for refinement in whole.with_and_without_rooms:

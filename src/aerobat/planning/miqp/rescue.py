@@ -24,26 +24,26 @@ from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 MORE_INTERVALS = (1.3, 2.0)  # factors on the requested number of intervals
-A_STAGE = 2  # least intervals a stage: with fewer, the path of a course has no freedom
+MIN_STAGE_INTERVALS = 2  # least intervals a stage: with fewer, the path of a course has no freedom
 MANY_INTERVALS = 40  # tried too if larger: a narrow window near an end needs intervals on both its sides
 RESCUE_TIME = 4.0  # processor time [s] of all fallbacks, so that refusals take 5 s (benchmarks/audit.py)
 # processor time [s] where a plan most likely exists, as a path with small constraint violations was found
 PROMISING_TIME = 15.0
-ONE_WAY = 0.75  # fraction of the remaining time for one fallback, so that the next has some
+FALLBACK_FRACTION = 0.75  # fraction of the remaining time for one fallback, so that the next has some
 # factor on the duration of a nearly feasible path above which a plan is poor: of the plans of 300 random
 # problems, it selects those far from the best
-POOR = 1.1
+SLOW_FACTOR = 1.1
 FREE_KNOTS = "free-knots"  # a quick planner that starts from other paths too
-MOTION = "time-optimal"  # the planner that starts from the most paths
-MOTIONS = 2  # starts of time-optimal: more starts give faster plans, but seldom the first plan
-ALL_MOTIONS = 8  # starts where a plan most likely exists
+TIME_OPTIMAL = "time-optimal"  # the planner that starts from the most paths
+FEW_STARTS = 2  # starts of time-optimal: more starts give faster plans, but seldom the first plan
+MANY_STARTS = 8  # starts where a plan most likely exists
 
 
 @dataclass
 class Rescue:
     """The search for a plan by fallbacks, after a requested planner found none or a poor one."""
 
-    asked: Any  # the requested planner, a Miqp (not imported: its module imports this one)
+    requested: Any  # the requested planner, a Miqp (not imported: its module imports this one)
     problem: Problem
     vehicle: Vehicle
     recorder: Recorder  # of the requested planner; attempts of fallbacks are passed on to its `progress`
@@ -54,11 +54,11 @@ class Rescue:
     def plan(self) -> Plan | None:
         """Return the first certified plan of the fallbacks, or None; its `rescue` names the fallback."""
         with within_time(RESCUE_TIME, processor):
-            found = self._first(self._ways(), self._none_found)
+            found = self._first(self._fallbacks(), self._none_found)
         if found is None and self.is_promising:
             with within_time(PROMISING_TIME, processor):
-                found = self._first(iter([self._motion_from_all(ALL_MOTIONS)]), self._none_found)
-        if found is None or found.keeps(self.asked.reserve):
+                found = self._first(iter([self._time_optimal_from_all(MANY_STARTS)]), self._none_found)
+        if found is None or found.keeps(self.requested.reserve):
             return found
         with within_time(RESCUE_TIME, processor):
             return self._with_reserve(found)
@@ -70,7 +70,7 @@ class Rescue:
     @property
     def _intervals(self) -> int:
         """The number of intervals of the requested planner."""
-        return int(self.asked.intervals_for(self._stages))
+        return int(self.requested.intervals_for(self._stages))
 
     @property
     def _stages(self) -> StageSequence:
@@ -86,12 +86,12 @@ class Rescue:
         # attempts of programs have a dt; attempts at paths have a cost if the path is nearly feasible
         paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
         fastest = min((path.duration for path in paths), default=inf)
-        is_fast = plan.certified and plan.bound is None and plan.duration <= POOR * fastest
+        is_fast = plan.certified and plan.bound is None and plan.duration <= SLOW_FACTOR * fastest
         if is_fast and not self._looks_poor(plan):
             return plan
         cls: Any = planner_class(FREE_KNOTS)
-        others = cls(reserve=self.asked.reserve, clearance=self.asked.clearance)
-        more = with_more_intervals(self.asked, self.problem, self.vehicle)
+        others = cls(reserve=self.requested.reserve, clearance=self.requested.clearance)
+        more = with_more_intervals(self.requested, self.problem, self.vehicle)
         said = f"no fast path of miqp with {self._intervals} intervals settled"
         longest = _priced(plan) if plan.certified else inf
         with within_time(PROMISING_TIME, processor):
@@ -116,21 +116,21 @@ class Rescue:
 
     def _first(
         self,
-        ways: Iterator[tuple[Planner, str]],
+        fallbacks: Iterator[tuple[Planner, str]],
         failed: str,
         shorter_than: float = inf,
     ) -> Plan | None:
         """Return the first certified plan of several planners that is short enough, or None.
 
         Args:
-            ways: Planners, each with words on how it plans.
+            fallbacks: Planners, each with words on how it plans.
             failed: Why fallbacks are tried, which the plan's `rescue` repeats.
             shorter_than: Upper bound of the plan's priced duration (`priced_duration`) [s].
         """
-        for planner, how in ways:
-            with within_share(ONE_WAY):
+        for planner, how in fallbacks:
+            with within_share(FALLBACK_FRACTION):
                 plan = self._planned(planner, how)
-            kept = min(self.asked.reserve, getattr(planner, "reserve", self.asked.reserve))
+            kept = min(self.requested.reserve, getattr(planner, "reserve", self.requested.reserve))
             if plan is not None and plan.keeps(kept) and _priced(plan) < shorter_than:
                 attempts = (*self.recorder.attempts, *plan.attempts)
                 return replace(plan, attempts=attempts, rescue=f"{failed}; planned {how}")
@@ -145,51 +145,51 @@ class Rescue:
             return planner.plan(self.problem, self.vehicle, self.recorder.progress)
         except Infeasible as refusal:
             (self.unanswered if out_of_time() else self.failed).append(how)
-            is_motion = isinstance(planner, planner_class(MOTION))
-            self.is_promising |= is_motion and any(each.cost is not None for each in refusal.attempts)
+            is_time_optimal = isinstance(planner, planner_class(TIME_OPTIMAL))
+            self.is_promising |= is_time_optimal and any(each.cost is not None for each in refusal.attempts)
         except SpecError:
             pass  # the planner does not take such problems
         return None
 
-    def _ways(self) -> Iterator[tuple[Planner, str]]:
+    def _fallbacks(self) -> Iterator[tuple[Planner, str]]:
         """Yield planners, each with words on how it plans, the most promising first.
 
         Where programs have solutions that the vehicle cannot fly, time-optimal comes first. Where programs
         have no solution, more intervals come first.
         """
-        if self.asked.reserve == FLYING_RESERVE:  # the default, which is given up where no plan keeps it
-            yield replace(self.asked, reserve=0.0, rescue=False), "without a reserve"
-        more = with_more_intervals(self.asked, self.problem, self.vehicle)
+        if self.requested.reserve == FLYING_RESERVE:  # the default, which is given up where no plan keeps it
+            yield replace(self.requested, reserve=0.0, rescue=False), "without a reserve"
+        more = with_more_intervals(self.requested, self.problem, self.vehicle)
         if any(attempt.cost is not None for attempt in self.recorder.attempts):
-            yield self._motion_from_all(MOTIONS)
+            yield self._time_optimal_from_all(FEW_STARTS)
             yield from more
         else:
             yield from more
-            yield self._motion(None, MOTIONS), f"by {MOTION}"
+            yield self._time_optimal(None, FEW_STARTS), f"by {TIME_OPTIMAL}"
         yield from self._others()
 
-    def _motion_from_all(self, starts: int) -> tuple[Planner, str]:
+    def _time_optimal_from_all(self, starts: int) -> tuple[Planner, str]:
         """Return time-optimal, started from the path without a vehicle too, and words on how it plans."""
-        return self._motion(self._path_without_rotors(), starts), f"by {MOTION}"
+        return self._time_optimal(self._path_without_rotors(), starts), f"by {TIME_OPTIMAL}"
 
-    def _motion(self, start: Plan | None, starts: int) -> Planner:
+    def _time_optimal(self, start: Plan | None, starts: int) -> Planner:
         """Return time-optimal with the requested reserve, zero included: a refusal comes soonest so."""
-        cls: Any = planner_class(MOTION)
-        guess = replace(self.asked, rescue=False)
-        return cast(Planner, cls(reserve=self.asked.reserve, starts=starts, guess=guess, start=start))
+        cls: Any = planner_class(TIME_OPTIMAL)
+        guess = replace(self.requested, rescue=False)
+        return cast(Planner, cls(reserve=self.requested.reserve, starts=starts, guess=guess, start=start))
 
     def _path_without_rotors(self) -> Plan | None:
         """Return the MIQP's plan without a vehicle, or None."""
         try:
-            return cast(Plan, replace(self.asked, rescue=False).plan(self.problem))
+            return cast(Plan, replace(self.requested, rescue=False).plan(self.problem))
         except Infeasible:
             return None
 
     def _with_reserve(self, found: Plan) -> Plan:
         """Return a plan near a plan that keeps the requested reserve, or the plan where there is none."""
-        name = MOTION if found.planner == MOTION else FREE_KNOTS
-        again = self._planned(planner_with_reserve(name, self.asked.reserve, start=found), f"by {name}")
-        if again is None or not again.keeps(self.asked.reserve):
+        name = TIME_OPTIMAL if found.planner == TIME_OPTIMAL else FREE_KNOTS
+        again = self._planned(planner_with_reserve(name, self.requested.reserve, start=found), f"by {name}")
+        if again is None or not again.keeps(self.requested.reserve):
             return found
         said = found.rescue if found.planner == name else f"{self._none_found}; planned by {name}"
         return replace(again, attempts=(*found.attempts, *again.attempts), rescue=said)
@@ -198,13 +198,13 @@ class Rescue:
         """Yield the fallbacks that seldom succeed where the earlier ones fail."""
         first = default_order(self.problem, self.vehicle)
         for order in range(first, max(INPUT_NAMES) + 1):
-            if order != (self.asked.order or first):
-                yield replace(self.asked, order=order, rescue=False), f"with order {order}"
-        if self.asked.search is not None:
-            yield replace(self.asked, search=None, rescue=False), "with intervals that differ"
+            if order != (self.requested.order or first):
+                yield replace(self.requested, order=order, rescue=False), f"with order {order}"
+        if self.requested.search is not None:
+            yield replace(self.requested, search=None, rescue=False), "with intervals that differ"
         if self.problem.maneuver.through_points:
-            yield planner_with_reserve("min-snap", self.asked.reserve), "by min-snap"
-        yield planner_with_reserve(FREE_KNOTS, self.asked.reserve), f"by {FREE_KNOTS}"
+            yield planner_with_reserve("min-snap", self.requested.reserve), "by min-snap"
+        yield planner_with_reserve(FREE_KNOTS, self.requested.reserve), f"by {FREE_KNOTS}"
 
 
 def _priced(plan: Plan) -> float:
@@ -213,12 +213,12 @@ def _priced(plan: Plan) -> float:
     return priced_duration(plan.evidence.task, plan.trajectory)
 
 
-def with_more_intervals(asked: Any, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
+def with_more_intervals(requested: Any, problem: Problem, vehicle: Vehicle) -> Iterator[tuple[Planner, str]]:
     """Yield the planner with more intervals than requested, fewest first, and words on how it plans."""
     sequence = problem.stages(vehicle.max_specific_thrust)
-    first, least = asked.intervals_for(sequence), A_STAGE * len(sequence.stages)
+    first, least = requested.intervals_for(sequence), MIN_STAGE_INTERVALS * len(sequence.stages)
     more = {sequence.intervals_from(max(round(factor * first), least)) for factor in MORE_INTERVALS}
     if max(more) * MORE_INTERVALS[0] < MANY_INTERVALS:
         more.add(sequence.intervals_from(MANY_INTERVALS))
     for intervals in sorted(n for n in more if n <= MAX_INTERVALS):
-        yield replace(asked, intervals=intervals, rescue=False), f"with {intervals} intervals"
+        yield replace(requested, intervals=intervals, rescue=False), f"with {intervals} intervals"

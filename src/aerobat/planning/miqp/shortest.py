@@ -17,8 +17,8 @@ from aerobat.planning.certified_solve import Judged
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.attempts import Attempts, Placement
 from aerobat.planning.polynomial.min_snap import MinSnap
-from aerobat.planning.refinement.excess import Excess
 from aerobat.planning.refinement.refine import RefinedPath, Refinement
+from aerobat.planning.refinement.violation import ConstraintViolation
 from aerobat.planning.warm_start import WarmStart
 
 GROWTH = 1.15  # factor on dt from one program to the next
@@ -54,12 +54,12 @@ def shortest(
     """
     scan, rough = _Scan(attempts, refinement, scanned, least), list[RefinedPath]()
     starts = scan.starts()
-    for begun, (slots, guess) in enumerate(starts, 1):
+    for number, (slots, guess) in enumerate(starts, 1):
         path = refinement.rough(guess, segments, min(map(_duration, rough), default=inf))
         if refinement.is_promising(path):
             scan.known.append(slots)
             rough.append(path)
-        if len(rough) >= STARTS or begun >= MAX_STARTS or out_of_time():
+        if len(rough) >= STARTS or number >= MAX_STARTS or out_of_time():
             break
     found: Judged[RefinedPath] | None = None
     for path in sorted(rough, key=_duration):
@@ -147,20 +147,20 @@ class _Scan:
             dt *= COARSE_GROWTH
         while dt <= last and unsolved < UNSOLVED and not self.attempts.is_over:
             placement = self.attempts.solve(dt, SCAN_NODES)
-            excess = inf
+            violation = inf
             if placement.answer.x is not None:
                 guess = self.attempts.path(placement)
-                excess = self._recorded(placement, guess)
+                violation = self._recorded(placement, guess)
             else:
                 self.attempts.judge(placement)
-            if excess <= FAR and placement.answer.slots not in self.known:
+            if violation <= FAR and placement.answer.slots not in self.known:
                 yield placement.answer.slots, guess
-            if excess <= 0.0:
+            if violation <= 0.0:
                 self.flown = placement
                 return
-            solved = solved or excess < inf
+            solved = solved or violation < inf
             unsolved = unsolved + 1 if solved and placement.answer.status == "unknown" else 0
-            dt *= GROWTH if excess < COARSE else COARSE_GROWTH
+            dt *= GROWTH if violation < COARSE else COARSE_GROWTH
 
     def start(self, dt: float) -> WarmStart | None:
         """Return the path of the program at a dt; None where it has none, or its slots are known."""
@@ -179,7 +179,7 @@ class _Scan:
 
     def _recorded(self, placement: Placement, guess: WarmStart) -> float:
         """Return the largest constraint violation of an answer's path; record an attempt if there is one."""
-        found = Excess.of(guess.trajectory, self.refinement.limits, SCAN_PLACES)
+        found = ConstraintViolation.of(guess.trajectory, self.refinement.limits, SCAN_PLACES)
         if not found.holds:
             self.attempts.judge(placement, found.reason, -found.largest)
         return 0.0 if found.holds else found.largest

@@ -78,6 +78,6 @@ def _without_rotors(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, Warm
 
 def closed_forms(task: Task, paces: Sequence[float] = (1.0,)) -> Iterator[tuple[None, WarmStart]]:
     """Yield closed forms through a course with their durations scaled by each of `paces`; none is a plan."""
-    begun = flying_lap if task.stages.closed else start_along_normals
+    closed_form = flying_lap if task.stages.closed else start_along_normals
     for pace, order in product(paces, ORDERS):
-        yield None, begun(task, order).time_scaled(pace)
+        yield None, closed_form(task, order).time_scaled(pace)

@@ -49,13 +49,13 @@ class ClearanceValues:
 
     def values(self, derivatives: Array, planes: Planes) -> Array:
         """Return the values (m, NEAREST) at derivatives (m, 6, 3)."""
-        left = _functions().values(*self._given(derivatives, planes), NO_DIRECTION)
+        left = _functions().values(*self._inputs(derivatives, planes), NO_DIRECTION)
         found = (self.task.clearance - left.reshape(-1, NEAREST)) / SIZE
         return np.asarray(np.where(np.isnan(found), np.inf, found))
 
     def slopes(self, derivatives: Array, planes: Planes) -> Array:
         """Return the slopes by the derivatives, (m, NEAREST, 6, 3)."""
-        by_thrust = _functions().slopes(*self._given(derivatives, planes), np.eye(3))[:, 0].T
+        by_thrust = _functions().slopes(*self._inputs(derivatives, planes), np.eye(3))[:, 0].T
         slopes = np.zeros((*planes.offsets.shape, 6, 3))
         slopes[..., 0, :] = -planes.normals / SIZE
         slopes[..., 2, :] = by_thrust.reshape(planes.normals.shape) / -SIZE
@@ -70,8 +70,8 @@ class ClearanceValues:
             planes: Separating planes at the places.
             weights: Weights of the values, (m, NEAREST).
         """
-        given = self._given(derivatives, planes, weights.reshape(-1, 1) / -SIZE)
-        found = _functions().curvature(*given, np.eye(3))
+        inputs = self._inputs(derivatives, planes, weights.reshape(-1, 1) / -SIZE)
+        found = _functions().curvature(*inputs, np.eye(3))
         bent = found.transpose(2, 1, 0).reshape(-1, NEAREST, 3, 3).sum(axis=1)
         by_motion = np.array([[self.task.balance.drag], [1.0]])
         return np.kron(by_motion @ by_motion.T, bent)
@@ -79,7 +79,7 @@ class ClearanceValues:
     def _thrust(self, derivatives: Array) -> Array:
         return self.task.balance.specific_thrust(derivatives[:, 1], derivatives[:, 2])
 
-    def _given(self, derivatives: Array, planes: Planes, *more: Array) -> tuple[Array, Array]:
+    def _inputs(self, derivatives: Array, planes: Planes, *more: Array) -> tuple[Array, Array]:
         """Return the functions' inputs: the body; thrust, position, normal, offset, `more` of each plane."""
         state = np.concatenate([self._thrust(derivatives), derivatives[:, 0]], axis=1)
         plane = planes.normals.reshape(-1, 3), np.maximum(planes.offsets, -FAR).reshape(-1, 1)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from aerobat.arrays import Array
-from aerobat.planning.refinement.excess import chebyshev
 from aerobat.planning.refinement.limit_values import LimitValues
+from aerobat.planning.refinement.violation import chebyshev
 
 FRACTIONS = chebyshev(24)  # places of every segment, both ends included, (p,)
 

@@ -85,7 +85,7 @@ class FlownPath:
 
     def _refined(self) -> FlownPath | None:
         """Return the path refined once more with this refinement, or None where no path is certified."""
-        path, refinement = self.judged.solution.source.path, replace(self.refinement, grows=False)
+        path, refinement = self.judged.solution.source.path, replace(self.refinement, adds_segments=False)
         judged = refinement.finished(refinement.path(path))
         if not (judged.feasible or out_of_time()):
             judged = refinement.refined(path, path.trajectory.segments)

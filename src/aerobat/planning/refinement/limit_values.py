@@ -104,7 +104,7 @@ class LimitValues:
 
         Values are infinite where the thrust is opposite to the thrust axis of its frame.
         """
-        found = self._functions.values(self._shared, self._given(derivatives, near), NO_DIRECTION)
+        found = self._functions.values(self._shared, self._inputs(derivatives, near), NO_DIRECTION)
         with np.errstate(invalid="ignore"):
             values = np.asarray(found[0].T @ self.measured.T)
         values[:, self.linear] = derivatives.reshape(-1, 18) @ self.path.T
@@ -116,7 +116,7 @@ class LimitValues:
 
     def slopes(self, derivatives: Array, near: Frames) -> LimitSlopes:
         """Return the constraints' slopes by the derivatives (m, 6, 3)."""
-        found = self._functions.slopes(self._shared, self._given(derivatives, near), DIRECTIONS)
+        found = self._functions.slopes(self._shared, self._inputs(derivatives, near), DIRECTIONS)
         beside = None if near.planes is None else self.clearances.slopes(derivatives, near.planes)
         return LimitSlopes(self, found.transpose(2, 1, 0), beside)
 
@@ -133,9 +133,9 @@ class LimitValues:
         """
         held = len(self._held)
         of_measures = weights[:, :held] @ self.measured, squares[:, :held] @ self._products
-        given = self._given(derivatives, near, *of_measures)
+        inputs = self._inputs(derivatives, near, *of_measures)
         second = (squares[:, :held][:, self.linear] @ self._path_products).reshape(-1, 18, 18)
-        second[:, 3:, 3:] += self._functions.curvature(self._shared, given, DIRECTIONS).transpose(2, 1, 0)
+        second[:, 3:, 3:] += self._functions.curvature(self._shared, inputs, DIRECTIONS).transpose(2, 1, 0)
         if near.planes is not None:
             beside = self.clearances.slopes(derivatives, near.planes).reshape(len(derivatives), -1, 18)
             second += np.swapaxes(beside, 1, 2) @ (squares[:, held:, None] * beside)
@@ -143,7 +143,7 @@ class LimitValues:
             second[:, 3 : 3 + MOVED, 3 : 3 + MOVED] += bent
         return second
 
-    def _given(self, derivatives: Array, near: Frames, *more: Array) -> Array:
+    def _inputs(self, derivatives: Array, near: Frames, *more: Array) -> Array:
         """Return the functions' inputs: velocity to crackle, body axes, then `more`, (m, 24 or more)."""
         motion = derivatives.reshape(-1, 18)[:, -MOTION:]
         return np.concatenate([motion, near.triads, *more], axis=1)

@@ -71,11 +71,11 @@ class RefinementProgram:
         Each multiplier is divided between the two nearest places of this program, linearly by distance.
         """
         before, places = multipliers.fractions, np.arange(self.fractions.shape[1])
-        at_places, others = np.split(multipliers.values, [before.size * self.counts.shape[-1]])
+        at_places, others = np.split(multipliers.values, [before.size * self.enforced.shape[-1]])
         pairs = zip(before, self.fractions, strict=True)
         numbers = np.array([np.interp(there, here, places) for there, here in pairs])
-        shares = np.maximum(1.0 - np.abs(numbers[:, None] - places[:, None]), 0.0)
-        spread = shares @ at_places.reshape(*before.shape, -1)
+        fractions = np.maximum(1.0 - np.abs(numbers[:, None] - places[:, None]), 0.0)
+        spread = fractions @ at_places.reshape(*before.shape, -1)
         return np.concatenate([spread.ravel(), others])
 
     @cached_property
@@ -92,18 +92,18 @@ class RefinementProgram:
         return self.limits.frames(np.minimum(times.ravel(), trajectory.duration), derivatives)
 
     @cached_property
-    def counts(self) -> Mask:
+    def enforced(self) -> Mask:
         """The mask of the constraints that are enforced, (S, p, c).
 
         Constraints that the fixed ends decide are left out there. Planes count only near obstacles.
         """
-        counts = np.ones((*self.fractions.shape, len(self.limits.sides)), dtype=bool)
-        counts[0, 0, self.limits.at_ends] = counts[-1, -1, self.limits.at_ends] = self._is_closed
+        enforced = np.ones((*self.fractions.shape, len(self.limits.sides)), dtype=bool)
+        enforced[0, 0, self.limits.at_ends] = enforced[-1, -1, self.limits.at_ends] = self._is_closed
         planes = self.near.planes
         if planes is not None:
-            near = np.isfinite(planes.offsets).reshape(*counts.shape[:2], -1)
-            counts[..., -near.shape[-1] :] &= near
-        return counts
+            near = np.isfinite(planes.offsets).reshape(*enforced.shape[:2], -1)
+            enforced[..., -near.shape[-1] :] &= near
+        return enforced
 
     @cached_property
     def weights(self) -> Array:
@@ -111,7 +111,7 @@ class RefinementProgram:
 
         So the back-off relative to these limits vanishes at the ends, which may lie on limits of the path.
         """
-        weights = np.where(self.counts, 1.0, 0.0)
+        weights = np.where(self.enforced, 1.0, 0.0)
         ends = () if self._is_closed else ((0, self.fractions[0]), (-1, 1.0 - self.fractions[-1]))
         for segment, inward in ends:
             faded = np.maximum(np.minimum(inward / FADED, 1.0) ** FADING, LEAST_FADED)
@@ -175,8 +175,8 @@ class RefinedPoint:
         """The values of the inequalities: limits at places, windows of stages, conditions of stages."""
         program = self.program
         values = program.limits.values(self._derivatives.reshape(-1, 6, 3), program.near)
-        values = values.reshape(program.counts.shape) * program.weights + program.backoff[:, None]
-        values[~program.counts] = LIMITED
+        values = values.reshape(program.enforced.shape) * program.weights + program.backoff[:, None]
+        values[~program.enforced] = LIMITED
         rows, bounds = program.windows
         windows = rows @ self._data.ratios - bounds
         return np.concatenate([values.ravel(), windows, program.stages.inequalities(self._at_stages)])
@@ -199,7 +199,7 @@ class RefinedPoint:
         windows = np.zeros((len(program.windows[1]), len(self.x)))
         windows[:, program.spline.ratio_columns] = program.windows[0] * self._data.ratios
         others = np.concatenate([windows, self._stage_rows(*self._stage_slopes)])
-        return RefinedRows(program, self._motion.slopes, limits, others)
+        return RefinedRows(program, self._motion.jacobian, limits, others)
 
     @cached_property
     def equality_rows(self) -> Array:
@@ -211,22 +211,22 @@ class RefinedPoint:
         if self.program.closure is not None:
             around = self.program.spline.motion(self._data, CLOSURE_PLACES)
             by_motion = self.program.closure.slopes(around.derivatives, self._data.durations)
-            by_local = np.einsum("spka,spkaK->sK", by_motion, around.slopes)
+            by_local = np.einsum("spka,spkaK->sK", by_motion, around.jacobian)
             found.append(self.program.spline.scattered(by_local)[None])
         return np.concatenate(found)
 
     def curvature(self, inequality_weights: Array, equality_weights: Array, squares: Array) -> Array:
         """Return the Hessian of the weighted constraints, plus Jᵀ diag(squares) J of inequalities, (n, n)."""
         program, spline = self.program, self.program.spline
-        segments, count, kinds = program.counts.shape
-        size, windows = program.counts.size, len(program.windows[1])
+        segments, count, kinds = program.enforced.shape
+        size, windows = program.enforced.size, len(program.windows[1])
         at_places, others = inequality_weights[:size], inequality_weights[size:]
         faded = program.weights.reshape(-1, kinds)
         weights = at_places.reshape(-1, kinds) * faded
         squared = squares[:size].reshape(-1, kinds) * faded**2
         derivatives = self._motion.derivatives.reshape(-1, 6, 3)
         second = program.limits.curvature(derivatives, program.near, weights, squared)
-        moving = self._motion.slopes.reshape(segments, count, 18, -1)
+        moving = self._motion.jacobian.reshape(segments, count, 18, -1)
         bent = (second.reshape(segments, count, 18, 18) @ moving).reshape(segments, count * 18, -1)
         blocks = np.swapaxes(moving.reshape(bent.shape), 1, 2) @ bent
         blocks += self._motion.curvature(self.rows.limits.weighted(weights).reshape(segments, count, 6, 3))
@@ -252,17 +252,17 @@ class RefinedPoint:
         blocks = self._ends.curvature(weights)
         second = stages.second_derivatives(self._at_stages, inequality_weights)
         for segment, each in zip(segments, second, strict=True):
-            slopes = self._ends.slopes[segment, 0, :KNOWN].reshape(STATE, -1)
-            blocks[segment] += slopes.T @ each @ slopes
+            jacobian = self._ends.jacobian[segment, 0, :KNOWN].reshape(STATE, -1)
+            blocks[segment] += jacobian.T @ each @ jacobian
         return blocks
 
     def _stage_rows(self, at: Indices, weights: Array) -> Array:
         """Return gradients (q, n) of Σ weights · derivatives, with weights (q, 6, 3) at the stages (q,)."""
         spline = self.program.spline
         segments = np.array(self.program.stage_segments, dtype=np.intp)[at]
-        slopes = self._ends.slopes[segments, 0].reshape(len(at), 18, spline.columns.shape[1])
+        jacobian = self._ends.jacobian[segments, 0].reshape(len(at), 18, spline.columns.shape[1])
         rows = np.zeros((len(at), spline.size + 1))
-        by_local = (weights.reshape(len(at), 1, 18) @ slopes)[:, 0]
+        by_local = (weights.reshape(len(at), 1, 18) @ jacobian)[:, 0]
         rows[np.arange(len(at))[:, None], spline.columns[segments]] = by_local
         return rows[:, :-1]
 
@@ -302,7 +302,7 @@ class RefinedRows:
     """
 
     program: RefinementProgram
-    motion: Array  # slopes of the derivatives by each segment's local variables, (S, p, 6, 3, K + 2)
+    motion: Array  # Jacobian of the derivatives by each segment's local variables, (S, p, 6, 3, K + 2)
     limits: LimitSlopes
     others: Array  # dense rows, (q, n)
 
@@ -314,14 +314,14 @@ class RefinedRows:
 
     def transposed(self, weights: Array) -> Array:
         """Return the product of the transposed Jacobian and weights, (n,)."""
-        counts = self.program.counts
-        at_places, others = weights[: counts.size], weights[counts.size :]
+        enforced = self.program.enforced
+        at_places, others = weights[: enforced.size], weights[enforced.size :]
         at_places = at_places * self.program.weights.ravel()
-        by_motion = self.limits.weighted(at_places.reshape(-1, counts.shape[-1]))
-        parts = np.swapaxes(self._flat, 1, 2) @ by_motion.reshape(len(counts), -1, 1)
+        by_motion = self.limits.weighted(at_places.reshape(-1, enforced.shape[-1]))
+        parts = np.swapaxes(self._flat, 1, 2) @ by_motion.reshape(len(enforced), -1, 1)
         return self.program.spline.scattered(parts[..., 0]) + self.others.T @ others
 
     @property
     def _flat(self) -> Array:
-        """The motion's slopes as one matrix a segment, (S, 18 p, K + 2)."""
+        """The motion's Jacobian as one matrix a segment, (S, 18 p, K + 2)."""
         return self.motion.reshape(len(self.motion), -1, self.motion.shape[-1])

@@ -29,11 +29,11 @@ from aerobat.planning.courses import is_course
 from aerobat.planning.gate_clearance import bodies_in_gates, is_clear
 from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.refinement.excess import INWARD, JUST_INSIDE, Excess, chebyshev
 from aerobat.planning.refinement.limit_values import LimitValues
 from aerobat.planning.refinement.program import Multipliers, RefinementProgram
 from aerobat.planning.refinement.spline import END_ORDER, Spline
 from aerobat.planning.refinement.stage_values import StageValues
+from aerobat.planning.refinement.violation import INWARD, JUST_INSIDE, ConstraintViolation, chebyshev
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
@@ -50,13 +50,13 @@ ROUGH = Settings(barrier=1e-6, least_slack=1e-3)  # of the rough rounds after th
 FINE = Settings(
     barrier=1e-6, least_slack=1e-3, damping=1e-2, iterations=30, tolerance=1e-5, violation=5e-5, gain=2e-4
 )
-# Settings for `Refinement.close`. A barrier costs about its parameter times the number of limits at places:
-# with the ten thousand of a course, 1 % of the duration. Fine rounds must not begin with a larger barrier
-# parameter than rough rounds end with: paths would move away from the limits again.
-CLOSE_ROUGH = Settings(
+# Settings for `Refinement.high_accuracy`. A barrier costs about its parameter times the number of limits at
+# places: with the ten thousand of a course, 1 % of the duration. Fine rounds must not begin with a larger
+# barrier parameter than rough rounds end with: paths would move away from the limits again.
+ACCURATE_ROUGH = Settings(
     barrier=1e-6, least_barrier=1e-7, least_slack=1e-3, iterations=100, tolerance=1e-6, gain=1e-4
 )
-CLOSE_FINE = Settings(
+ACCURATE_FINE = Settings(
     barrier=1e-8,
     least_barrier=1e-8,
     least_slack=1e-3,
@@ -69,36 +69,41 @@ CLOSE_FINE = Settings(
 ROUGH_ROUNDS = 8  # largest number of rough rounds
 FINE_ROUNDS = 16  # largest number of fine rounds before a path is certified
 MORE_ROUNDS = 1  # further series of fine rounds, each from the last certified path
-SPREADS = 4  # most redistributions of knots: plans of 60 random problems get 1.2 % shorter on average
-ROUGH_SHARE = 0.5  # fraction of the remaining time for rough rounds; the rest is for certification
+REDISTRIBUTIONS = 4  # most redistributions of knots: plans of 60 random problems get 1.2 % shorter on average
+ROUGH_TIME_FRACTION = 0.5  # fraction of the remaining time for rough rounds; the rest is for certification
 PLACES = 16  # places of a segment in the first round: with 12, finding the peaks between them does not help
 MORE_PLACES = 1.5  # factor on PLACES where rotors have no lag and their thrusts may jump
 LOSS = 0.02  # increase of duration by certification, relative, from which twice as many segments are tried
 LITTLE_GAIN = 0.005  # relative decrease of duration below which rough rounds end
-SETTLED = 0.1  # constraint violation, relative to the limit's size, above which rough rounds continue
-BEHIND = 0.02  # relative excess over a known path's duration at which a slower path is given up
-RADIUS = 2.0  # half the width of the box (trust region) of scaled derivatives in the first round
-SHRINK = 1.5  # factor by which RADIUS shrinks from one rough round to the next
-LEAST_RADIUS = 1.0  # lower bound of the shrinking RADIUS
+# constraint violation, relative to the limit's size, above which rough rounds continue
+CONVERGED_VIOLATION = 0.1
+DURATION_CUTOFF = 0.02  # relative excess over a known path's duration at which a slower path is given up
+TRUST_RADIUS = 2.0  # half the width of the box (trust region) of scaled derivatives in the first round
+SHRINK = 1.5  # factor by which TRUST_RADIUS shrinks from one rough round to the next
+MIN_TRUST_RADIUS = 1.0  # lower bound of the shrinking TRUST_RADIUS
 STRETCH = 1.6  # factor by which segment durations may change in one round
 BACKOFF = 1e-4  # initial tightening of all limits at places, relative to their sizes
 MAX_BACKOFF = 0.03  # largest tightening that one round adds, as large violations move elsewhere
 # Constraint violation, relative to the limit's size, above which each segment gets one more place at its
-# peak, and limits are tightened less (BESIDE_PEAKS). Plans of 27 random problems get 1.4 % shorter on average
-# by that, in four fifths of the time.
-PEAKED = 1e-3
-PEAKS = 8  # largest number of places added to a segment; later rounds tighten by the full amount instead
-APART = 0.25  # least distance of an added place from its neighbours, as a fraction of the gap between them
-BESIDE_PEAKS = 0.1  # factor on the tightening in rounds that add places
-STILL = 0.02  # relative change of duration and of violation below which rounds have stalled
-MORE_BACKOFF = 1.3  # factor on violations that gives the tightening of fine rounds
-FINE_BACKOFF = 2e-4  # constant added to that tightening, relative to the limit's size
+# peak, and limits are tightened less (REDUCED_BACKOFF). Plans of 27 random problems get 1.4 % shorter on
+# average by that, in four fifths of the time.
+PEAK_VIOLATION = 1e-3
+# largest number of places added to a segment; later rounds tighten by the full amount instead
+MAX_ADDED_PLACES = 8
+# least distance of an added place from its neighbours, as a fraction of the gap between them
+MIN_SPACING = 0.25
+REDUCED_BACKOFF = 0.1  # factor on the tightening in rounds that add places
+MIN_PROGRESS = 0.02  # relative change of duration and of violation below which rounds have stalled
+BACKOFF_FACTOR = 1.3  # factor on violations that gives the tightening of fine rounds
+BACKOFF_OFFSET = 2e-4  # constant added to that tightening, relative to the limit's size
 # Distance from the tightened limit, relative to the limit's size, within which a certificate may find a
 # violation that dense samples miss.
-NEARLY_EXCEEDED = 2e-3
-MENDABLE = 0.5  # largest constraint violation, relative to the limit's size, that further rounds may repair
+NEAR_LIMIT = 2e-3
+# largest constraint violation, relative to the limit's size, that further rounds may repair
+REPAIRABLE_VIOLATION = 0.5
 RELATIVE_STAGE_TOLERANCE = 1e-5  # violation of a stage's condition, relative to its size, that is rounding
-NEARLY_MISSED = 0.02  # violation of a stage's condition, relative to its size, that further rounds may repair
+# largest violation of a stage's condition, relative to its size, that further rounds may repair
+REPAIRABLE_MISS = 0.02
 NEWTON_STEPS = 3  # Newton steps that satisfy the equality constraints exactly after a solve
 CONVERGED = "locally optimal"  # the status of a converged solution
 
@@ -108,7 +113,7 @@ class RefinedPath:
     """A path with its stages and its constraint violations."""
 
     path: WarmStart
-    excess: Excess  # constraint violations on dense samples
+    violation: ConstraintViolation  # constraint violations on dense samples
     multipliers: Multipliers | None = None  # of the last program's inequalities
     certified: Judged[RefinedPath] | None = None  # the shortest certified path of the rough rounds up to here
 
@@ -128,11 +133,12 @@ class Refinement:
     recorder: Recorder
     in_gates: tuple[BodyInGate, ...] = ()  # room of the body in the gates that stages cross
     still_ends: bool = False  # whether the jerk is zero at the ends
-    close: bool = False  # whether solves are more accurate: within 0.1 % of the local optimum
-    grows: bool = False  # whether paths get twice as many segments where certification costs more than LOSS
+    high_accuracy: bool = False  # whether solves are more accurate: within 0.1 % of the local optimum
+    # whether paths get twice as many segments where certification costs more than LOSS
+    adds_segments: bool = False
     # whether a path that misses a stage with few segments is given up: more segments take several times as
     # long, mostly in vain. For planners that have other starts.
-    hasty: bool = False
+    gives_up_early: bool = False
     _known: dict[tuple[Stage, ...], StageValues] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -149,7 +155,7 @@ class Refinement:
     @property
     def settings(self) -> tuple[Settings, Settings]:
         """The interior point settings of rough rounds after the first, and of fine rounds."""
-        return (CLOSE_ROUGH, CLOSE_FINE) if self.close else (ROUGH, FINE)
+        return (ACCURATE_ROUGH, ACCURATE_FINE) if self.high_accuracy else (ROUGH, FINE)
 
     @cached_property
     def limits(self) -> LimitValues:
@@ -198,7 +204,7 @@ class Refinement:
             known: The duration [s] of a known path. A path that stays much slower is given up early.
         """
         number = min(segments, max(SEGMENTS, len(guess.phases)))
-        with within_share(ROUGH_SHARE):
+        with within_share(ROUGH_TIME_FRACTION):
             return self.finer(self._rough(knots_at_stages(guess, number), known), segments, known)
 
     def finer(self, found: RefinedPath, segments: int, known: float = np.inf) -> RefinedPath:
@@ -213,13 +219,13 @@ class Refinement:
         while number < segments and not out_of_time() and not self._gives_up(found):
             number = min(2 * number, segments)
             found = self._rough(knots_at_stages(found.path, number), known, found.certified)
-        return self._spread_anew(found, known)
+        return self._redistribute_knots(found, known)
 
-    def _spread_anew(self, found: RefinedPath, known: float) -> RefinedPath:
+    def _redistribute_knots(self, found: RefinedPath, known: float) -> RefinedPath:
         """Redistribute the knots evenly between stages and solve again, as long as the duration falls."""
-        for _ in range(SPREADS):
+        for _ in range(REDISTRIBUTIONS):
             duration = found.path.trajectory.duration
-            if out_of_time() or not self.is_promising(found) or duration > (1.0 + BEHIND) * known:
+            if out_of_time() or not self.is_promising(found) or duration > (1.0 + DURATION_CUTOFF) * known:
                 break
             spread = knots_at_stages(found.path, found.path.trajectory.segments)
             again = self._rough(spread, duration, found.certified, found.multipliers)
@@ -247,13 +253,14 @@ class Refinement:
             solution = rounds.solve()
             certified = _shortest(certified, judge(solution, self.task, self.recorder))
             duration = solution.duration
-            is_settled = number and solution.source.excess.largest < SETTLED
-            gains_little = is_settled and duration > (1.0 - LITTLE_GAIN) * before
-            is_over = gains_little or duration > (1.0 + BEHIND) * known or rounds.is_stuck(solution)
+            has_converged = number and solution.source.violation.largest < CONVERGED_VIOLATION
+            gains_little = has_converged and duration > (1.0 - LITTLE_GAIN) * before
+            is_slow = duration > (1.0 + DURATION_CUTOFF) * known
+            is_over = gains_little or is_slow or rounds.has_stalled(solution)
             if is_over or out_of_time() or not self.is_promising(solution.source):
                 break
             before = duration
-            rounds.go_on(solution.source)
+            rounds.recenter(solution.source)
         return replace(solution.source, certified=certified)
 
     def finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
@@ -261,17 +268,17 @@ class Refinement:
 
         Where the duration has not converged, another series of fine rounds begins at the certified path.
         """
-        judged = self._finished(rough)
+        judged = self._fine_rounds(rough)
         judged = _shortest(judged, rough.certified) or judged
         for _ in range(MORE_ROUNDS):
             solution = judged.solution
             if not judged.feasible or solution.status == CONVERGED or out_of_time():
                 break
-            again = self._finished(solution.source)
+            again = self._fine_rounds(solution.source)
             if not again.feasible or again.solution.duration >= solution.duration:
                 break
             judged = again
-        return self._with_more_segments(rough, judged) if self.grows else judged
+        return self._with_more_segments(rough, judged) if self.adds_segments else judged
 
     def _with_more_segments(self, rough: RefinedPath, found: Judged[RefinedPath]) -> Judged[RefinedPath]:
         """Return the certified path, or a shorter certified path with twice as many segments.
@@ -286,32 +293,32 @@ class Refinement:
         finer = self.finer(rough, min(2 * path.segments, MAX_SEGMENTS), duration)
         if not self.is_promising(finer) or finer.path.trajectory.duration >= duration:
             return found
-        judged = replace(self, grows=False).finished(finer)
+        judged = replace(self, adds_segments=False).finished(finer)
         is_better = judged.feasible and judged.solution.duration < duration and is_clear(judged.frames)
         return judged if is_better else found
 
-    def _finished(self, rough: RefinedPath) -> Judged[RefinedPath]:
+    def _fine_rounds(self, rough: RefinedPath) -> Judged[RefinedPath]:
         """Run one series of fine rounds; return the certified path, or the last path tried."""
         _, fine = self.settings
-        rounds = Rounds(self, rough.path, fine, radius=LEAST_RADIUS, multipliers=rough.multipliers)
-        rounds.back_off(rough.excess)
+        rounds = Rounds(self, rough.path, fine, radius=MIN_TRUST_RADIUS, multipliers=rough.multipliers)
+        rounds.back_off(rough.violation)
         return certified_solve(rounds, self.task, self.recorder, FINE_ROUNDS)
 
     def is_promising(self, path: RefinedPath) -> bool:
         """Return whether further rounds may repair a path's constraint violations and missed stages."""
-        return path.excess.largest <= MENDABLE and self._nearly_meets_stages(path)
+        return path.violation.largest <= REPAIRABLE_VIOLATION and self._nearly_meets_stages(path)
 
     def _gives_up(self, path: RefinedPath) -> bool:
-        """Return whether a hasty refinement gives a path up before it has the requested segments."""
-        return self.hasty and not self._nearly_meets_stages(path)
+        """Return whether the refinement gives a path up early, before it has the requested segments."""
+        return self.gives_up_early and not self._nearly_meets_stages(path)
 
     def _nearly_meets_stages(self, path: RefinedPath) -> bool:
         """Return whether a path misses no stage by more than further rounds may repair."""
-        return self._missed_stage(path.path, NEARLY_MISSED) is None
+        return self._missed_stage(path.path, REPAIRABLE_MISS) is None
 
     def path(self, guess: WarmStart) -> RefinedPath:
         """Return a path with its constraint violations on dense samples."""
-        return RefinedPath(guess, Excess.of(guess.trajectory, self.limits))
+        return RefinedPath(guess, ConstraintViolation.of(guess.trajectory, self.limits))
 
     def solution(
         self, path: RefinedPath, status: str, iterations: int = 0, time: float = 0.0
@@ -324,10 +331,11 @@ class Refinement:
             iterations: The solver's iterations.
             time: The solver's time [s].
         """
-        trajectory, excess = path.path.trajectory, path.excess
+        trajectory, violation = path.path.trajectory, path.violation
         failure = self._missed_stage(path.path)
-        if failure is None and not excess.holds:
-            failure = Reason(f"{excess.reason}{path.path.leg_at(excess.place[1])}", excess.reason.limits)
+        if failure is None and not violation.holds:
+            reason, leg = violation.reason, path.path.leg_at(violation.place[1])
+            failure = Reason(f"{reason}{leg}", reason.limits)
         return Solution(
             source=path,
             duration=trajectory.duration,
@@ -377,7 +385,7 @@ class Rounds:
         guess: WarmStart,
         settings: Settings = FIRST,
         places: int = PLACES,
-        radius: float = RADIUS,
+        radius: float = TRUST_RADIUS,
         multipliers: Multipliers | None = None,
         stretch: float = STRETCH,
     ) -> None:
@@ -385,9 +393,9 @@ class Rounds:
         self._refinement, self._guess, self._settings = refinement, guess, settings
         jumps = not refinement.task.vehicle.lags.any()
         fractions = chebyshev(round(places * (MORE_PLACES if jumps else 1.0)))
-        begun = np.tile(fractions, (guess.trajectory.segments, 1))
-        self._fractions = begun if multipliers is None else multipliers.fractions
-        self._most_places, self._exceeded = self._fractions.shape[1] + PEAKS, np.inf
+        initial = np.tile(fractions, (guess.trajectory.segments, 1))
+        self._fractions = initial if multipliers is None else multipliers.fractions
+        self._max_places, self._last_violation = self._fractions.shape[1] + MAX_ADDED_PLACES, np.inf
         self._radius, self._stretch = radius, stretch
         trajectory = guess.trajectory
         self._segments = tuple(_segment_that_ends(trajectory, time) for time in guess.times)
@@ -402,13 +410,13 @@ class Rounds:
         known = None if self._multipliers is None else program.at_its_places(self._multipliers)
         answer = interior_point(program, program.spline.start, self._settings, known)
         self._multipliers = Multipliers(answer.z, program.fractions)
-        x = _meeting_stages(program, answer)
+        x = _with_exact_equalities(program, answer)
         trajectory = program.spline.trajectory(x)
         times = tuple(float(trajectory.knots[segment + 1]) for segment in self._segments)
         found = refinement.path(replace(self._guess, trajectory=trajectory, times=times))
         path = replace(found, multipliers=self._multipliers)
-        stands_still = abs(trajectory.duration / self._guess.trajectory.duration - 1.0) < LITTLE_GAIN
-        status = CONVERGED if answer.converged or stands_still else "unknown"
+        is_unchanged = abs(trajectory.duration / self._guess.trajectory.duration - 1.0) < LITTLE_GAIN
+        status = CONVERGED if answer.converged or is_unchanged else "unknown"
         return refinement.solution(path, status, answer.iterations, perf_counter() - began)
 
     def tighten(self, solution: Solution[RefinedPath], certificate: Certificate | None) -> bool:
@@ -416,48 +424,49 @@ class Rounds:
 
         Return False where further rounds lead nowhere.
         """
-        excess = solution.source.excess
-        if out_of_time() or self.is_stuck(solution) or not self._refinement.is_promising(solution.source):
+        violation = solution.source.violation
+        if out_of_time() or self.has_stalled(solution) or not self._refinement.is_promising(solution.source):
             return False
-        self.back_off(excess, MORE_BACKOFF, FINE_BACKOFF)
+        self.back_off(violation, BACKOFF_FACTOR, BACKOFF_OFFSET)
         if certificate is not None:
             refuted, times = _refuted(certificate, self._refinement.task.reserve)
-            self._hold_at(_with_times(excess.peaks, solution.source.path.trajectory, times))
+            self._add_places(_with_times(violation.peaks, solution.source.path.trajectory, times))
             kept = self._backoff - self._refinement.limits.reserve
-            is_near = excess.nearby + kept > -NEARLY_EXCEEDED
-            self._backoff += (MORE_BACKOFF * refuted + FINE_BACKOFF) * is_near
+            is_near = violation.nearby + kept > -NEAR_LIMIT
+            self._backoff += (BACKOFF_FACTOR * refuted + BACKOFF_OFFSET) * is_near
         self._guess = solution.source.path
         return True
 
-    def is_stuck(self, solution: Solution[RefinedPath]) -> bool:
+    def has_stalled(self, solution: Solution[RefinedPath]) -> bool:
         """Return whether rounds have stalled: large violation, hardly changed, in the same duration."""
-        excess = solution.source.excess.largest
-        pairs = (solution.duration, self._guess.trajectory.duration), (excess, self._exceeded)
-        return excess > SETTLED and all(abs(new - old) < STILL * old for new, old in pairs)
+        violation = solution.source.violation.largest
+        pairs = (solution.duration, self._guess.trajectory.duration), (violation, self._last_violation)
+        is_unchanged = all(abs(new - old) < MIN_PROGRESS * old for new, old in pairs)
+        return violation > CONVERGED_VIOLATION and is_unchanged
 
-    def go_on(self, path: RefinedPath) -> None:
+    def recenter(self, path: RefinedPath) -> None:
         """Make a path the next guess, shrink the box and tighten limits where the path violates them."""
         self._guess, (self._settings, _) = path.path, self._refinement.settings
-        self._radius = max(self._radius / SHRINK, LEAST_RADIUS)
-        self.back_off(path.excess)
+        self._radius = max(self._radius / SHRINK, MIN_TRUST_RADIUS)
+        self.back_off(path.violation)
 
-    def back_off(self, excess: Excess, factor: float = 1.0, more: float = 0.0) -> None:
+    def back_off(self, violation: ConstraintViolation, factor: float = 1.0, more: float = 0.0) -> None:
         """Add a place at each segment's largest violation, and tighten limits where they are violated.
 
         Args:
-            excess: The violations of the last path.
+            violation: The violations of the last path.
             factor: Tightening per violation.
             more: Constant that is added where a limit is violated, as a fraction of the limit's size.
         """
-        exceeded = np.clip(excess.nearby, 0.0, MAX_BACKOFF)
-        if excess.largest > PEAKED and self._hold_at(excess.peaks):
-            factor *= BESIDE_PEAKS
-        self._exceeded = excess.largest
+        exceeded = np.clip(violation.nearby, 0.0, MAX_BACKOFF)
+        if violation.largest > PEAK_VIOLATION and self._add_places(violation.peaks):
+            factor *= REDUCED_BACKOFF
+        self._last_violation = violation.largest
         self._backoff += factor * exceeded + more * (exceeded > 0.0)
 
-    def _hold_at(self, peaks: Array) -> bool:
+    def _add_places(self, peaks: Array) -> bool:
         """Add one place to each segment, near `peaks` (S,); return False where segments have too many."""
-        if self._fractions.shape[1] >= self._most_places:
+        if self._fractions.shape[1] >= self._max_places:
             return False
         held = np.array([_between(row, peak) for row, peak in zip(self._fractions, peaks, strict=True)])
         self._fractions = np.sort(np.concatenate([self._fractions, held[:, None]], axis=1), axis=1)
@@ -501,7 +510,7 @@ def _between(places: Array, peak: float) -> float:
     """Return the fraction nearest to a peak that keeps its distance from sorted places."""
     after = int(np.searchsorted(places[1:-1], peak, side="right")) + 1
     before, gap = places[after - 1], places[after] - places[after - 1]
-    return float(np.clip(peak, before + APART * gap, before + (1.0 - APART) * gap))
+    return float(np.clip(peak, before + MIN_SPACING * gap, before + (1.0 - MIN_SPACING) * gap))
 
 
 def _with_times(peaks: Array, trajectory: Trajectory, times: Sequence[float]) -> Array:
@@ -534,14 +543,14 @@ def knots_at_stages(path: WarmStart, segments: int) -> WarmStart:
     return replace(path, trajectory=trajectory)
 
 
-def segments_for(sequence: StageSequence, asked: int = SEGMENTS) -> int:
-    """Return the number of a path's segments: `asked`, or one a leg if more, or LEG_SEGMENTS on a course."""
+def segments_for(sequence: StageSequence, requested: int = SEGMENTS) -> int:
+    """Return the number of a path's segments: `requested`, at least one a leg, LEG_SEGMENTS on a course."""
     legs = len(sequence.stages) + 1
-    wanted = max(asked, LEG_SEGMENTS * legs) if is_course(sequence) else asked
+    wanted = max(requested, LEG_SEGMENTS * legs) if is_course(sequence) else requested
     return min(max(wanted, legs), MAX_SEGMENTS)
 
 
-def _meeting_stages(program: RefinementProgram, answer: InteriorPointResult) -> Array:
+def _with_exact_equalities(program: RefinementProgram, answer: InteriorPointResult) -> Array:
     """Return an answer after Newton steps (least norm) that satisfy the equality constraints exactly."""
     x = answer.x
     for _ in range(NEWTON_STEPS):

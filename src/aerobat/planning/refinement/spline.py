@@ -67,13 +67,13 @@ class KnotData(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Derivatives of position at places of all segments, with their slopes by the variables.
+    """Derivatives of position at places of all segments, with their Jacobian by the variables.
 
     A segment's local variables are the K variables of its two knots, its ln τ, and ln h.
     """
 
     derivatives: Array  # of position, (S, p, 6, 3)
-    slopes: Array  # of the derivatives by local variables, (S, p, 6, 3, K + 2)
+    jacobian: Array  # of the derivatives by local variables, (S, p, 6, 3, K + 2)
     _scaled: Array  # T^-k B, (S, 6 p, 10)
     _data: KnotData
     _effect: Array  # slopes of Z by local variables, (S, 10, 3, K)
@@ -107,6 +107,23 @@ class Motion:
         return found
 
 
+class _Variable(NamedTuple):
+    """A variable's place in the knot data; data that two segments share have one column and two places."""
+
+    segment: int
+    row: int  # of the segment's data, (10,)
+    direction: Array  # of the derivative that it changes, (3,)
+    column: int  # its index among the variables
+
+
+class _Layout(NamedTuple):
+    """The order of the variables."""
+
+    free: list[_Variable]  # the scaled derivatives at knots
+    ratio_columns: list[int]  # the indices of ln τ
+    mean_column: int  # the index of ln h
+
+
 @dataclass(frozen=True, eq=False)
 class Spline:
     """The free variables of a piecewise polynomial path, and the path at which an optimization starts.
@@ -119,18 +136,18 @@ class Spline:
     """
 
     task: Task
-    begun: Trajectory  # the path at the start, of degree 9
+    initial: Trajectory  # the path at the start, of degree 9
     still_ends: bool = False  # whether the jerk is zero at the ends
 
     @property
     def segments(self) -> int:
         """The number S of segments."""
-        return self.begun.segments
+        return self.initial.segments
 
     @cached_property
     def mean_duration(self) -> float:
         """The mean segment duration h of the path at the start [s]."""
-        return self.begun.duration / self.segments
+        return self.initial.duration / self.segments
 
     @cached_property
     def size(self) -> int:
@@ -140,12 +157,12 @@ class Spline:
     @property
     def mean_column(self) -> int:
         """The index of the variable ln h."""
-        return self._layout[2]
+        return self._layout.mean_column
 
     @cached_property
     def ratio_columns(self) -> Indices:
         """The indices of the variables ln τ, (S,)."""
-        return np.array(self._layout[1], dtype=np.intp)
+        return np.array(self._layout.ratio_columns, dtype=np.intp)
 
     @property
     def columns(self) -> Indices:
@@ -156,11 +173,11 @@ class Spline:
     def start(self) -> Array:
         """The variables of the path at the start, (n,)."""
         x = np.zeros(self.size)
-        for segment, row, direction, column in self._layout[0]:
+        for segment, row, direction, column in self._layout.free:
             order = row % END_ORDER
             offset = direction @ (self._ends[segment, row] - self._fixed_data[segment, row])
             x[column] = offset * self.mean_duration**order / self._sizes[order]
-        x[self.ratio_columns] = np.log(self.begun.durations / self.mean_duration)
+        x[self.ratio_columns] = np.log(self.initial.durations / self.mean_duration)
         x[self.mean_column] = log(self.mean_duration)
         return x
 
@@ -180,15 +197,15 @@ class Spline:
         return KnotData((ratios[:, None] ** ORDERS)[..., None] * moved + fixed, fixed, ratios, durations)
 
     def motion(self, data: KnotData, places: Array) -> Motion:
-        """Return the derivatives at places, as `KnotData.derivatives` does, with their slopes."""
+        """Return the derivatives at places, as `KnotData.derivatives` does, with their Jacobian."""
         segments, scaled = self.segments, data.scaled(places)
         derivatives = (scaled @ data.values).reshape(segments, -1, DERIVATIVES, 3)
         effect = (data.ratios[:, None] ** ORDERS)[..., None, None] * self._arranged[1]
         by_durations = np.stack([ORDERS[:, None] * each for each in (data.values, data.fixed)], axis=-1)
         moved = np.concatenate([effect, by_durations], axis=-1)
-        slopes = (scaled @ moved.reshape(segments, 2 * END_ORDER, -1)).reshape(*derivatives.shape, -1)
-        slopes[..., -2:] -= (POWERS * derivatives)[..., None]
-        return Motion(derivatives, slopes, scaled, data, effect)
+        jacobian = (scaled @ moved.reshape(segments, 2 * END_ORDER, -1)).reshape(*derivatives.shape, -1)
+        jacobian[..., -2:] -= (POWERS * derivatives)[..., None]
+        return Motion(derivatives, jacobian, scaled, data, effect)
 
     def gathered(self, step: Array) -> Array:
         """Return each segment's local part (S, K + 2) of a step (n,)."""
@@ -228,7 +245,7 @@ class Spline:
 
         Derivatives that neighbours share are the mean of both sides.
         """
-        ends = np.stack([self.begun.on_segments([0.0, 1.0], k) for k in range(END_ORDER)], axis=2)
+        ends = np.stack([self.initial.on_segments([0.0, 1.0], k) for k in range(END_ORDER)], axis=2)
         for before, after, shared in self._joints:
             met = (ends[after, 0, :shared] + ends[before, 1, :shared]) / 2.0
             ends[after, 0, :shared] = ends[before, 1, :shared] = met
@@ -274,15 +291,15 @@ class Spline:
         return np.asarray(thrust / np.linalg.norm(thrust))
 
     @cached_property
-    def _layout(self) -> tuple[list[tuple[int, int, Array, int]], list[int], int]:
-        """The segment, row, direction and column of all free data; the columns of ln τ; that of ln h."""
-        moved: list[tuple[int, int, Array, int]] = []
+    def _layout(self) -> _Layout:
+        """The order of the variables."""
+        free: list[_Variable] = []
         ratios: list[int] = []
         count = 0
 
         def add(direction: Array, *where: tuple[int, int]) -> None:
             nonlocal count
-            moved.extend((segment, row, direction, count) for segment, row in where)
+            free.extend(_Variable(segment, row, direction, count) for segment, row in where)
             count += 1
 
         start, goal = self._end_states or ((), ())
@@ -300,7 +317,7 @@ class Spline:
                         add(axis, *where)
         for direction, *where in self._end_variables(*goal) if goal else ():
             add(direction, *where)
-        return moved, ratios, count
+        return _Layout(free, ratios, count)
 
     def _end_variables(
         self, segment: int, first: int, state: EndState
@@ -327,14 +344,14 @@ class Spline:
     @cached_property
     def _arranged(self) -> tuple[Indices, Array]:
         """`columns`, and the slopes of each segment's data by its local variables, (S, 10, 3, K)."""
-        moved, ratios, mean = self._layout
+        free, ratios, mean = self._layout
         local: list[dict[int, int]] = [{} for _ in range(self.segments)]
-        for segment, _, _, column in moved:
+        for segment, _, _, column in free:
             local[segment].setdefault(column, len(local[segment]))
         widest = max(map(len, local))
         columns = np.full((self.segments, widest + 2), mean + 1, dtype=np.intp)
         effect = np.zeros((self.segments, 2 * END_ORDER, 3, widest))
-        for segment, row, direction, column in moved:
+        for segment, row, direction, column in free:
             place = local[segment][column]
             columns[segment, place] = column
             effect[segment, row, :, place] += direction * self._sizes[row % END_ORDER]

@@ -24,7 +24,7 @@ from aerobat.problem.stage import Stage
 KNOWN = 3  # number of derivatives that stages constrain: position, velocity, acceleration
 STATE = 3 * KNOWN  # number of their components
 DIRECTIONS = np.eye(STATE)
-BALL_SHARE = 1.0 - 1e-5  # fraction of a ball's squared radius that is used; the rest allows for rounding
+BALL_FRACTION = 1.0 - 1e-5  # fraction of a ball's squared radius that is used; the rest allows for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +42,9 @@ class StageValues:
     def inequalities(self, derivatives: Array) -> Array:
         """Return the values of the inequalities, (q,)."""
         linear = self._unequal.values(derivatives)
-        balls = [float(offset @ offset) - BALL_SHARE for _, offset, _ in self._in_balls(derivatives)]
+        balls = [float(offset @ offset) - BALL_FRACTION for _, offset, _ in self._in_balls(derivatives)]
         rooms = [
-            room.scale * room.functions.values(*room.given(derivatives), NO_DIRECTION)[0, :, 0]
+            room.scale * room.functions.values(*room.inputs(derivatives), NO_DIRECTION)[0, :, 0]
             for room in self._rooms
         ]
         return np.concatenate([linear, balls, *rooms])
@@ -70,7 +70,7 @@ class StageValues:
             slopes.append(np.zeros((6, 3)))
             slopes[-1][0] = 2.0 * offset / radius
         for room in self._rooms:
-            found = room.functions.slopes(*room.given(derivatives), DIRECTIONS)[..., 0].T
+            found = room.functions.slopes(*room.inputs(derivatives), DIRECTIONS)[..., 0].T
             for value in room.scale[:, None] * found:
                 stages.append(room.stage)
                 slopes.append(np.zeros((6, 3)))
@@ -93,7 +93,7 @@ class StageValues:
             first += 1
         for room in self._rooms:
             own = room.scale * weights[first : first + len(room.scale)]
-            found[room.stage] += room.functions.curvature(*room.given(derivatives, own), DIRECTIONS)[..., 0]
+            found[room.stage] += room.functions.curvature(*room.inputs(derivatives, own), DIRECTIONS)[..., 0]
             first += len(room.scale)
         return found
 
@@ -164,7 +164,7 @@ class _Room(NamedTuple):
     shared: Array  # parameters of body, balance and opening, in the functions' order
     scale: Array  # factors on the values, (2 K + 1,)
 
-    def given(self, derivatives: Array, *more: Array) -> tuple[Array, Array]:
+    def inputs(self, derivatives: Array, *more: Array) -> tuple[Array, Array]:
         """Return the functions' inputs: the shared parameters; the state at the stage, then `more`."""
         state = derivatives[self.stage, :KNOWN].ravel()
         return self.shared, np.concatenate([state, *more])[None]

@@ -13,14 +13,14 @@ from aerobat.planning.refinement.limit_values import LimitValues
 from aerobat.planning.refinement.spline import DERIVATIVES
 from aerobat.trajectory import Trajectory
 
-LOOKED_AT = 64  # samples of a segment
+SAMPLES = 64  # samples of a segment
 JUST_INSIDE = 1e-9  # distance of samples from knots, as a fraction of a segment, to stay in that segment
 INWARD = 0.02  # fraction of a segment at either end without peaks: places are dense there, motion is slow
 NEGLIGIBLE = 1e-9  # constraint violation, relative to the limit's size, that counts as none
 
 
 @dataclass(frozen=True, eq=False)
-class Excess:
+class ConstraintViolation:
     """The largest constraint values of a path, as fractions of their limits' sizes; negative: satisfied."""
 
     worst: Array  # largest value of each constraint in each segment, (S, c)
@@ -29,7 +29,7 @@ class Excess:
     peaks: Array  # fraction of each segment with its largest value, without samples near the ends, (S,)
 
     @classmethod
-    def of(cls, trajectory: Trajectory, limits: LimitValues, places: int = LOOKED_AT) -> Excess:
+    def of(cls, trajectory: Trajectory, limits: LimitValues, places: int = SAMPLES) -> ConstraintViolation:
         """Return the constraint violations along a trajectory, the reserve included.
 
         Args:
