@@ -35,12 +35,12 @@ _MIN_SLACK_FRACTION = 0.1  # smallest fraction of a slack that a step leaves
 _BARRIER_SOLVED = 10.0  # μ is decreased when the error of the barrier problem is below this multiple of μ
 _BARRIER_FALL = 0.2  # factor of μ at each decrease
 _BARRIER_POWER = 1.5  # exponent of μ at each decrease; the smaller of the two results is used
-_GROWTH = 4.0  # factor of δ where the matrix is not positive definite or a step is shortened
-_SHRINK = 3.0  # divisor of δ after a whole step
-_JUMP = 10.0  # factor of δ where no length of a step is accepted
+_DAMPING_GROWTH = 4.0  # factor of δ where the matrix is not positive definite or a step is shortened
+_DAMPING_DECAY = 3.0  # divisor of δ after a whole step
+_DAMPING_JUMP = 10.0  # factor of δ where no length of a step is accepted
 _MOST_DAMPING = 1.0  # largest δ that shortened steps lead to
 _LARGEST_DAMPING = 1e10  # δ at which the method gives up a step
-_SHORT = 0.2  # step length to the edge of the box below which δ is raised first
+_SHORT_STEP = 0.2  # step length to the edge of the box below which δ is raised first
 _JAMMED = 1e-3  # step length below which slacks and multipliers are initialized anew
 _BACKTRACKS = 10  # step lengths tried by the line search, each half the previous one
 _CORRECTIONS = 3  # second-order corrections in a row
@@ -284,7 +284,7 @@ class _InteriorPoint:
         before = self._value(at.x, at.slacks, at.point)
         while self._damping < _LARGEST_DAMPING:
             if not equations.factorize(self._damping):
-                self._damping *= _GROWTH
+                self._damping *= _DAMPING_GROWTH
                 continue
             found = self._accepted(at, equations, before)
             if found is not None:
@@ -292,7 +292,7 @@ class _InteriorPoint:
                 if found[1] < _JAMMED:
                     self._restart(at)
                 return True
-            self._damping *= _JUMP
+            self._damping *= _DAMPING_JUMP
         return False
 
     def _restart(self, at: _Iterate) -> None:
@@ -308,10 +308,10 @@ class _InteriorPoint:
         residual = at.point.inequalities + at.slacks
         step = equations.step(residual, at.point.equalities)
         predicted, length = self._predicted_change(at, step), self._longest(at, step)
-        if length < _SHORT and self._damping < _MOST_DAMPING:
+        if length < _SHORT_STEP and self._damping < _MOST_DAMPING:
             return None
         for halvings in range(_BACKTRACKS):
-            trial = self._tried(at, step, length)
+            trial = self._trial_point(at, step, length)
             if self._accepts(before, trial.value, predicted, length):
                 self._adapt(is_whole=not halvings)
                 return step, length, trial
@@ -344,9 +344,9 @@ class _InteriorPoint:
     def _adapt(self, is_whole: bool) -> None:
         """Decrease the damping after a whole step, increase it after a shortened one."""
         if is_whole:
-            self._damping = max(self._damping / _SHRINK, self._settings.damping)
+            self._damping = max(self._damping / _DAMPING_DECAY, self._settings.damping)
         else:
-            self._damping = max(self._damping, min(self._damping * _GROWTH, _MOST_DAMPING))
+            self._damping = max(self._damping, min(self._damping * _DAMPING_GROWTH, _MOST_DAMPING))
 
     def _corrected(
         self,
@@ -377,7 +377,7 @@ class _InteriorPoint:
             equal = length * equal + trial.point.equalities
             step = equations.step(residual, equal)
             length = self._longest(at, step)
-            trial = self._tried(at, step, length)
+            trial = self._trial_point(at, step, length)
             if self._accepts(before, trial.value, predicted, longest):
                 return step, length, trial
             if trial.value.violation > _SLOW_CORRECTION * violation:
@@ -385,7 +385,7 @@ class _InteriorPoint:
             violation = trial.value.violation
         return None
 
-    def _tried(self, at: _Iterate, step: _Step, length: float) -> _Trial:
+    def _trial_point(self, at: _Iterate, step: _Step, length: float) -> _Trial:
         """Return the trial point of a step, with slacks of at least −c(x).
 
         No slack falls below a fraction of its value (fraction to the boundary).
@@ -410,21 +410,27 @@ class _InteriorPoint:
 
     def _longest(self, at: _Iterate, step: _Step) -> float:
         """Return the longest step that keeps the point inside the box."""
-        return min(_to_zero(at.x - self._lower, step.x), _to_zero(self._upper - at.x, -step.x))
+        return min(
+            _step_to_boundary(at.x - self._lower, step.x), _step_to_boundary(self._upper - at.x, -step.x)
+        )
 
     def _move(self, at: _Iterate, step: _Step, length: float, trial: _Trial) -> None:
         """Apply an accepted step. Multipliers move by their own step length, which keeps them positive."""
         lower, upper = at.x - self._lower, self._upper - at.x
         by_lower = self._barrier / lower - at.z_lower - at.z_lower / lower * step.x
         by_upper = self._barrier / upper - at.z_upper + at.z_upper / upper * step.x
-        dual = min(_to_zero(at.z, step.z), _to_zero(at.z_lower, by_lower), _to_zero(at.z_upper, by_upper))
+        dual = min(
+            _step_to_boundary(at.z, step.z),
+            _step_to_boundary(at.z_lower, by_lower),
+            _step_to_boundary(at.z_upper, by_upper),
+        )
         at.x, at.slacks, at.point, _ = trial
         at.y, at._dual_residual = at.y + length * step.y, None
-        at.z = self._near_path(at.z + dual * step.z, at.slacks)
-        at.z_lower = self._near_path(at.z_lower + dual * by_lower, at.x - self._lower)
-        at.z_upper = self._near_path(at.z_upper + dual * by_upper, self._upper - at.x)
+        at.z = self._near_central_path(at.z + dual * step.z, at.slacks)
+        at.z_lower = self._near_central_path(at.z_lower + dual * by_lower, at.x - self._lower)
+        at.z_upper = self._near_central_path(at.z_upper + dual * by_upper, self._upper - at.x)
 
-    def _near_path(self, multipliers: Array, distances: Array) -> Array:
+    def _near_central_path(self, multipliers: Array, distances: Array) -> Array:
         """Return the multipliers, clipped so that their products with `distances` stay near μ."""
         central = self._barrier / distances
         return np.clip(multipliers, central / _CORRIDOR, central * _CORRIDOR)
@@ -474,7 +480,7 @@ def _largest(values: Array) -> float:
     return float(np.abs(values).max(initial=0.0))
 
 
-def _to_zero(values: Array, changes: Array) -> float:
+def _step_to_boundary(values: Array, changes: Array) -> float:
     """Return the step length, at most 1, that keeps positive values positive."""
     fall = float((-changes / values).max(initial=0.0))
     return _FRACTION_TO_BOUNDARY / fall if fall > _FRACTION_TO_BOUNDARY else 1.0

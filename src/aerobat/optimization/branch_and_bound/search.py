@@ -92,10 +92,10 @@ class BestFirstSearch:
         possible = self._bounds.possible
         for stage, slot in slots.items():
             is_meant = (self._candidates.stage == stage) & (self._candidates.slot == slot)
-            fitting = np.flatnonzero(possible & is_meant)
-            if not fitting.size:
+            matching = np.flatnonzero(possible & is_meant)
+            if not matching.size:
                 return
-            chosen.append(int(fitting[0]))
+            chosen.append(int(matching[0]))
             possible = possible & self._candidates.compatible_with(chosen[-1:])
         lower, upper = self._tightened(self._root.lower, self._root.upper, chosen)
         solution = self._solve(lower, upper, None, inf)
