@@ -104,9 +104,9 @@ def certified_solve(
         recorder: Records one attempt a solve.
         rounds: Largest number of solves.
     """
-    for left in reversed(range(rounds)):
+    for remaining in reversed(range(rounds)):
         judged = judge(program.solve(), task, recorder)
-        if judged.feasible or not left or not program.tighten(judged.solution, judged.certificate):
+        if judged.feasible or not remaining or not program.tighten(judged.solution, judged.certificate):
             break
     return judged
 

@@ -26,7 +26,8 @@ from aerobat.vehicle import Vehicle
 # hexarotor of the paper's class
 ASSUMED_THRUST_TO_WEIGHT = 5.0
 CLEARANCE_FRACTION = 0.5  # fraction of the room in a narrow passage that is kept as clearance
-KEPT_INSIDE = 0.1  # largest reduction of a ball's radius, relative: lab flights have errors of half of that
+# largest reduction of a ball's radius, relative: lab flights have errors of half of that
+MAX_BALL_REDUCTION = 0.1
 RATES = {Quantity.POSITION: Quantity.VELOCITY, Quantity.VELOCITY: Quantity.ACCELERATION}
 ROUNDING = 1e-9  # relative difference of limits or directions below which they are equal
 LEAST_CLEARANCE = 0.001  # least clearance [m]; covers violations between the places of a program
@@ -60,16 +61,16 @@ class Task:
         """
         body_radius = 0.0 if vehicle is None else vehicle.body_radius
         stages = problem.stages(max_specific_thrust(problem, vehicle), body_radius)
-        inside = (_well_inside(stage, clearance) for stage in stages.stages)
+        inside = (_with_smaller_ball(stage, clearance) for stage in stages.stages)
         stages = replace(stages, stages=tuple(_at_limits(stage, problem.path_limits) for stage in inside))
-        asked = cls(problem, vehicle, stages, reserve, clearance)
+        task = cls(problem, vehicle, stages, reserve, clearance)
         if vehicle is None or not clearance or not problem.surroundings.obstacles:
-            return asked
+            return task
         left = min(gaps_at_ends(problem, vehicle)[0], default=inf)
-        return asked if left > clearance else asked.with_room(left)
+        return task if left > clearance else task.with_room(left)
 
     def with_room(self, room: float) -> Task:
-        """Return the task with its clearance reduced to a share of `room` [m], where that is less."""
+        """Return the task with its clearance reduced to a fraction of `room` [m], where that is less."""
         return replace(self, clearance=min(self.clearance, max(CLEARANCE_FRACTION * room, LEAST_CLEARANCE)))
 
     def with_stages(self, stages: Iterable[Stage]) -> Task:
@@ -121,11 +122,11 @@ class Task:
         )
 
 
-def _well_inside(stage: Stage, clearance: float) -> Stage:
+def _with_smaller_ball(stage: Stage, clearance: float) -> Stage:
     """Return the stage with a smaller ball, if it has one."""
     if stage.ball is None or not clearance:
         return stage
-    kept = min(clearance, KEPT_INSIDE * stage.ball.radius)
+    kept = min(clearance, MAX_BALL_REDUCTION * stage.ball.radius)
     return replace(stage, ball=replace(stage.ball, radius=stage.ball.radius - kept))
 
 
@@ -136,20 +137,21 @@ def _at_limits(stage: Stage, limits: Limits) -> Stage:
     inequalities find no path near such a stage.
     """
     conditions = list(stage.conditions)
-    for place, asked in enumerate(stage.conditions):
-        if asked.quantity not in RATES:
+    for place, condition in enumerate(stage.conditions):
+        if condition.quantity not in RATES:
             continue
-        used = asked.direction != 0.0
-        ends = [asked.direction[used] * each[used] for each in limits.of(asked.quantity.derivative)]
+        used = condition.direction != 0.0
+        ends = [condition.direction[used] * each[used] for each in limits.of(condition.quantity.derivative)]
         least, most = float(np.minimum(*ends).sum()), float(np.maximum(*ends).sum())
         reached = next(
-            (end for bound, end in ((asked.lower, most), (asked.upper, least)) if _same(bound, end)), None
+            (end for bound, end in ((condition.lower, most), (condition.upper, least)) if _same(bound, end)),
+            None,
         )
         if reached is None:
             continue
-        conditions[place] = replace(asked, lower=reached, upper=reached)
-        if not any(_fixes(known, RATES[asked.quantity], asked.direction) for known in conditions):
-            conditions.append(Condition(RATES[asked.quantity], asked.direction, lower=0.0, upper=0.0))
+        conditions[place] = replace(condition, lower=reached, upper=reached)
+        if not any(_fixes(known, RATES[condition.quantity], condition.direction) for known in conditions):
+            conditions.append(Condition(RATES[condition.quantity], condition.direction, lower=0.0, upper=0.0))
     return replace(stage, conditions=tuple(conditions))
 
 

@@ -29,8 +29,8 @@ def extra_turns(task: Task, trajectory: Trajectory) -> int:
     time.
     """
     stages = task.stages
-    asked = [False, *map(_asks_upside_down, stages.stages)]
-    turns = sum(after and not before for before, after in pairwise(asked))
+    inverted = [False, *map(_asks_upside_down, stages.stages)]
+    turns = sum(after and not before for before, after in pairwise(inverted))
     if not turns or (is_course(stages) and any(stage.is_placed for stage in stages.stages)):
         return 0
     velocity, acceleration = (trajectory.on_segments(PLACES, derivative) for derivative in (1, 2))
@@ -43,8 +43,8 @@ def extra_turns(task: Task, trajectory: Trajectory) -> int:
 def _asks_upside_down(stage: Stage) -> bool:
     """Return whether a stage asks for downward thrust."""
     return any(
-        asked.quantity is Quantity.SPECIFIC_THRUST
-        and asked.lower > 0.0
-        and asked.direction[2] < UPSIDE_DOWN * float(np.linalg.norm(asked.direction))
-        for asked in stage.conditions
+        condition.quantity is Quantity.SPECIFIC_THRUST
+        and condition.lower > 0.0
+        and condition.direction[2] < UPSIDE_DOWN * float(np.linalg.norm(condition.direction))
+        for condition in stage.conditions
     )

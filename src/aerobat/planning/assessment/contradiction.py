@@ -20,7 +20,7 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.vehicle import Vehicle
 
-KNOWN = 3  # number of derivatives that stages constrain: position, velocity, acceleration
+STAGE_DERIVATIVES = 3  # number of derivatives that stages constrain: position, velocity, acceleration
 ROUNDING = 1e-9  # excess of tilt that is rounding [rad]
 LINEAR = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 
@@ -42,9 +42,9 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
     """
     balance = force_balance(problem.environment, vehicle)
     for stage in problem.stages(vehicle.max_specific_thrust, vehicle.body_radius).stages:
-        asked = [c.bound(balance) for c in _linear(stage)]
-        if asked and not is_possible(asked, problem.path_limits):
-            return _contradiction(stage, asked, problem.path_limits)
+        bounds = [c.bound(balance) for c in _linear(stage)]
+        if bounds and not is_possible(bounds, problem.path_limits):
+            return _contradiction(stage, bounds, problem.path_limits)
         tilt, most = _least_tilt(stage), problem.limits.max_tilt
         if tilt > most + ROUNDING:
             sentence = (
@@ -57,8 +57,10 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
 
 def _least_tilt(stage: Stage) -> float:
     """Return the least tilt that a stage's attitude allows [rad]."""
-    asked = stage.attitude
-    return 0.0 if asked is None else float(np.arccos(np.clip(asked.up[2], -1.0, 1.0))) - asked.tolerance
+    attitude = stage.attitude
+    if attitude is None:
+        return 0.0
+    return float(np.arccos(np.clip(attitude.up[2], -1.0, 1.0))) - attitude.tolerance
 
 
 def _linear(stage: Stage) -> list[Condition]:
@@ -67,13 +69,13 @@ def _linear(stage: Stage) -> list[Condition]:
     return [c for c in (*stage.where, *others) if c.quantity in LINEAR]
 
 
-def _contradiction(stage: Stage, asked: list[LinearBound], limits: Limits) -> Contradiction:
-    if not is_possible(asked, Limits()):
+def _contradiction(stage: Stage, bounds: list[LinearBound], limits: Limits) -> Contradiction:
+    if not is_possible(bounds, Limits()):
         sentence = (
             f"the conditions of the stage '{stage.name}' exclude each other; change or drop one of them"
         )
         return Contradiction(stage.name, (), sentence)
-    binding = [k for k in range(KNOWN) if is_possible(asked, limits.without(k))]
+    binding = [k for k in range(STAGE_DERIVATIVES) if is_possible(bounds, limits.without(k))]
     bound = " or ".join(field_with_value(k, limits) for k in binding)
     return Contradiction(
         stage.name,
@@ -83,17 +85,17 @@ def _contradiction(stage: Stage, asked: list[LinearBound], limits: Limits) -> Co
     )
 
 
-def is_possible(asked: list[LinearBound], limits: Limits) -> bool:
+def is_possible(bounds: list[LinearBound], limits: Limits) -> bool:
     """Return False where no position, velocity and acceleration within the limits satisfy the bounds."""
-    boxes = [limits.of(derivative) for derivative in range(KNOWN)]
+    boxes = [limits.of(derivative) for derivative in range(STAGE_DERIVATIVES)]
     lower, upper = (np.concatenate([box[side] for box in boxes]) for side in (0, 1))
     bounded = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
-    rows = [bound.weights.ravel() for bound in asked]
+    rows = [bound.weights.ravel() for bound in bounds]
     instant = AssignmentProgram(
-        equality=np.zeros((0, 3 * KNOWN)),
+        equality=np.zeros((0, 3 * STAGE_DERIVATIVES)),
         target=np.zeros(0),
-        rows=np.array([*rows, *np.eye(3 * KNOWN)[bounded]]),
-        lower=np.array([*(bound.limits[0] for bound in asked), *lower[bounded]]),
-        upper=np.array([*(bound.limits[1] for bound in asked), *upper[bounded]]),
+        rows=np.array([*rows, *np.eye(3 * STAGE_DERIVATIVES)[bounded]]),
+        lower=np.array([*(bound.limits[0] for bound in bounds), *lower[bounded]]),
+        upper=np.array([*(bound.limits[1] for bound in bounds), *upper[bounded]]),
     )
     return solver("builtin").solve(instant).status != "infeasible"

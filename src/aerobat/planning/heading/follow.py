@@ -28,7 +28,8 @@ RESERVE_FRACTION = 0.5  # fraction of the path's reserve that stays for the cont
 # fractions of each part at which limits are evaluated: not at its knots, and denser near them, where limits
 # change fast
 PLACES = 0.5 - 0.5 * np.cos(np.pi * np.array([0.006, *np.arange(1, 8) / 8, 0.994]))
-SPANS = np.diff(0.5 * (PLACES[1:] + PLACES[:-1]), prepend=0.0, append=1.0)  # quadrature weights of PLACES
+# quadrature weights of PLACES
+PLACE_WEIGHTS = np.diff(0.5 * (PLACES[1:] + PLACES[:-1]), prepend=0.0, append=1.0)
 SMOOTH = 1e-6  # weight [s⁶] of the squared third derivative: smooths required turns above about 10 rad/s
 MIN_HEADING_WEIGHT = 0.3  # weight of the required heading below which it is ignored; the full weight is 1
 ACTIVE_DISTANCE = 0.5  # distance from a limit, relative to its size, within which a step respects it
@@ -36,7 +37,8 @@ SLACK = 1e-3  # constraint violation at samples that counts as none, relative to
 REACH, LEAST_REACH = 0.6, 2e-3  # largest yaw change of the first step, and the one at which steps end [rad]
 ROUNDS = 60  # largest number of steps
 SMOOTHER = (1.0, 30.0, 1000.0)  # factors on SMOOTH of the unconstrained optima at which searches start
-PART = 0.4  # scale of the smoother optima, which are starts too: the whole turns may violate limits by far
+# scale of the smoother optima, which are starts too: the whole turns may violate limits by far
+START_SCALE = 0.4
 RESTORED = 0.5  # fraction of a constraint violation that one step removes
 MIN_DECREASE = 1e-4  # relative decrease of the cost below which steps end
 # (additional reserve as a fraction of limits' sizes, factor on the turn), tried in turn until certified
@@ -99,7 +101,7 @@ def heading_error(plan: Plan) -> HeadingError | None:
         return None
     times = YawSpline.along(plan.trajectory).times(PLACES)
     limits = YawLimits(Task.of(plan.problem, plan.vehicle), plan.trajectory, times)
-    angle, weight = _asked(heading, limits)
+    angle, weight = _required(heading, limits)
     off = np.where(weight >= MIN_HEADING_WEIGHT, np.abs(angle), -inf)
     if off.max() < 0.0:
         return None
@@ -115,7 +117,7 @@ def _turned(plan: Plan, spline: YawSpline, variables: Array) -> Plan:
     return replace(plan, trajectory=spline.with_yaw(variables), stages=stages, dt=dt)
 
 
-def _asked(heading: Heading, limits: YawLimits) -> tuple[Array, Array]:
+def _required(heading: Heading, limits: YawLimits) -> tuple[Array, Array]:
     """Return the angle [rad] about the thrust from body x to the required heading and its weight, (m,)."""
     setpoint, duration = limits.carried, limits.path.duration
     axes = so3.axes(setpoint.q_world_body)
@@ -147,7 +149,7 @@ class _YawProgram:
     @cached_property
     def _target(self) -> tuple[Array, Array]:
         """The required yaw [rad], without jumps of 2π, and its weight, (m,) each."""
-        angle, weight = _asked(self.heading, self._limits)
+        angle, weight = _required(self.heading, self._limits)
         known = np.flatnonzero(weight >= MIN_HEADING_WEIGHT)
         if not len(known):
             return np.zeros_like(angle), np.zeros_like(weight)
@@ -182,40 +184,40 @@ class _YawProgram:
         return np.array([self.spline.rows(PLACES, k) @ self._ends[1] for k in range(ORDERS)])
 
     @cached_property
-    def _pull(self) -> Array:
+    def _error_weights(self) -> Array:
         """The weights of the squared heading errors [s], (m,)."""
-        return np.asarray(self._target[1] ** 2 * self._seconds)
+        return np.asarray(self._target[1] ** 2 * self._quadrature)
 
     @cached_property
-    def _seconds(self) -> Array:
+    def _quadrature(self) -> Array:
         """The quadrature weight of each place [s], (m,)."""
-        return np.outer(self.spline.seconds, SPANS).ravel()
+        return np.outer(self.spline.seconds, PLACE_WEIGHTS).ravel()
 
     def _yaw(self, x: Array) -> Array:
         """Return the yaw and its derivatives at the places, (4, m)."""
         return np.array([each @ x for each in self._rows]) + self._fixed
 
-    def _slopes(self, yaw: Array, smooth: float = SMOOTH) -> tuple[Array, Array]:
+    def _gradient_and_hessian(self, yaw: Array, smooth: float = SMOOTH) -> tuple[Array, Array]:
         """Return the cost's gradient (v,) and Hessian (v, v)."""
-        bend, (value, *_, third) = smooth * self._seconds, self._rows
-        hessian = (value.T * self._pull) @ value + (third.T * bend) @ third
+        bend, (value, *_, third) = smooth * self._quadrature, self._rows
+        hessian = (value.T * self._error_weights) @ value + (third.T * bend) @ third
         hessian += 1e-9 * np.trace(hessian) / len(hessian) * np.eye(len(hessian))
-        off = self._pull * (yaw[0] - self._target[0])
+        off = self._error_weights * (yaw[0] - self._target[0])
         return value.T @ off + third.T @ (bend * yaw[3]), hessian
 
     def _starts(self) -> list[Array]:
         """Return the starts: no turn, the unconstrained optima for each smoothness, scaled smoother ones."""
         still = np.zeros(self._ends[0].shape[1])
-        slopes = [self._slopes(self._yaw(still), SMOOTH * more) for more in SMOOTHER]
-        whole = [np.asarray(-np.linalg.solve(hessian, gradient)) for gradient, hessian in slopes]
-        return [still, *whole, *(PART * turn for turn in whole[1:])]
+        pairs = [self._gradient_and_hessian(self._yaw(still), SMOOTH * more) for more in SMOOTHER]
+        whole = [np.asarray(-np.linalg.solve(hessian, gradient)) for gradient, hessian in pairs]
+        return [still, *whole, *(START_SCALE * turn for turn in whole[1:])]
 
     def _rank(self, x: Array) -> tuple[float, float]:
         """Return the constraint violation (SLACK at least) and the cost, which are compared in this order."""
         yaw = self._yaw(x)
-        off = self._pull @ (yaw[0] - self._target[0]) ** 2
+        off = self._error_weights @ (yaw[0] - self._target[0]) ** 2
         exceeded = float(self._limits.excess(yaw).max())
-        return max(exceeded, SLACK), float(off + SMOOTH * self._seconds @ yaw[3] ** 2)
+        return max(exceeded, SLACK), float(off + SMOOTH * self._quadrature @ yaw[3] ** 2)
 
     def _improved(self, x: Array) -> Array:
         """Return an improved yaw: steps reduce first the constraint violation, then the cost."""
@@ -224,7 +226,7 @@ class _YawProgram:
         rank = self._rank(x)
         for _ in range(ROUNDS):
             yaw = self._yaw(x)
-            excess, (gradient, hessian) = limits.excess(yaw), self._slopes(yaw)
+            excess, (gradient, hessian) = limits.excess(yaw), self._gradient_and_hessian(yaw)
             at, which = np.nonzero(excess > -ACTIVE_DISTANCE)
             slopes = limits.slopes(yaw)[:, at, which]
             linear = sum(slope[:, None] * each[at] for slope, each in zip(slopes, self._rows, strict=True))

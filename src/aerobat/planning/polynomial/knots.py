@@ -23,7 +23,8 @@ from aerobat.trajectory.minimum_effort import minimum_effort
 
 LEG_THRUST_FRACTION = 0.3  # fraction of the specific thrust that accelerates a leg when times are guessed
 SHORTEST_LEG = 0.2  # least guessed duration of a leg [s]
-EXCEEDED = 0.3  # by how much a stretched path may exceed rotor limits, as a fraction of the rotors' range
+# by how much a stretched path may exceed rotor limits, as a fraction of the rotors' range
+ALLOWED_EXCESS = 0.3
 PACE = 1.05  # factor on the duration in one step of stretching
 PACES = 80  # largest number of steps: 50 times the duration
 FIGURE_PACES = 12  # the same for figures, 1.8 times: slow motions reach their attitudes only in free fall
@@ -72,10 +73,12 @@ def first_times(problem: Problem, fixed: Array, max_specific_thrust: float) -> A
     return durations
 
 
-def unhurried(task: Task) -> Task:
+def without_speed_bounds(task: Task) -> Task:
     """Return the task without lower bounds on speed at stages that ask no attitude."""
     stages = (
-        stage if stage.attitude else replace(stage, conditions=tuple(filterfalse(_hurries, stage.conditions)))
+        stage
+        if stage.attitude
+        else replace(stage, conditions=tuple(filterfalse(_is_speed_bound, stage.conditions)))
         for stage in task.stages.stages
     )
     return task.with_stages(stages)
@@ -104,9 +107,9 @@ def _is_of_thrust(condition: Condition) -> bool:
 def stretched_path(task: Task, order: int) -> Trajectory:
     """Return the closed form through ordered stages as a warm start; legs last as the roots of their lengths.
 
-    The path is stretched in time until rotors exceed their limits by EXCEEDED at most: a motion that is a
-    little too fast is nearer to the optimum than one that is too slow. Slow motions cannot fly figures: where
-    no pace tried satisfies that, the pace that exceeds limits least is taken.
+    The path is stretched in time until rotors exceed their limits by ALLOWED_EXCESS at most: a motion that is
+    a little too fast is nearer to the optimum than one that is too slow. Slow motions cannot fly figures:
+    where no pace tried satisfies that, the pace that exceeds limits least is taken.
 
     Args:
         task: The task whose ends and stages are met, without the attitudes of figures, which follow from
@@ -114,9 +117,9 @@ def stretched_path(task: Task, order: int) -> Trajectory:
         order: The derivative of position whose square is minimized.
     """
     vehicle, still = task.vehicle, np.zeros((len(task.stages.stages), 3))
-    fixed = fixed_at_knots(_without_figures_attitudes(unhurried(task)), order, still)
+    fixed = fixed_at_knots(_without_figures_attitudes(without_speed_bounds(task)), order, still)
     durations = first_times(task.problem, fixed, vehicle.max_specific_thrust)
-    allowed = -EXCEEDED * float(vehicle.thrust_ranges.max())
+    allowed = -ALLOWED_EXCESS * float(vehicle.thrust_ranges.max())
     paces = FIGURE_PACES if any(map(_is_of_figure, task.stages.stages)) else PACES
 
     def path(steps: int) -> Trajectory:
@@ -190,7 +193,7 @@ def _along(gate: Gate, speed: float) -> tuple[Condition, ...]:
     return fixed(Quantity.VELOCITY, max(speed, MIN_GATE_SPEED) * gate.normal)
 
 
-def _hurries(condition: Condition) -> bool:
+def _is_speed_bound(condition: Condition) -> bool:
     """Return whether a condition is a lower bound on speed."""
     return condition.quantity is Quantity.VELOCITY and 0.0 < condition.lower < condition.upper
 

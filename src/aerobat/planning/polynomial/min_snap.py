@@ -16,7 +16,12 @@ from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged, Solution, judge
 from aerobat.planning.passages import place_stages
 from aerobat.planning.planners import Planner, option, planner
-from aerobat.planning.polynomial.knots import first_times, fixed_at_knots, unhurried, violated_stage
+from aerobat.planning.polynomial.knots import (
+    first_times,
+    fixed_at_knots,
+    violated_stage,
+    without_speed_bounds,
+)
 from aerobat.planning.recorder import Progress, Recorder
 from aerobat.planning.result import Plan
 from aerobat.planning.rotor_margin import sampled_margin
@@ -170,8 +175,8 @@ class _Planning:
         """
         started = perf_counter()
         task, durations, margin = self.task, self._scaled(duration), None
-        for begun in (unhurried(task), task):
-            trajectory = self._trajectory(begun, durations)
+        for variant in (without_speed_bounds(task), task):
+            trajectory = self._trajectory(variant, durations)
             failure = violated_stage(task, trajectory)
             if failure is None:
                 break

@@ -21,8 +21,8 @@ from aerobat.planning.task import Task
 from aerobat.problem.ball import Ball
 from aerobat.problem.stage import Stage
 
-KNOWN = 3  # number of derivatives that stages constrain: position, velocity, acceleration
-STATE = 3 * KNOWN  # number of their components
+STAGE_DERIVATIVES = 3  # number of derivatives that stages constrain: position, velocity, acceleration
+STATE = 3 * STAGE_DERIVATIVES  # number of their components
 DIRECTIONS = np.eye(STATE)
 BALL_FRACTION = 1.0 - 1e-5  # fraction of a ball's squared radius that is used; the rest allows for rounding
 
@@ -74,7 +74,7 @@ class StageValues:
             for value in room.scale[:, None] * found:
                 stages.append(room.stage)
                 slopes.append(np.zeros((6, 3)))
-                slopes[-1][:KNOWN] = value.reshape(KNOWN, 3)
+                slopes[-1][:STAGE_DERIVATIVES] = value.reshape(STAGE_DERIVATIVES, 3)
         return np.array(stages, dtype=np.intp), np.array(slopes).reshape(-1, 6, 3)
 
     def equality_slopes(self) -> tuple[Indices, Array]:
@@ -166,7 +166,7 @@ class _Room(NamedTuple):
 
     def inputs(self, derivatives: Array, *more: Array) -> tuple[Array, Array]:
         """Return the functions' inputs: the shared parameters; the state at the stage, then `more`."""
-        state = derivatives[self.stage, :KNOWN].ravel()
+        state = derivatives[self.stage, :STAGE_DERIVATIVES].ravel()
         return self.shared, np.concatenate([state, *more])[None]
 
 
