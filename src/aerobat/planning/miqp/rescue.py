@@ -36,7 +36,6 @@ SLOW_FACTOR = 1.1
 FREE_KNOTS = "free-knots"  # a quick planner that starts from other paths too
 TIME_OPTIMAL = "time-optimal"  # the planner that starts from the most paths
 FEW_STARTS = 2  # starts of time-optimal: more starts give faster plans, but seldom the first plan
-MANY_STARTS = 8  # starts where a plan most likely exists
 
 
 @dataclass
@@ -57,7 +56,7 @@ class Rescue:
             found = self._first(self._fallbacks(), self._none_found)
         if found is None and self.is_promising:
             with within_time(PROMISING_TIME, processor):
-                found = self._first(iter([self._time_optimal_from_all(MANY_STARTS)]), self._none_found)
+                found = self._first(iter([self._time_optimal_from_all()]), self._none_found)
         if found is None or found.keeps(self.requested.reserve):
             return found
         with within_time(RESCUE_TIME, processor):
@@ -161,22 +160,22 @@ class Rescue:
             yield replace(self.requested, reserve=0.0, rescue=False), "without a reserve"
         more = with_more_intervals(self.requested, self.problem, self.vehicle)
         if any(attempt.cost is not None for attempt in self.recorder.attempts):
-            yield self._time_optimal_from_all(FEW_STARTS)
+            yield self._time_optimal_from_all(starts=FEW_STARTS)
             yield from more
         else:
             yield from more
-            yield self._time_optimal(None, FEW_STARTS), f"by {TIME_OPTIMAL}"
+            yield self._time_optimal(None, starts=FEW_STARTS), f"by {TIME_OPTIMAL}"
         yield from self._others()
 
-    def _time_optimal_from_all(self, starts: int) -> tuple[Planner, str]:
+    def _time_optimal_from_all(self, **settings: int) -> tuple[Planner, str]:
         """Return time-optimal, started from the path without a vehicle too, and words on how it plans."""
-        return self._time_optimal(self._path_without_rotors(), starts), f"by {TIME_OPTIMAL}"
+        return self._time_optimal(self._path_without_rotors(), **settings), f"by {TIME_OPTIMAL}"
 
-    def _time_optimal(self, start: Plan | None, starts: int) -> Planner:
+    def _time_optimal(self, start: Plan | None, **settings: int) -> Planner:
         """Return time-optimal with the requested reserve, zero included: a refusal comes soonest so."""
         cls: Any = planner_class(TIME_OPTIMAL)
         guess = replace(self.requested, rescue=False)
-        return cast(Planner, cls(reserve=self.requested.reserve, starts=starts, guess=guess, start=start))
+        return cast(Planner, cls(reserve=self.requested.reserve, guess=guess, start=start, **settings))
 
     def _path_without_rotors(self) -> Plan | None:
         """Return the MIQP's plan without a vehicle, or None."""
