@@ -75,7 +75,7 @@ def test_certificates_enclose_what_independent_samples_find(drag: tuple[float, .
     moments = np.linalg.norm(sampled.setpoint.wrench.moment_body, axis=1)
     rates = np.linalg.norm(sampled.setpoint.omega_body, axis=1)
     for quantity, rotor, series, close in (
-        *(("thrust", i, thrusts[:, i], 1e-3) for i in range(4)),
+        *(("thrust", i, thrusts[:, i], 5e-3) for i in range(4)),
         *(("command", i, commands[:, i], 3e-2) for i in range(4)),
         ("moment", None, moments, 1e-5),
         ("body rate", None, rates, 1e-5),

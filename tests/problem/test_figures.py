@@ -202,9 +202,11 @@ def test_strong_vehicles_keep_attitudes_of_figures_firmly_and_weak_ones_as_they_
     assert {s.attitude.min_thrust for s in firm.stage_sequence((), thrust).stages if s.attitude} == {11.0}
 
 
-@pytest.mark.parametrize(("tilt_deg", "asked"), [(90.0, 19.125), (30.0, 9.5625), (0.0, 8.0)])
-def test_a_half_flip_asks_for_thrust_across_its_gate_by_the_gates_tilt(tilt_deg: float, asked: float) -> None:
+@pytest.mark.parametrize(("tilt_deg", "asked"), [(90.0, 19.125), (45.0, 13.523), (30.0, 9.81), (0.0, 9.81)])
+def test_a_half_flip_asks_for_thrust_by_its_gates_tilt_and_for_a_hovers(
+    tilt_deg: float, asked: float
+) -> None:
     problem = ab.load_problem("half-flip")
     gates = problem.maneuver.with_gate_tilt(problem.gates, np.deg2rad(tilt_deg))
     (stage,) = problem.maneuver.stage_sequence(gates, 40.0).stages
-    assert max(c.min_thrust for c in stage.explicit(gates[0]).conditions) == pytest.approx(asked)
+    assert max(c.min_thrust for c in stage.explicit(gates[0]).conditions) == pytest.approx(asked, rel=1e-4)

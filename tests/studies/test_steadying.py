@@ -1,9 +1,11 @@
-"""Plans that turn slower: as fast, and flown better by rotors that lag otherwise than known."""
+"""Plans that turn slower or push harder in gates: about as fast, and more of their flights succeed."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import aerobat as ab
@@ -35,6 +37,19 @@ def test_a_steadied_plan_is_as_fast_turns_slower_and_more_other_flights_succeed(
     assert "instead of" in found.rescue
 
 
+@pytest.mark.slow
+def test_half_flips_through_tilted_gates_keep_their_attitude_in_most_flights():
+    """At 60° 78 of 100 flights succeeded while plans used half of the gate's tolerance, at 20° 35 did."""
+    for tilt, least in ((60.0, 190), (75.0, 195)):
+        half_flip = ab.load_problem("half-flip")
+        gates = half_flip.maneuver.with_gate_tilt(half_flip.gates, math.radians(tilt))
+        first = ab.plan(replace(half_flip, gates=gates), PLANNER, "agile-quad")
+        found = steadied(first, PLANNER, ab.load_dispersion("lab"))
+        assert found.duration <= MAX_DURATION_RATIO * first.duration
+        assert succeeded(found) >= least
+        assert "with more thrust in gates" in found.rescue
+
+
 def test_plans_stay_where_the_lag_turns_little_or_no_reserve_is_asked():
     lab, planner = ab.load_dispersion("lab"), ab.MinSnap()
     calm = ab.plan("line", planner, "crazyflie")
@@ -42,8 +57,8 @@ def test_plans_stay_where_the_lag_turns_little_or_no_reserve_is_asked():
     assert steadied(calm, PLANNER, lab) is calm  # no gate is passed
     fast = ab.plan("half-flip", PLANNER, "crazyflie")
     assert steadied(fast, ab.Miqp(), lab) is fast
-    slow = replace(
-        load_vehicle("crazyflie"), max_body_rate=0.9 * MAX_LAG_ANGLE / load_vehicle("crazyflie").lags.max()
-    )
-    flip = ab.plan("half-flip", PLANNER, slow)
+    crazyflie = load_vehicle("crazyflie")
+    quick = replace(crazyflie, rotors=tuple(replace(rotor, lag=0.002) for rotor in crazyflie.rotors))
+    flip = ab.plan("half-flip", PLANNER, quick)
+    assert np.max(quick.lags) * flip.assessment.max_body_rate < MAX_LAG_ANGLE
     assert steadied(flip, PLANNER, lab) is flip

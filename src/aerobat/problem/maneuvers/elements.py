@@ -22,7 +22,7 @@ class PassGate(Maneuver):
     crossing_point: CrossingPoint = "centre"  # of the opening: its centre, or free
     margin: NonNegative = 0.0  # [m] from the edges to the body, where the crossing point is free
     speed: NonNegative = MIN_CROSSING_SPEED  # [m/s] at least, along the direction of passage
-    upright: bool = False  # the thrust axis along the gate's upright, within half its tolerance
+    upright: bool = False  # the thrust axis along the gate's upright, within a tenth of its tolerance
     # least specific thrust along it; left out, 20 % of what the vehicle has
     min_thrust: Positive | None = None  # [m/s²]
 

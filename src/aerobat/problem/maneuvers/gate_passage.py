@@ -22,7 +22,7 @@ class GatePassage:
 
     A `perpendicular` passage moves along the gate's direction of passage at `speed` or faster, without a
     lateral velocity, so that a vehicle with an extent fits through; at rest in the gate it could turn back.
-    An `upright` passage has the thrust axis along the gate's upright, within half its tolerance, if the
+    An `upright` passage has the thrust axis along the gate's upright, within a tenth of its tolerance, if the
     maneuver requires an attitude at all; otherwise only in the plane of the maneuver's turn, as in the paper.
     A `centred` passage is at the fraction `at`; otherwise it is one interval later, at the end of interval
     N/2, with free velocity, as in the authors' reference code. With a free `crossing_point` the opening is

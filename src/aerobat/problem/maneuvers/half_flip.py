@@ -22,6 +22,7 @@ from aerobat.problem.maneuvers.gate_passage import PAPER_LATERAL, PAPER_PASSAGE,
 from aerobat.problem.maneuvers.maneuver import Maneuver, maneuver
 from aerobat.problem.stage import StageSequence
 from aerobat.so3 import UP
+from aerobat.states import STANDARD_GRAVITY
 
 HALF_FLIP_FRACTION = 0.85  # fraction of MIN_ATTITUDE_THRUST: half-flips are slower than figures
 _UPRIGHT = 1e-9  # [-] horizontal component of a gate's upright, below which the gate is upright
@@ -31,8 +32,8 @@ _UPRIGHT = 1e-9  # [-] horizontal component of a gate's upright, below which the
 class HalfFlip(Maneuver):
     """Thrust along the tilted gate's upright while passing it, never upside down (paper, Section II-D)."""
 
-    # ε_y, least horizontal thrust across the passage; left out, 19 times the sine of the gate's tilt of
-    # vehicles that have 22.5 beside their weight, and at least 20 % of what they have along its upright
+    # ε_y, least horizontal thrust across the passage; left out, 19 times the sine of the gate's tilt for
+    # vehicles that have 22.5 beside their weight, and along its upright a hover's or 20 % of the most thrust
     min_lateral_thrust: Positive | None = None  # [m/s²]
     passage: GatePassage = GatePassage()  # how the gate is passed
     gate: str | None = None  # name of the gate; left out, the only one
@@ -77,10 +78,9 @@ class HalfFlip(Maneuver):
             raise SpecError("gate.tilt_deg must be from -90 to 90 for a half-flip; past that it is a flip")
         across = float(np.hypot(gate.up[0], gate.up[1]))
         if self.min_lateral_thrust is None:
-            return max(
-                THRUST_FRACTION * max_specific_thrust,
-                across * HALF_FLIP_FRACTION * min_attitude_thrust(max_specific_thrust),
-            )
+            sideways = HALF_FLIP_FRACTION * min_attitude_thrust(max_specific_thrust)
+            hover = min(sideways, STANDARD_GRAVITY)
+            return max(THRUST_FRACTION * max_specific_thrust, across * sideways, hover)
         if across < _UPRIGHT:
             raise SpecError(
                 "maneuver.min_lateral_thrust asks for thrust sideways, which an upright gate has not; tilt it"

@@ -1,32 +1,41 @@
 """A plan about as fast as the first one, but with more successful flights: used by commands.
 
 Rotors with an unknown lag are late by an angle proportional to the body rate. Paths with much lower body
-rates often take hardly longer.
+rates often take hardly longer. A push that no model contains, such as unknown drag, tilts the vehicle by the
+ratio of push to thrust, so that more thrust in a gate keeps the attitude there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import radians
 
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
+from aerobat.evaluation import Score
+from aerobat.optimization.deadline import processor
 from aerobat.planning import Attempt, Plan, Planner, as_planner
-from aerobat.studies.flights import passed
-from aerobat.studies.passing.spread import with_narrower_gates
+from aerobat.problem import Problem
+from aerobat.studies.flights import joined, passed
+from aerobat.studies.passing.spread import with_more_thrust, with_narrower_gates
 from aerobat.studies.passing.task import PassingTask, Variant, warm_started_refinement
 from aerobat.studies.share import Trials
 from aerobat.studies.workers import pool
 
-MAX_LAG_ANGLE = radians(15.0)  # [rad] turned within the rotors' lag: above this, some flights are too late
-BODY_RATE_FRACTIONS = (0.65, 0.5, 0.8)  # of the largest body rate (benchmarks/steadying.py)
-MAX_DURATION_RATIO = 1.01  # longest duration, over that of the first plan
+MAX_LAG_ANGLE = radians(5.0)  # [rad] turned within the rotors' lag, above which flights may be too late
+# of the largest body rate, in the order of trial (benchmarks/steadying.py); 1 only refines the path once more
+BODY_RATE_FRACTIONS = (0.65, 1.0, 0.5, 0.8)
+MAX_DURATION_RATIO = 1.03  # longest duration, over that of the first plan
 SELECTION_FLIGHTS = range(10**6, 10**6 + 200)  # flights that select the plan; other flights judge it
+FIRST_FLIGHTS = 50  # of these: where enough of them succeed, the plan is kept
 SUFFICIENT_SUCCESS = 0.975  # fraction of these flights: most plans with as many successes are proven for 95 %
-MIN_SUCCESS = 0.4  # fraction of these flights: with fewer successes, turning slower has not helped
-PLANNING_TIME = 10.0  # [s] processor time limit of each plan, which takes 0.3 to 3: the limit decides nothing
+CERTAIN_SUCCESS = 0.985  # fraction of these flights with which no further plan is tried
+MIN_SUCCESS = 0.2  # fraction of these flights: with fewer successes, turning slower has not helped
+# [s] processor time limit of all these plans, most of which take 0.3 to 1; each may take half of what is left
+PLANNING_TIME = 4.0
+LEAST_TIME = 0.5  # [s] of which no plan is begun with less
 
 
 @validated
@@ -39,9 +48,10 @@ def steadied(
     controller: str = "full",
     progress: Callable[[Attempt], None] | None = None,
 ) -> Plan:
-    """Return the plan, or one at most 1 % longer with lower body rates and more successful flights.
+    """Return the plan, or one at most 3 % longer of which more flights succeed.
 
-    Others are searched only if there are gates, the rotors' lag matters, and too few of some flights succeed.
+    It has lower body rates, and more thrust in gates that flights pass with a wrong attitude. Others are
+    searched only if there are gates, the rotors' lag matters, and too few of some flights succeed.
 
     Args:
         plan: The first plan, for a vehicle.
@@ -70,30 +80,50 @@ def steadied(
             progress=progress,
             flying=flying,
         )
-        return _slower_turning(task, plan, kept)
+        return _steadier(task, plan, kept)
 
 
-def _slower_turning(task: PassingTask, plan: Plan, reserve: float) -> Plan:
-    """Return the plan, or a slower-turning one, hardly longer, if more flights succeed."""
-    scores = task.scores(plan, SELECTION_FLIGHTS)
+def _steadier(task: PassingTask, plan: Plan, reserve: float) -> Plan:
+    """Return the plan, or one with more thrust in gates or lower body rates of which more flights succeed."""
+    scores = task.scores(plan, SELECTION_FLIGHTS[:FIRST_FLIGHTS])
+    if passed(scores).fraction >= SUFFICIENT_SUCCESS:
+        return plan
+    scores = joined([scores, task.scores(plan, SELECTION_FLIGHTS[FIRST_FLIGHTS:])])
     first = best = passed(scores)
-    found = plan
-    problem = with_narrower_gates(plan.problem, task.vehicle, scores)
-    for rate in BODY_RATE_FRACTIONS if first.fraction >= MIN_SUCCESS else ():
-        if best.fraction >= SUFFICIENT_SUCCESS:
-            break
-        try:
-            other = task.tightened(plan, reserve, Variant(rate, True), problem, PLANNING_TIME)
-        except (Infeasible, SpecError):  # no plan, or gates too narrow for one
-            continue
-        if other.duration > MAX_DURATION_RATIO * plan.duration or not (other.certified and other.flies):
-            continue
-        share = passed(task.scores(other, SELECTION_FLIGHTS))
-        if share.count > best.count:
-            why = (
-                f"goes on from {plan.planner}'s {plan.duration:.3f} s, turning at most {100 * rate:g} % as "
-                f"fast: {share.count} of {share.of} flights succeed instead of {first.count}"
-            )
-            attempts = (*plan.attempts, *other.attempts)
-            best, found = share, replace(other, attempts=attempts, rescue=why)
+    if not MIN_SUCCESS <= first.fraction < SUFFICIENT_SUCCESS:
+        return plan
+    found, deadline = plan, processor() + PLANNING_TIME
+    for problem, how in _tightened(task, plan, scores):
+        too_slow = 0.0  # largest fraction of the body rate with which a path took too long
+        for rate in BODY_RATE_FRACTIONS:
+            left = deadline - processor()
+            if best.fraction >= CERTAIN_SUCCESS or left <= LEAST_TIME:
+                return found
+            if rate <= too_slow:
+                continue
+            try:
+                other = task.tightened(plan, reserve, Variant(rate, True), problem, 0.5 * left)
+            except (Infeasible, SpecError):  # no plan, or gates too narrow for one
+                continue
+            if other.duration > MAX_DURATION_RATIO * plan.duration:
+                too_slow = rate
+                continue
+            share = passed(task.scores(other, SELECTION_FLIGHTS))
+            if share.count > best.count and other.certified and other.flies:
+                slower = "" if rate == 1.0 else f", turning at most {100 * rate:g} % as fast"
+                why = (
+                    f"goes on from {plan.planner}'s {plan.duration:.3f} s{how}{slower}: {share.count} of "
+                    f"{share.of} flights succeed instead of {first.count}"
+                )
+                attempts = (*plan.attempts, *other.attempts)
+                best, found = share, replace(other, attempts=attempts, rescue=why)
     return found
+
+
+def _tightened(task: PassingTask, plan: Plan, scores: Score) -> Iterator[tuple[Problem, str]]:
+    """Yield the problem with more thrust in gates and with narrower gates only, and how each differs."""
+    narrower = with_narrower_gates(plan.problem, task.vehicle, scores)
+    stronger = with_more_thrust(narrower, task.vehicle, plan, scores, SUFFICIENT_SUCCESS)
+    if stronger != narrower:
+        yield stronger, ", with more thrust in gates"
+    yield narrower, ""
