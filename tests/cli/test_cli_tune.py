@@ -61,7 +61,7 @@ def test_an_interrupted_search_writes_nothing(folder: Path, monkeypatch: pytest.
     monkeypatch.setattr(Progress, "tell", interrupt)
     before = sorted(folder.iterdir())
     with pytest.raises(SystemExit) as stop:
-        cli.main(["tune", "half-flip", "--vehicle", "slow.toml", *FEW, "20"])
+        cli.main(["tune", "half-flip.plan", "--vehicle", "slow.toml", *FEW, "20"])
     assert stop.value.code == 130
     assert sorted(folder.iterdir()) == before
 

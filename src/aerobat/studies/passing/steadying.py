@@ -32,7 +32,6 @@ SELECTION_FLIGHTS = range(10**6, 10**6 + 200)  # flights that select the plan; o
 FIRST_FLIGHTS = 50  # of these: where enough of them succeed, the plan is kept
 SUFFICIENT_SUCCESS = 0.975  # fraction of these flights: most plans with as many successes are proven for 95 %
 CERTAIN_SUCCESS = 0.985  # fraction of these flights with which no further plan is tried
-MIN_SUCCESS = 0.2  # fraction of these flights: with fewer successes, turning slower has not helped
 # [s] processor time limit of all these plans, most of which take 0.3 to 1; each may take half of what is left
 PLANNING_TIME = 4.0
 LEAST_TIME = 0.5  # [s] of which no plan is begun with less
@@ -90,7 +89,7 @@ def _steadier(task: PassingTask, plan: Plan, reserve: float) -> Plan:
         return plan
     scores = joined([scores, task.scores(plan, SELECTION_FLIGHTS[FIRST_FLIGHTS:])])
     first = best = passed(scores)
-    if not MIN_SUCCESS <= first.fraction < SUFFICIENT_SUCCESS:
+    if first.fraction >= SUFFICIENT_SUCCESS:
         return plan
     found, deadline = plan, processor() + PLANNING_TIME
     for problem, how in _tightened(task, plan, scores):
