@@ -50,7 +50,7 @@ class Presets(Generic[T]):
         """Return what one of them describes, or a file. Raises SpecError.
 
         A path object, or text that ends in .toml or has a folder in it, is the path of a file. Other text is
-        a name, or else the path of a file that there is.
+        a name, or else the path of a file or folder that there is; a folder is refused.
         """
         text = os.fspath(name_or_path)
         path: Document = Path(text)
@@ -58,7 +58,7 @@ class Presets(Generic[T]):
             known = self.names()
             if text in known:
                 path = self.folder / f"{text}.toml"
-            elif not os.path.isfile(text):
+            elif not os.path.exists(text):
                 raise unknown_name(self.kind, text, known)
         return read_document(path, self.cls, self.kind, name=path.name.removesuffix(".toml"))
 

@@ -273,7 +273,11 @@ def test_a_path_holds_no_nul() -> None:
         load_vehicle("null\0.toml")
 
 
-def test_what_is_no_file_is_said_so(tmp_path: Path) -> None:
+def test_what_is_no_file_is_said_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "flights").mkdir()
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SpecError, match=r"^vehicle file flights: this is a folder; give the path of a file"):
+        load_vehicle("flights")
     for way, complaint in [
         (tmp_path / "none.toml", "there is no such file"),
         (tmp_path, "this is a folder"),

@@ -71,10 +71,12 @@ class Flip(Maneuver):
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
         """Return the stages of the turn, including the gate's.
 
-        Raises SpecError where there are several gates and `gate` names none, or the gate's upright is not in
-        the plane of the turn.
+        Raises SpecError where there are several gates and `gate` names none, where `passage` is given and
+        there is no gate, or where the gate's upright is not in the plane of the turn.
         """
         gate = passed_gate(gates, self.gate, self.kind) if gates or self.gate is not None else None
+        if gate is None and self.passage not in (GatePassage(), PAPER_PASSAGE):
+            raise SpecError("maneuver.passage needs a gate, and the flip has none; add one or drop passage")
         at_gate_deg = inf if gate is None else self._angle_deg(gate)
         turns = [360.0 * k + angle for k in range(self.count) for angle in self.ANGLES_DEG]
         turns += [360.0 * k for k in range(1, self.count)]
