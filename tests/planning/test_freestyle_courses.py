@@ -54,7 +54,7 @@ def test_a_course_of_figures_is_planned_from_its_first_closed_form() -> None:
     found = ab.plan(problem, ab.FreeKnots(reserve=0.15), QUAD)
     assert found.certified
     assert found.duration < 3.6
-    assert len(found.attempts) < 30  # 73 where closed forms led nowhere
+    assert len(found.attempts) < 40  # 73 where closed forms led nowhere
     assert len(list(closed_forms(Task.of(problem, QUAD)))) == 2
 
 
