@@ -82,26 +82,37 @@ class Rescue:
         than its stages ask. A plan is also poor if a nearly feasible path is much faster, or if stages have
         windows and the plan is suspiciously long.
         """
-        # attempts of programs have a dt; attempts at paths have a cost if the path is nearly feasible
-        paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
-        fastest = min((path.duration for path in paths), default=inf)
-        is_fast = plan.certified and plan.bound is None and plan.duration <= SLOW_FACTOR * fastest
-        if is_fast and not self._looks_poor(plan):
+        fault = self._fault(plan)
+        if not fault:
             return plan
         cls: Any = planner_class(FREE_KNOTS)
         others = cls(reserve=self.requested.reserve, clearance=self.requested.clearance)
         more = with_more_intervals(self.requested, self.problem, self.vehicle)
-        said = f"no fast path of miqp with {self._intervals} intervals settled"
+        said = f"the path of miqp with {self._intervals} intervals {fault}"
         longest = _priced(plan) if plan.certified else inf
         with within_time(PROMISING_TIME, processor):
             return self._first(chain([(others, f"by {FREE_KNOTS}")], more), said, longest) or plan
 
-    def _looks_poor(self, plan: Plan) -> bool:
-        """Return whether a plan goes astray, turns over too often, or is suspiciously long with windows."""
-        found, is_timed = plan.assessment, any(stage.at != "free" for stage in self._stages.stages)
+    def _fault(self, plan: Plan) -> str:
+        """Return what makes a plan poor, in words; nothing for a good one."""
+        # attempts of programs have a dt; attempts at paths have a cost if the path is nearly feasible
+        paths = [made for made in self.recorder.attempts if made.dt is None and made.cost is not None]
+        fastest = min((path.duration for path in paths), default=inf)
+        if not plan.certified:
+            return "was not certified"
+        if plan.bound is not None:
+            return "was the program's own, not refined"
+        if plan.duration > SLOW_FACTOR * fastest:
+            return "was slower than one that nearly held"
+        found = plan.assessment
         if found is None:
-            return False
-        return found.goes_astray or found.extra_turns > 0 or (is_timed and found.suspicious)
+            return ""
+        if found.goes_astray:
+            return "went astray"
+        if found.extra_turns > 0:
+            return "turned over more often than asked"
+        is_timed = any(stage.at != "free" for stage in self._stages.stages)
+        return "took suspiciously long" if is_timed and found.suspicious else ""
 
     def __str__(self) -> str:
         """The fallbacks that found no plan, as a part of a sentence."""

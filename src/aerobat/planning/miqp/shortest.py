@@ -75,7 +75,7 @@ def _from_flown(
     scan: _Scan, starts: Iterator[tuple[_Slots, WarmStart]], segments: int
 ) -> Judged[RefinedPath] | None:
     """The path near the scan's first answer that the vehicle can fly as it is, or None."""
-    for _ in starts:
+    for _ in starts:  # runs the scan to its end, which finds what the vehicle can fly
         pass
     if scan.flown is None or out_of_time():
         return None
