@@ -36,6 +36,9 @@ def test_a_line_names_the_planner_its_time_the_best_so_far_and_the_last_attempt(
         progress.record(attempt(duration, feasible))
     clock.now = 61.0
     assert str(progress) == "planning with free-knots for 61 s: 2.100 s so far; attempt 4: 2.300 s, so"
+    progress.tried("reserve 0.15: 97 % pass")
+    said = "planning with free-knots for 61 s: round 2, no plan so far; attempt 4: 2.300 s, so"
+    assert str(progress) == f"{said}; round 1, reserve 0.15: 97 % pass"
     progress.begin("miqp")
     clock.now = 63.0
     assert str(progress) == "planning with miqp for 2 s: no plan so far"

@@ -105,8 +105,8 @@ class PlanningProgress(Progress):
         """The planner, the time spent, its best duration, and its last attempt."""
         best = "no plan so far" if self._best == inf else f"{self._best:.3f} s so far"
         last = f"; attempt {self._tried}: {self._last}" if self._tried else ""
-        spent = self._clock() - self._began
-        return f"planning with {self._planner} for {spent:.0f} s: {best}{last}{self._trial}"
+        spent, number = self._clock() - self._began, f"round {self._rounds + 1}, " if self._rounds else ""
+        return f"planning with {self._planner} for {spent:.0f} s: {number}{best}{last}{self._trial}"
 
 
 @contextmanager
