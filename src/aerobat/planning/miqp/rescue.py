@@ -29,6 +29,7 @@ MANY_INTERVALS = 40  # tried too if larger: a narrow window near an end needs in
 RESCUE_TIME = 4.0  # processor time [s] of all fallbacks, so that refusals take 5 s (benchmarks/audit.py)
 # processor time [s] where a plan most likely exists, as a path with small constraint violations was found
 PROMISING_TIME = 15.0
+SHORTENING_TIME = 8.0  # processor time [s] where a plan is known, but poor
 FALLBACK_FRACTION = 0.75  # fraction of the remaining time for one fallback, so that the next has some
 # factor on the duration of a nearly feasible path above which a plan is poor: of the plans of 300 random
 # problems, it selects those far from the best
@@ -90,7 +91,7 @@ class Rescue:
         more = with_more_intervals(self.requested, self.problem, self.vehicle)
         said = f"the path of miqp with {self._intervals} intervals {fault}"
         longest = _priced(plan) if plan.certified else inf
-        with within_time(PROMISING_TIME, processor):
+        with within_time(SHORTENING_TIME, processor):
             return self._first(chain([(others, f"by {FREE_KNOTS}")], more), said, longest) or plan
 
     def _fault(self, plan: Plan) -> str:
