@@ -92,7 +92,8 @@ class Rescue:
         more = with_more_intervals(self.requested, self.problem, self.vehicle)
         said = f"the path of miqp with {self._intervals} intervals {fault}"
         longest = _priced(plan) if plan.certified else inf
-        fallbacks = chain(self._faster_through_gates(), [(others, f"by {FREE_KNOTS}")], more)
+        faster = () if plan.certified else self._faster_through_gates()
+        fallbacks = chain(faster, [(others, f"by {FREE_KNOTS}")], more)
         with within_time(SHORTENING_TIME, processor):
             return self._first(fallbacks, said, longest) or plan
 

@@ -32,6 +32,7 @@ SELECTION_FLIGHTS = range(10**6, 10**6 + 200)  # flights that select the plan; o
 FIRST_FLIGHTS = 50  # of these: where enough of them succeed, the plan is kept
 SUFFICIENT_SUCCESS = 0.975  # fraction of these flights: most plans with as many successes are proven for 95 %
 CERTAIN_SUCCESS = 0.985  # fraction of these flights with which no further plan is tried
+MIN_GAIN = 0.02  # fraction of these flights that must succeed beyond the best so far for a longer plan
 # [s] processor time limit of all these plans, most of which take 0.3 to 1; each may take half of what is left
 PLANNING_TIME = 4.0
 LEAST_TIME = 0.5  # [s] of which no plan is begun with less
@@ -108,7 +109,8 @@ def _steadier(task: PassingTask, plan: Plan, reserve: float) -> Plan:
                 too_slow = rate
                 continue
             share = passed(task.scores(other, SELECTION_FLIGHTS))
-            if share.count > best.count and other.certified and other.flies:
+            gain = MIN_GAIN if other.duration > found.duration else 0.0
+            if share.fraction > best.fraction + gain and other.certified and other.flies:
                 slower = "" if rate == 1.0 else f", turning at most {100 * rate:g} % as fast"
                 why = (
                     f"goes on from {plan.planner}'s {plan.duration:.3f} s{how}{slower}: {share.count} of "
