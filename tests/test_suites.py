@@ -20,9 +20,9 @@ EITHER = "not (browser or ros)"  # slow tests and others
 LONG = """
 import budget, pytest
 
-budget.LIMIT = 0.01
+budget.LIMIT = 0.05
 
-def work(): sum(range(10_000_000))
+def work(): sum(range(20_000_000))
 
 def test_plain(): work()
 
@@ -33,10 +33,10 @@ def test_slow(): work()
 FIRST = """
 import budget, functools
 
-budget.LIMIT = 0.01
+budget.LIMIT = 0.05
 
 @functools.cache
-def work(): sum(range(10_000_000))
+def work(): sum(range(20_000_000))
 
 def test_plain(): work()
 """

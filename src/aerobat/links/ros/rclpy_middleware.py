@@ -19,6 +19,8 @@ from aerobat.links.ros.middleware import (
     require_time,
 )
 
+CLOSING_TIME = 2.0  # [s] of the wall for each thread that ends
+
 
 class RclpyMiddleware:
     """A node of ROS 2; see `Middleware`."""
@@ -49,7 +51,9 @@ class RclpyMiddleware:
         self._executors = SingleThreadedExecutor(), MultiThreadedExecutor(4)
         for executor, node in zip(self._executors, (self._node, self._waiting), strict=True):
             executor.add_node(node)
-            Thread(target=executor.spin, daemon=True).start()
+        self._threads = [Thread(target=executor.spin, daemon=True) for executor in self._executors]
+        for thread in self._threads:
+            thread.start()
         require_time(self.time)
 
     @staticmethod
@@ -119,6 +123,8 @@ class RclpyMiddleware:
         for executor in self._executors:
             executor.shutdown(0.0)
         self._rclpy.try_shutdown()
+        for thread in self._threads:  # one that runs when the interpreter ends would abort the process
+            thread.join(CLOSING_TIME)
 
 
 def _rclpy() -> Any:
