@@ -242,10 +242,14 @@ def test_a_flip_that_contradicts_its_gate_is_refused_in_words(
         Flip(axis_deg).stage_sequence([gate], 50.0)
 
 
-def test_a_flip_without_a_gate_refuses_to_say_how_one_is_passed() -> None:
+def test_a_maneuver_without_a_gate_refuses_to_say_how_one_is_passed() -> None:
     assert Flip().as_in_paper().stage_sequence((), 30.0).stages
-    with pytest.raises(SpecError, match=r"^maneuver\.passage needs a gate, and the flip has none"):
-        Flip(passage=GatePassage(speed=3.0)).stage_sequence((), 30.0)
+    assert not Line().as_in_paper().stage_sequence((), 30.0).stages
+    for kind, maneuver in (("flip", Flip), ("line", Line)):
+        with pytest.raises(
+            SpecError, match=rf"^maneuver\.passage needs a gate, and the {kind} has none; add one"
+        ):
+            maneuver(passage=GatePassage(speed=3.0)).stage_sequence((), 30.0)
 
 
 def test_maneuvers_ask_their_gates_attitude_about_both_axes_within_a_tenth_of_its_tolerance() -> None:

@@ -78,12 +78,7 @@ class Rescue:
         return self.problem.stages(self.vehicle.max_specific_thrust)
 
     def shortened(self, plan: Plan) -> Plan:
-        """Return the plan, or where it is poor a faster plan by a fallback, which its `rescue` names.
-
-        A plan is poor if it is not certified, is a program's own path, goes astray, or turns over more often
-        than its stages ask. A plan is also poor if a nearly feasible path is much faster, or if stages have
-        windows and the plan is suspiciously long.
-        """
+        """Return the plan, or where it is poor a faster plan by a fallback, which its `rescue` names."""
         fault = self._fault(plan)
         if not fault:
             return plan
@@ -213,7 +208,7 @@ class Rescue:
 
         A body that turns leaves a low gate's frame sooner so.
         """
-        if hasattr(self.problem.maneuver, "passage"):
+        if self.problem.gates and hasattr(self.problem.maneuver, "passage"):
             yield _FasterThroughGates(replace(self.requested, rescue=False)), "faster through its gates"
 
     def _others(self) -> Iterator[tuple[Planner, str]]:

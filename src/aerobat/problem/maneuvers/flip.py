@@ -75,8 +75,7 @@ class Flip(Maneuver):
         there is no gate, or where the gate's upright is not in the plane of the turn.
         """
         gate = passed_gate(gates, self.gate, self.kind) if gates or self.gate is not None else None
-        if gate is None and self.passage not in (GatePassage(), PAPER_PASSAGE):
-            raise SpecError("maneuver.passage needs a gate, and the flip has none; add one or drop passage")
+        self.passage.require_gate(gates, self.kind)
         at_gate_deg = inf if gate is None else self._angle_deg(gate)
         turns = [360.0 * k + angle for k in range(self.count) for angle in self.ANGLES_DEG]
         turns += [360.0 * k for k in range(1, self.count)]

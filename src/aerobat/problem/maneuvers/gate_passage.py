@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from aerobat.declaration import NonNegative, declared
+from aerobat.errors import SpecError
 from aerobat.problem.condition import Condition, Quantity
 from aerobat.problem.gate import Gate
 from aerobat.problem.stage import (
@@ -40,6 +41,13 @@ class GatePassage:
     def __post_init__(self) -> None:
         """Check the margin."""
         check_margin(self.crossing_point, self.margin)
+
+    def require_gate(self, gates: Sequence[Gate], maneuver: str) -> None:
+        """Raise SpecError where a maneuver of this kind says how a gate is passed, and there is none."""
+        if not gates and self not in (GatePassage(), PAPER_PASSAGE):
+            raise SpecError(
+                f"maneuver.passage needs a gate, and the {maneuver} has none; add one or drop passage"
+            )
 
     def stage(
         self, gate: Gate, conditions: Sequence[Condition] = (), min_thrust: float | None = None

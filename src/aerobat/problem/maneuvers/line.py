@@ -17,7 +17,8 @@ class Line(Maneuver):
     passage: GatePassage = GatePassage()  # how the gates are passed
 
     def stage_sequence(self, gates: Sequence[Gate], max_specific_thrust: float) -> StageSequence:
-        """Return one stage for each gate, and no others."""
+        """Return one stage for each gate, and no others. Raises SpecError for a passage without a gate."""
+        self.passage.require_gate(gates, self.kind)
         return StageSequence(tuple(self.passage.stage(gate) for gate in gates))
 
     def in_words(self, gates: Sequence[Gate]) -> str:

@@ -108,9 +108,11 @@ def _steadier(task: PassingTask, plan: Plan, reserve: float) -> Plan:
             if other.duration > MAX_DURATION_RATIO * plan.duration:
                 too_slow = rate
                 continue
+            if not (other.certified and other.flies):
+                continue
             share = passed(task.scores(other, SELECTION_FLIGHTS))
             gain = MIN_GAIN if other.duration > found.duration else 0.0
-            if share.fraction > best.fraction + gain and other.certified and other.flies:
+            if share.fraction > best.fraction + gain:
                 slower = "" if rate == 1.0 else f", turning at most {100 * rate:g} % as fast"
                 why = (
                     f"goes on from {plan.planner}'s {plan.duration:.3f} s{how}{slower}: {share.count} of "
