@@ -12,12 +12,7 @@ import pytest
 import aerobat as ab
 from aerobat.planning.result import FLYING_RESERVE
 from aerobat.studies.passing import steadied
-from aerobat.studies.passing.steadying import (
-    MAX_DURATION_RATIO,
-    MAX_LAG_ANGLE,
-    MIN_GAIN,
-    SELECTION_FLIGHTS,
-)
+from aerobat.studies.passing.steadying import DURATION_PRICE, MAX_LAG_ANGLE, MIN_GAIN, SELECTION_FLIGHTS
 from aerobat.vehicle import load_vehicle
 
 PLANNER = ab.Miqp(reserve=FLYING_RESERVE)
@@ -42,7 +37,7 @@ def test_a_steadied_plan_is_as_fast_turns_slower_and_more_other_flights_succeed(
     assert found.flies
     assert found.keeps(FLYING_RESERVE)
     assert (found.problem, found.vehicle) == (first.problem, first.vehicle)
-    assert found.duration <= MAX_DURATION_RATIO * first.duration
+    assert found.duration <= 1.03 * first.duration
     assert found.assessment.max_body_rate < 0.85 * first.assessment.max_body_rate
     assert succeeded(found) > succeeded(first) + 10
     assert "instead of" in found.rescue
@@ -56,8 +51,28 @@ def test_a_longer_plan_is_worth_its_time(vehicle: str, tilt: float) -> None:
     found = steadied(first, PLANNER, ab.load_dispersion("lab"))
     if found.duration > first.duration:
         more, less = map(int, re.findall(r"(\d+)(?: of 200 flights| *$)", found.rescue))
-        assert more - less >= MIN_GAIN * len(SELECTION_FLIGHTS)
-    assert found.duration <= MAX_DURATION_RATIO * first.duration
+        worth = max(MIN_GAIN, DURATION_PRICE * math.log(found.duration / first.duration))
+        assert more - less >= worth * len(SELECTION_FLIGHTS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("vehicle", "figure", "before", "least"),
+    [("crazyflie", "matty-flip", 100, 170), ("agilicious", "inverted-pass", 180, 190)],
+)
+def test_figures_without_gates_leave_more_to_the_controller_where_flights_stray(
+    vehicle: str, figure: str, before: int, least: int
+) -> None:
+    """Plans without gates were once left as they were: of the Crazyflie's matty flip 50 of 200 succeeded."""
+    lab = ab.load_dispersion("lab")
+    first = ab.plan(figure, PLANNER, vehicle)
+    found = steadied(first, PLANNER, lab)
+    assert found.certified
+    assert found.keeps(FLYING_RESERVE + 0.05)
+    assert succeeded(first) < before
+    assert succeeded(found) >= least
+    own = replace(PLANNER, reserve=FLYING_RESERVE - 0.01)  # a reserve that somebody chose does not grow
+    assert not steadied(first, own, lab).keeps(FLYING_RESERVE + 0.05)
 
 
 @pytest.mark.slow
@@ -66,7 +81,7 @@ def test_half_flips_through_tilted_gates_keep_their_attitude_in_most_flights():
     for tilt, least in ((60.0, 190), (75.0, 195)):
         first = ab.plan(half_flip(tilt), PLANNER, "agile-quad")
         found = steadied(first, PLANNER, ab.load_dispersion("lab"))
-        assert found.duration <= MAX_DURATION_RATIO * first.duration
+        assert found.duration <= 1.03 * first.duration
         assert succeeded(found) >= least
         assert "with more thrust in gates" in found.rescue
 
@@ -75,7 +90,7 @@ def test_plans_stay_where_the_lag_turns_little_or_no_reserve_is_asked():
     lab, planner = ab.load_dispersion("lab"), ab.MinSnap()
     calm = ab.plan("line", planner, "crazyflie")
     assert steadied(calm, planner, lab) is calm
-    assert steadied(calm, PLANNER, lab) is calm  # no gate is passed
+    assert steadied(calm, PLANNER, lab) is calm
     fast = ab.plan("half-flip", PLANNER, "crazyflie")
     assert steadied(fast, ab.Miqp(), lab) is fast
     crazyflie = load_vehicle("crazyflie")

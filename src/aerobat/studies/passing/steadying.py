@@ -1,41 +1,72 @@
-"""A plan about as fast as the first one, but with more successful flights: used by commands.
+"""A plan with more successful flights than the first one, where that is worth its time: used by commands.
 
 Rotors with an unknown lag are late by an angle proportional to the body rate. Paths with much lower body
 rates often take hardly longer. A push that no model contains, such as unknown drag, tilts the vehicle by the
-ratio of push to thrust, so that more thrust in a gate keeps the attitude there.
+ratio of push to thrust, so that more thrust in a gate keeps the attitude there. A larger reserve of every
+rotor leaves more to the controller.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from math import radians
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import log, radians
 
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
-from aerobat.evaluation import Score
 from aerobat.optimization.deadline import processor
 from aerobat.planning import Attempt, Plan, Planner, as_planner
+from aerobat.planning.result import FLYING_RESERVE
 from aerobat.problem import Problem
 from aerobat.studies.flights import joined, passed
 from aerobat.studies.passing.spread import with_more_thrust, with_narrower_gates
 from aerobat.studies.passing.task import PassingTask, Variant, warm_started_refinement
-from aerobat.studies.share import Trials
+from aerobat.studies.share import Share, Trials
 from aerobat.studies.workers import pool
 
 MAX_LAG_ANGLE = radians(5.0)  # [rad] turned within the rotors' lag, above which flights may be too late
-# of the largest body rate, in the order of trial (benchmarks/steadying.py); 1 only refines the path once more
-BODY_RATE_FRACTIONS = (0.65, 1.0, 0.5, 0.8)
-MAX_DURATION_RATIO = 1.03  # longest duration, over that of the first plan
 SELECTION_FLIGHTS = range(10**6, 10**6 + 200)  # flights that select the plan; other flights judge it
 FIRST_FLIGHTS = 50  # of these: where enough of them succeed, the plan is kept
-SUFFICIENT_SUCCESS = 0.975  # fraction of these flights: most plans with as many successes are proven for 95 %
-CERTAIN_SUCCESS = 0.985  # fraction of these flights with which no further plan is tried
-MIN_GAIN = 0.02  # fraction of these flights that must succeed beyond the best so far for a longer plan
+# fraction of these flights, less the price of the duration, with which no further plan is tried; most plans
+# with as many successes are proven for 95 %
+SUFFICIENT_SUCCESS = 0.975
+MIN_GAIN = 0.02  # fraction of these flights that must succeed beyond the first plan's for a longer plan
+# price of a duration e times as long, as a fraction of these flights: of a plan 10 % longer, 5 of 100 flights
+# more must succeed
+DURATION_PRICE = 0.5
 # [s] processor time limit of all these plans, most of which take 0.3 to 1; each may take half of what is left
 PLANNING_TIME = 4.0
 LEAST_TIME = 0.5  # [s] of which no plan is begun with less
+
+
+@dataclass(frozen=True)
+class _Tightening:
+    """What is asked of a further plan."""
+
+    rate: float  # limit of the body rate, as a fraction of the first plan's largest; 1 only refines once more
+    reserve: float = 0.0  # beyond the first plan's
+    thrust: bool = False  # whether more thrust is asked in gates
+
+    def contains(self, other: _Tightening) -> bool:
+        """Return True where whatever the other asks is asked here too."""
+        return self.rate <= other.rate and self.reserve >= other.reserve and self.thrust >= other.thrust
+
+    def described(self, reserve: float) -> str:
+        """Return the differences from the first plan in words, whose reserve is given."""
+        stronger = ", with more thrust in gates" if self.thrust else ""
+        slower = "" if self.rate == 1.0 else f", turning at most {100 * self.rate:g} % as fast"
+        kept = f", with a reserve of {reserve + self.reserve:g}" if self.reserve else ""
+        return stronger + slower + kept
+
+
+# In the order of trial. Lower body rates cost flips through gates hardly any time, and more thrust keeps
+# their attitude; of figures without gates more reserve costs the least time (benchmarks/steadying.py).
+_TIGHTENINGS = (
+    *(_Tightening(rate, thrust=thrust) for rate in (0.65, 0.5) for thrust in (False, True)),
+    *(_Tightening(1.0, reserve, thrust) for reserve in (0.1, 0.2) for thrust in (False, True)),
+    *(_Tightening(0.8, reserve) for reserve in (0.0, 0.1)),
+)
 
 
 @validated
@@ -48,10 +79,12 @@ def steadied(
     controller: str = "full",
     progress: Callable[[Attempt], None] | None = None,
 ) -> Plan:
-    """Return the plan, or one at most 3 % longer of which more flights succeed.
+    """Return the plan, or another one of which more flights succeed, if that is worth its longer duration.
 
-    It has lower body rates, and more thrust in gates that flights pass with a wrong attitude. Others are
-    searched only if there are gates, the rotors' lag matters, and too few of some flights succeed.
+    The other has lower body rates, more reserve, or more thrust in stages that flights pass with a wrong
+    attitude. A duration 10 % longer is worth 5 of 100 flights. More reserve is tried only where the planner
+    has the default reserve. Other plans are searched only if the rotors' lag matters, and too few of some
+    flights succeed.
 
     Args:
         plan: The first plan, for a vehicle.
@@ -63,7 +96,7 @@ def steadied(
     """
     planner = as_planner(planner)
     vehicle, reserve = plan.vehicle, getattr(planner, "reserve", 0.0)
-    if vehicle is None or plan.assessment is None or not (reserve and plan.problem.gates and plan.flies):
+    if vehicle is None or plan.assessment is None or not (reserve and plan.flies):
         return plan
     if float(vehicle.lags.max()) * (plan.assessment.max_body_rate or 0.0) <= MAX_LAG_ANGLE:
         return plan
@@ -80,53 +113,77 @@ def steadied(
             progress=progress,
             flying=flying,
         )
-        return _steadier(task, plan, kept)
+        return _steadier(task, plan, kept, may_grow=reserve == FLYING_RESERVE)
 
 
-def _steadier(task: PassingTask, plan: Plan, reserve: float) -> Plan:
-    """Return the plan, or one with more thrust in gates or lower body rates of which more flights succeed."""
+@dataclass(frozen=True)
+class _Flown:
+    """A plan, and the share of its flights that succeed."""
+
+    plan: Plan
+    share: Share
+    value: float  # fraction of the flights that succeed, less the price of the duration
+
+    def explained(self, first: _Flown, how: str) -> Plan:
+        """Return the plan with its relation to the first plan as its `rescue`."""
+        why = (
+            f"goes on from {first.plan.planner}'s {first.plan.duration:.3f} s{how}: {self.share.count} of "
+            f"{self.share.of} flights succeed instead of {first.share.count}"
+        )
+        return replace(self.plan, attempts=(*first.plan.attempts, *self.plan.attempts), rescue=why)
+
+
+def _steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> Plan:
+    """Return the plan, or the most valuable of others of which enough more flights succeed.
+
+    Args:
+        task: The flights, and the planner of further plans.
+        plan: The first plan.
+        reserve: The reserve that the first plan keeps.
+        may_grow: Whether larger reserves are tried, too.
+    """
     scores = task.scores(plan, SELECTION_FLIGHTS[:FIRST_FLIGHTS])
     if passed(scores).fraction >= SUFFICIENT_SUCCESS:
         return plan
     scores = joined([scores, task.scores(plan, SELECTION_FLIGHTS[FIRST_FLIGHTS:])])
-    first = best = passed(scores)
-    if first.fraction >= SUFFICIENT_SUCCESS:
-        return plan
+    share = passed(scores)
+    first = best = _Flown(plan, share, share.fraction)
     found, deadline = plan, processor() + PLANNING_TIME
-    for problem, how in _tightened(task, plan, scores):
-        too_slow = 0.0  # largest fraction of the body rate with which a path took too long
-        for rate in BODY_RATE_FRACTIONS:
-            left = deadline - processor()
-            if best.fraction >= CERTAIN_SUCCESS or left <= LEAST_TIME:
-                return found
-            if rate <= too_slow:
-                continue
-            try:
-                other = task.tightened(plan, reserve, Variant(rate, True), problem, 0.5 * left)
-            except (Infeasible, SpecError):  # no plan, or gates too narrow for one
-                continue
-            if other.duration > MAX_DURATION_RATIO * plan.duration:
-                too_slow = rate
-                continue
-            if not (other.certified and other.flies):
-                continue
+    narrower = with_narrower_gates(plan.problem, task.vehicle, scores)
+    stronger = with_more_thrust(narrower, task.vehicle, plan, scores, SUFFICIENT_SUCCESS)
+    too_long: list[_Tightening] = []  # whose plans are not worth their duration
+    for each in _tightenings(plan.problem, may_grow, stronger != narrower):
+        left = deadline - processor()
+        if best.value >= SUFFICIENT_SUCCESS or left <= LEAST_TIME:
+            break
+        if any(each.contains(other) for other in too_long):
+            continue
+        problem, variant = stronger if each.thrust else narrower, Variant(each.rate, True)
+        try:
+            other = task.tightened(plan, reserve + each.reserve, variant, problem, 0.5 * left)
+        except (Infeasible, SpecError):  # no plan, or gates too narrow for one
+            continue
+        price = DURATION_PRICE * log(other.duration / plan.duration)
+        if 1.0 - price <= best.value:
+            too_long.append(each)
+        elif other.certified and other.flies:
             share = passed(task.scores(other, SELECTION_FLIGHTS))
-            gain = MIN_GAIN if other.duration > found.duration else 0.0
-            if share.fraction > best.fraction + gain:
-                slower = "" if rate == 1.0 else f", turning at most {100 * rate:g} % as fast"
-                why = (
-                    f"goes on from {plan.planner}'s {plan.duration:.3f} s{how}{slower}: {share.count} of "
-                    f"{share.of} flights succeed instead of {first.count}"
-                )
-                attempts = (*plan.attempts, *other.attempts)
-                best, found = share, replace(other, attempts=attempts, rescue=why)
+            flown = _Flown(other, share, share.fraction - price)
+            gain = MIN_GAIN if price > 0.0 else 0.0
+            if flown.value > best.value and share.fraction > first.share.fraction + gain:
+                best, found = flown, flown.explained(first, each.described(reserve))
     return found
 
 
-def _tightened(task: PassingTask, plan: Plan, scores: Score) -> Iterator[tuple[Problem, str]]:
-    """Yield the problem with more thrust in gates and with narrower gates only, and how each differs."""
-    narrower = with_narrower_gates(plan.problem, task.vehicle, scores)
-    stronger = with_more_thrust(narrower, task.vehicle, plan, scores, SUFFICIENT_SUCCESS)
-    if stronger != narrower:
-        yield stronger, ", with more thrust in gates"
-    yield narrower, ""
+def _tightenings(problem: Problem, may_grow: bool, may_push: bool) -> list[_Tightening]:
+    """Return the tightenings that are tried; larger reserves and more thrust in gates only where they may be.
+
+    Without gates only larger reserves are tried, if they may be.
+    """
+    allowed = [
+        each
+        for each in _TIGHTENINGS
+        if (may_grow or not each.reserve) and (not each.thrust or (may_push and problem.gates))
+    ]
+    larger = [each for each in allowed if each.reserve]
+    return allowed if problem.gates or not larger else larger
