@@ -56,7 +56,7 @@ class Commander:
 
         Args:
             vehicle: of which the maximum thrust is used for braking.
-            gravity: [m/s²].
+            gravity: [m/s²] until a mission begins, whose plan has its own.
             period: from one tick to the next [s].
             say: receives sentences about the progress.
         """
@@ -127,6 +127,7 @@ class Commander:
         """Fly a mission from a hover. Raises SpecError where the vehicle does not hover."""
         mission.join(now, self.require_hover(now))
         self.mission, self.log, self.route = mission, [], None
+        self._gravity = mission.gravity
         self.doing = Doing.MANEUVERING
 
     def step(self, now: float, late: float = 0.0) -> PathGoal | None:

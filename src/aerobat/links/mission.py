@@ -86,7 +86,7 @@ class Mission(Generic[GoalT_co]):
         self.phase = Phase.READY
         self.reason = ""  # the reason of an abort
         self.max_lateness = 0.0  # [s] largest delay of the plan's set-points so far
-        environment = plan.problem.environment
+        self.gravity = plan.problem.environment.gravity  # [m/s²]
         self.stream = follower.stream
         self._follower = follower
         first, last = self.stream.flat(0.0), self.stream.flat(self.stream.duration)
@@ -100,7 +100,7 @@ class Mission(Generic[GoalT_co]):
         self._heading = plan.trajectory.heading
         self._final_yaw = yaw_of(self.stream.at(self.stream.duration).q_world_body)
         motion = last.position, last.velocity
-        self._after = Braking.of(*motion, plan.vehicle, environment.gravity, -np.inf).trajectory
+        self._after = Braking.of(*motion, plan.vehicle, self.gravity, -np.inf).trajectory
         self.began = np.nan  # [s] start time of the phase
         self.maneuver_began = np.nan  # [s]
         self._last_tick = np.nan

@@ -120,5 +120,6 @@ class CrazyswarmServer(VehicleNode):
         path = as_path(pieces, heading=float(pieces["polynomials"][0, 3, 0]))
         here = self.vehicle.state.position
         offset = here - path.evaluate(0.0) if request.relative else _ZERO
-        stream = SetpointStream(path, self.vehicle.vehicle, Environment(), offset)
+        environment = Environment(gravity=self.vehicle.gravity)
+        stream = SetpointStream(path, self.vehicle.vehicle, environment, offset)
         self._flown = stream, self.vehicle.time

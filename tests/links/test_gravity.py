@@ -1,0 +1,92 @@
+"""Links where gravity is not the Earth's: what is flown follows the gravity that was planned with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import aerobat as ab
+from aerobat import so3
+from aerobat.interchange.exports.crazyflie import AXES
+from aerobat.interchange.ros import Messages
+from aerobat.kernels.rigid_body import Body
+from aerobat.links.autopilot.vehicle import SimulatedVehicle
+from aerobat.links.commander import Commander, Doing
+from aerobat.links.goals import Observed, PathPiece
+from aerobat.links.mission import Mission, MissionSettings, Phase
+from aerobat.links.path_follower import PathForwarder
+from aerobat.links.ros.crazyswarm import SERVICES
+from aerobat.links.ros.crazyswarm_server import CrazyswarmServer
+from aerobat.links.routes import rest_to_rest
+from aerobat.links.stream import SetpointStream
+from ros_sky import BEGAN, Graph, Ros
+
+MOON = ab.Environment(gravity=1.62)
+NAME = "/cf231"
+
+
+def test_a_hold_in_a_maneuver_brakes_by_the_gravity_of_that_maneuver() -> None:
+    """A climb ends by gravity, on the Moon six times as slowly as on Earth: rotors do not pull down."""
+    vehicle, low, high = ab.load_vehicle("agile-quad"), np.array([0.0, 0.0, 3.0]), np.array([0.0, 0.0, 33.0])
+    path = rest_to_rest(low, high, max_speed=4.0)
+    problem = ab.Problem(name="climb", start=ab.at_rest(low), goal=ab.at_rest(high), environment=MOON)
+    plan = ab.Plan(problem=problem, trajectory=path, planner="by hand", status="").for_vehicle(vehicle)
+    stream = SetpointStream(path, vehicle, MOON, np.zeros(3))
+    mission = Mission(plan, MissionSettings(), PathForwarder(stream))
+    now, period = 0.0, 0.05  # [s]
+    commander = Commander(vehicle, ab.Environment().gravity, period)
+    commander.observe(Observed(now, Body((0.0, 0.0, 3.0), (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), (0.0,) * 3)))
+    commander.begin(now, mission)
+    while mission.phase is not Phase.MANEUVER or now - mission.maneuver_began < 0.5 * path.duration:
+        goal, now = commander.step(now), now + period
+        assert goal is not None
+        reached = goal.position, goal.velocity, goal.q_world_body, goal.omega
+        commander.observe(Observed(now, Body(*(tuple(part.tolist()) for part in reached))))
+    commander.hover(now)
+    assert commander.doing is Doing.BRAKING
+    assert commander.route is not None
+    braking = commander.route.path
+    assert braking.evaluate(0.0, 1)[2] > 3.0
+    thrust = braking.evaluate(np.linspace(0.0, braking.duration, 200), 2)[:, 2] + MOON.gravity
+    assert (thrust > 0.0).all()
+
+
+def test_an_uploaded_trajectory_leans_by_the_gravity_around_the_vehicle(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    graph = Graph(2)
+    ros = Ros(graph)
+    vehicle = SimulatedVehicle(replace(ab.load_vehicle("crazyflie"), drag_body=np.zeros(3)), MOON)
+    server = CrazyswarmServer(ros, vehicle, NAME)
+
+    def order(service: str, **request: Any) -> None:
+        ros.client(f"{NAME}/{service}", SERVICES[service])(group_mask=0, **request)
+
+    def run_for(seconds: float) -> None:
+        end = graph.time + round(1e9 * seconds)
+        while graph.time < end:
+            graph.time += 4_000_000
+            graph.deliver()
+            server.tick((graph.time - BEGAN) / 1e9)
+
+    order("takeoff", height=1.0)
+    run_for(3.0)
+    aside = rest_to_rest(np.zeros(3), np.array([1.5, 0.0, 0.0]))
+    powers = aside.coefficients[0] / aside.duration ** np.arange(6)[:, None]
+    polynomials = {f"poly_{axis}": row for axis, row in zip(AXES, [*powers.T, np.zeros(1)], strict=True)}
+    duration = Messages(ros.make).time("Duration", round(1e9 * aside.duration))
+    piece = ros.make("crazyflie_interfaces/msg/TrajectoryPolynomialPiece", duration=duration, **polynomials)
+    order("upload_trajectory", trajectory_id=1, piece_offset=0, pieces=[piece])
+    order("start_trajectory", trajectory_id=1, timescale=1.0, reversed=False, relative=True)
+    followed: list[PathPiece] = []
+    monkeypatch.setattr(vehicle, "follow_path", followed.append)
+    run_for(aside.duration)
+    goals = [piece.begin for piece in followed]
+    leaning = so3.thrust_axis(np.array([goal.q_world_body for goal in goals]))
+    asked = np.array([goal.acceleration for goal in goals]) + MOON.weight
+    asked /= np.linalg.norm(asked, axis=1, keepdims=True)
+    assert asked[:, 2].min() < 0.7  # 45° and more
+    np.testing.assert_allclose(leaning, asked, atol=0.01)
