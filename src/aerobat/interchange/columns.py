@@ -19,6 +19,7 @@ from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange.csv import write_csv
 from aerobat.interchange.rows import NAMES, PATH
+from aerobat.interchange.tables import csv_text
 from aerobat.planning import Plan
 from aerobat.storage import write_whole
 
@@ -76,8 +77,7 @@ def columns_text(plan: Plan, columns: Sequence[str], rate: float) -> str:
         raise SpecError(f"{' and '.join(columns)} follow from a vehicle, and the plan has none; plan for one")
     header = [column for name in written for column in _header(name, groups[name].shape[1])]
     rows = np.concatenate([groups[name] for name in written], axis=1)
-    lines = [",".join(header), *(",".join(map(repr, row)) for row in rows.tolist())]
-    return "\n".join(lines) + "\n"
+    return csv_text([header, *rows.tolist()])
 
 
 def _header(group: str, count: int) -> Sequence[str]:

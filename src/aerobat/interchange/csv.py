@@ -22,6 +22,7 @@ from aerobat.interchange.rows import (
     require_numbers,
     rows_of_columns,
 )
+from aerobat.interchange.tables import csv_text
 from aerobat.storage import read_whole, write_whole
 from aerobat.trajectory import Carrier, Trajectory, as_trajectory
 from aerobat.trajectory.piecewise import MAX_DURATION
@@ -43,7 +44,7 @@ def write_csv(trajectory: Trajectory | Carrier, path: PathName, rate: Positive =
     rows = np.concatenate([trajectory.evaluate(times, k) for k in range(4)], axis=1)
     if abs(times[-1] - (len(times) - 1) / rate) > SAME_TIME:
         rows = np.column_stack([rows, times])
-    write_whole(path, "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()))
+    write_whole(path, csv_text(rows.tolist()))
 
 
 @validated

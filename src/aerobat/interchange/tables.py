@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +32,7 @@ def write_table(table: Mapping[str, Any], path: PathName) -> None:
     columns = _columns(table)
     if _suffix(path) == CSV:
         rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-        text = io.StringIO()
-        csv.writer(text, lineterminator="\n").writerows([list(columns), *rows])
-        write_whole(path, text.getvalue())
+        write_whole(path, csv_text([columns, *rows]))
         return
     parquet = _parquet()
     from pyarrow import table as arrow_table
@@ -57,6 +55,13 @@ def read_table(path: PathName) -> dict[str, NDArray[Any]]:
         if _suffix(path) == CSV:
             return _from_csv(read_text(Path(path), MAX_TABLE))
         return _from_parquet(Path(path))
+
+
+def csv_text(rows: Iterable[Iterable[Any]]) -> str:
+    """Return lines of numbers or text with commas between, digits enough to read all numbers back exactly."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 def require_writable(path: PathName) -> None:

@@ -15,6 +15,7 @@ from aerobat.errors import SpecError
 from aerobat.interchange.exports.heading import POWERS, YawFit, fit_yaw
 from aerobat.interchange.exports.loss import Content, Loss, peak_difference
 from aerobat.interchange.exports.refit import DEGREE, refit
+from aerobat.interchange.tables import csv_text
 from aerobat.planning import Plan
 from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
@@ -81,6 +82,6 @@ def _loss(plan: Plan, path: Trajectory, yaw: YawFit) -> Loss:
 
 
 def _csv(pieces: Pieces) -> bytes:
-    header = ",".join(["duration", *(f"{axis}^{power}" for axis in AXES for power in range(POWERS))])
+    header = ["duration", *(f"{axis}^{power}" for axis in AXES for power in range(POWERS))]
     rows = np.column_stack([pieces["duration"], pieces["polynomials"].reshape(len(pieces), -1)])
-    return "\n".join([header, *(",".join(map(repr, row)) for row in rows.tolist()), ""]).encode()
+    return csv_text([header, *rows.tolist()]).encode()

@@ -14,6 +14,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.flatness import Reference, reference
 from aerobat.interchange.exports.loss import Content, ExportRows
+from aerobat.interchange.tables import csv_text
 from aerobat.planning import Plan
 
 ATTITUDE, RATES, PATH = SETPOINTS = (
@@ -99,7 +100,6 @@ def _float32(values: Array) -> Array:
 
 def _table(timestamps: Array, header: Sequence[str], columns: Sequence[Array]) -> bytes:
     """A table with the timestamps [µs] first, numbers with the digits of float32."""
-    lines = [",".join(["timestamp", *header])]
-    for timestamp, row in zip(timestamps, np.concatenate(columns, axis=1), strict=True):
-        lines.append(",".join([str(int(timestamp)), *map(str, row)]))
-    return ("\n".join(lines) + "\n").encode()
+    times, rows = timestamps.astype(int), np.concatenate(columns, axis=1)
+    table = [["timestamp", *header], *([time, *row] for time, row in zip(times, rows, strict=True))]
+    return csv_text(table).encode()
