@@ -101,6 +101,8 @@ class FlightsOptions:
     seed: Seed = 0
     """The seed of all flights: the same seed, the same flights."""
 
+    workers: Annotated[str | None, Workers(group=flying)] = None
+
 
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(RunOptions):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
-from aerobat.cli.options import FlightsOptions, ProblemOptions, Workers, flying, planning
+from aerobat.cli.options import FlightsOptions, ProblemOptions, planning
 from aerobat.cli.progress import Progress, showing
 from aerobat.cli.tasks import read_task
 from aerobat.cli.terminal import print_json
@@ -26,8 +26,6 @@ class CausesOptions(ProblemOptions, FlightsOptions):
 
     reserve: Annotated[float, Parameter(group=planning, validator=validators.Number(gte=0, lt=0.5))] = 0.1
     """The fraction of every limit's range that plans which know the rotors keep at either of its ends."""
-
-    workers: Annotated[str | None, Workers(group=flying)] = None
 
 
 def causes(problem: str, options: CausesOptions = CausesOptions()) -> None:

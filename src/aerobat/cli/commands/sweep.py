@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, Workers, flying, output
+from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, flying, output
 from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import finish_study, is_of_a_run
 from aerobat.cli.runs.record import RECORD, FlightSettings, RunRecord, read_record, write_record
@@ -58,8 +58,6 @@ class SweepingOptions(FlightsOptions):
     controller: Annotated[str, Parameter(group=flying)] = "full"
     """The control law: full, or paper, at the gains of the vehicle's file; lee, lqr, indi, rates; or one of
     your own that --import brings in."""
-
-    workers: Annotated[str | None, Workers(group=flying)] = None
 
     table: Annotated[Literal["csv", "parquet"], Parameter(group=output)] = "csv"
     """The form of the table, flights.csv or flights.parquet; the latter needs aerobat[parquet]."""

@@ -15,8 +15,6 @@ from aerobat.cli.options import (
     OutputOptions,
     PlanningOptions,
     ProblemOptions,
-    Workers,
-    flying,
     how_many,
     limiting,
     output,
@@ -50,8 +48,6 @@ class TuningOptions(ProblemOptions, FlightsOptions, OutputOptions):
 
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The vehicle's file to write; an earlier one is replaced. Default: out/VEHICLE-tuned.toml."""
-
-    workers: Annotated[str | None, Workers(group=flying)] = None
 
 
 def tune(*problems: str, options: TuningOptions = TuningOptions()) -> ExitCode:
