@@ -19,7 +19,6 @@ from aerobat import cli, so3
 from aerobat.interchange.ros import Messages, PlanMessages
 from aerobat.links.goals import PathGoal, PathPiece, PositionGoal
 from aerobat.links.ros import topics
-from aerobat.links.ros.run import RVIZ
 from aerobat.states import BodyState
 from ros_sky import BEGAN, Graph, Ros
 from shared_plans import shared_plan
@@ -149,14 +148,14 @@ def test_what_rviz_2_is_sent_is_what_rviz_shows_field_by_field() -> None:
     assert not any(value for name, value in rviz2.items() if name not in rviz)
 
 
-@pytest.mark.parametrize("middleware", RVIZ)
-def test_the_shipped_rviz_configurations_show_what_is_published(middleware: str) -> None:
+@pytest.mark.parametrize("generation", topics.RVIZ)
+def test_the_shipped_rviz_configurations_show_what_is_published(generation: str) -> None:
     """Of ROS 2 the markers are latched, and reach who asks for that alone."""
-    path = Path(RVIZ[middleware].split(" -d ")[1])
+    path = Path(topics.RVIZ[generation].split(" -d ")[1])
     manager = yaml.safe_load(path.read_text())["Visualization Manager"]
     displays = {display["Name"]: display for display in manager["Displays"]}
     assert manager["Global Options"]["Fixed Frame"] == "world"
-    if middleware == "RospyMiddleware":
+    if generation == "1":
         assert displays["Plan"]["Marker Topic"] == topics.MARKERS
         assert displays["Vehicle"]["Topic"] == topics.ODOMETRY
         return

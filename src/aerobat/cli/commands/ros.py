@@ -21,7 +21,8 @@ from aerobat.links.ros.crazyswarm_server import CrazyswarmServer
 from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings, Tick
 from aerobat.links.ros.middleware import Middleware, PacedClock
 from aerobat.links.ros.preparation import MANEUVERS, ManeuverRequest, prepare
-from aerobat.links.ros.run import RVIZ, run
+from aerobat.links.ros.run import run
+from aerobat.links.ros.topics import RVIZ
 from aerobat.links.ros.vehicle_node import VehicleNode
 from aerobat.planning import Planner, planner_class, suited_planner
 from aerobat.problem import Problem, load_problem
@@ -77,7 +78,7 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
             _rehearse(executor, vehicle, maneuvers, settings)
             node = ManeuverNode(middleware, vehicle, maneuvers, executor, settings, say, take)
             say(f"flies {vehicle.name}: /aerobat/ takeoff, {', '.join(maneuvers)}, hold, land")
-            say(f"to look: {RVIZ[type(middleware).__name__]}")
+            say(f"to look: {RVIZ[options.generation]}")
             run(node, middleware, options.rate, options.seconds or inf)
     finally:
         if board is not None:

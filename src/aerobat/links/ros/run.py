@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from math import inf
 from typing import Protocol
 
 from aerobat.interchange.ros import NANOSECONDS
 from aerobat.links.ros.middleware import Middleware
 
-# by the class of the middleware: the command that shows the topics
-_FOLDER = files("aerobat.links.ros") / "rviz"
-RVIZ = {
-    "RospyMiddleware": f"rviz -d {_FOLDER / 'ros1.rviz'}",
-    "RclpyMiddleware": f"rviz2 -d {_FOLDER / 'ros2.rviz'}",
-}
 _MAX_MISSED_TICKS = 5  # largest number of missed ticks that are made up for at once
 _CATCH_UP_TIME = 0.005  # [s] after more, for processing messages that a tick would count as lost;
 # limited by wall time too, since a clock may stand still until this node goes on

@@ -8,6 +8,8 @@ velocity is the acceleration, and its acceleration the jerk.
 
 from __future__ import annotations
 
+from importlib.resources import files
+
 import numpy as np
 
 from aerobat import so3
@@ -23,6 +25,10 @@ KIND_OF_MARKERS = "visualization_msgs/msg/MarkerArray"
 KIND_OF_REPORT = "std_msgs/msg/String"
 KIND_OF_CLOCK = "rosgraph_msgs/msg/Clock"
 JERK_JOINT = f"{BODY}/velocity"
+
+_FOLDER = files("aerobat.links.ros") / "rviz"
+# the command that shows the topics, by the generation of ROS
+RVIZ = {"1": f"rviz -d {_FOLDER / 'ros1.rviz'}", "2": f"rviz2 -d {_FOLDER / 'ros2.rviz'}"}
 
 _ALONE = 1.0  # [s] duration of a goal of a single point, longer than it is followed
 _ZERO: Array = np.zeros(3)
