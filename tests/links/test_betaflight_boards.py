@@ -157,7 +157,7 @@ def test_a_flip_on_demand_is_flown_by_betaflights_firmware_over_tcp() -> None:
         bench = flown(loop, loop)
         assert bench.node.commander.mission.reason == ""
         assert any("through gate" in sentence for sentence in bench.said), bench.said
-        motors = loop.firmware.step(0.1).commands
+        motors = loop.firmware.step(0.1)
     assert not any(motors)
 
 

@@ -147,7 +147,7 @@ class FirmwareLoop:
         time.sleep(0.001)
 
     def step(self, sensed: Sensed, duration: float) -> PerRotor:
-        commands = self.firmware.step(duration, state_packet(sensed)).commands
+        commands = self.firmware.step(duration, state_packet(sensed))
         low, high = self._vehicle.min_thrusts, self._vehicle.max_thrusts
         by_rotor = dict(zip(self._order, commands, strict=True))
         return tuple(float(low[k] + (high[k] - low[k]) * by_rotor[k]) for k in range(len(by_rotor)))

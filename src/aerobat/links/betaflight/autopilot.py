@@ -109,21 +109,21 @@ class BetaflightRun:
     def _stand(self, duration: float, sticks: bytes) -> tuple[float, ...]:
         commands: tuple[float, ...] = ()
         for _ in range(round(duration / _STEP)):
-            commands = self._firmware.step(_STEP, state_packet(_AT_REST), sticks).commands
+            commands = self._firmware.step(_STEP, state_packet(_AT_REST), sticks)
         return commands
 
     def step(self, sensed: Sensed, setpoint: RateSetpoint, duration: float) -> PerRotor:
         """See `AutopilotRun.step`."""
         throttle = throttle_of(self._vehicle, setpoint.thrust)
         sticks = self._sticks.packet(setpoint.omega, throttle)
-        motors = self._firmware.step(duration, state_packet(sensed), sticks)
+        fractions = self._firmware.step(duration, state_packet(sensed), sticks)
         self._time += duration
-        self._at_rest = self._at_rest + duration if throttle > _THROTTLE and not any(motors.commands) else 0.0
+        self._at_rest = self._at_rest + duration if throttle > _THROTTLE and not any(fractions) else 0.0
         if self._at_rest > _DISARM_TIME:
             raise SpecError(
                 f"autopilot: Betaflight disarmed {self._time:.2f} s into the flight: {self._flags}"
             )
-        commands = self._low + self._span * motors.commands
+        commands = self._low + self._span * fractions
         by_rotor = dict(zip(self._order, commands.tolist(), strict=True))
         return tuple(by_rotor[k] for k in range(len(by_rotor)))
 

@@ -15,12 +15,11 @@ from contextlib import closing, suppress
 from functools import lru_cache, partial
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from typing import NamedTuple
 
 from aerobat.errors import BackendMissing, SpecError
 
 _ORDER = struct.Struct("<QII144s40s")
-_ANSWER = struct.Struct("<QI4f4x")
+_ANSWER = struct.Struct("<12x4f4x")  # of the answer in lockstep.c, the motors alone
 _ANSWER_TIMEOUT = 20.0  # [s] of wall time, limit for an answer
 _STEP = 0.01  # [s] of firmware time between polls of its serial line
 _POLL_TIMEOUT = 0.002  # [s] of wall time for each poll
@@ -62,13 +61,6 @@ def _locked(folder: str | Path) -> int:
         os.close(descriptor)
         raise
     return descriptor
-
-
-class Motors(NamedTuple):
-    """The firmware's answer to a step."""
-
-    time: float  # [s] of its clock
-    commands: tuple[float, ...]  # 0 to 1, in the order of the packet's motors
 
 
 class Firmware:
@@ -116,10 +108,13 @@ class Firmware:
         finally:
             theirs.close()
 
-    def step(self, duration: float, state: bytes | None = None, sticks: bytes | None = None) -> Motors:
+    def step(
+        self, duration: float, state: bytes | None = None, sticks: bytes | None = None
+    ) -> tuple[float, ...]:
         """Advance the firmware by a duration [s], after giving it a state and receiver channels, if any.
 
-        Raises FirmwareEnded where its process has ended.
+        Returns the motor commands, 0 to 1, in the order of the packet. Raises FirmwareEnded where its
+        process has ended.
         """
         order = _ORDER.pack(
             round(1e9 * duration), state is not None, sticks is not None, state or b"", sticks or b""
@@ -136,8 +131,7 @@ class Firmware:
             raise FirmwareEnded(
                 f"autopilot: Betaflight's process has ended{self._exit_code}; run it again"
             ) from None
-        nanoseconds, _, *commands = _ANSWER.unpack(answer)
-        return Motors(1e-9 * nanoseconds, tuple(min(max(command, 0.0), 1.0) for command in commands))
+        return tuple(min(max(command, 0.0), 1.0) for command in _ANSWER.unpack(answer))
 
     @property
     def _exit_code(self) -> str:
