@@ -6,6 +6,7 @@ Missions are the same for every link: they use times, states and goals, but no m
 from __future__ import annotations
 
 from enum import StrEnum
+from itertools import pairwise
 from math import hypot, pi
 from typing import Generic, Protocol, TypeVar
 
@@ -106,23 +107,17 @@ class Mission(Generic[GoalT_co]):
         self._last_tick = np.nan
         self._rested_since = np.nan
         self._routes: list[Trajectory] = []
-        self._turn = (0.0, 0.0)  # [rad] initial yaw, and the turn during the climb
+        self._turn = (0.0, 0.0)  # [rad] initial yaw, and the turn on the first route
 
     def begin(self, now: float, observed: Observed) -> None:
         """Take off with an armed vehicle that obeys; `observed` is its state on the ground."""
         here = np.array(observed.body.position)
         above = np.array([here[0], here[1], max(self._start[2], here[2] + _CLIMB)])
-        limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
-        self._routes = [rest_to_rest(here, above, *limits), rest_to_rest(above, self._start, *limits)]
-        self._turn = self._yaw_and_turn(observed)
-        self._enter(Phase.CLIMB, now)
+        self._set_out(now, observed, Phase.CLIMB, here, above)
 
     def join(self, now: float, observed: Observed) -> None:
         """Fly to the plan's start from the hover that `observed` is."""
-        limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
-        self._routes = [rest_to_rest(np.array(observed.body.position), self._start, *limits)]
-        self._turn = self._yaw_and_turn(observed)
-        self._enter(Phase.APPROACH, now)
+        self._set_out(now, observed, Phase.APPROACH, np.array(observed.body.position))
 
     def step(
         self, now: float, observed: Observed, delay: float, late: float = 0.0
@@ -165,10 +160,14 @@ class Mission(Generic[GoalT_co]):
         expected = self.stream.flat(observed.time - self.maneuver_began).position
         return float(np.linalg.norm(np.array(observed.body.position) - expected))
 
-    def _yaw_and_turn(self, observed: Observed) -> tuple[float, float]:
-        """Return the yaw of a vehicle [rad], and the turn to the plan's heading [rad]."""
+    def _set_out(self, now: float, observed: Observed, phase: Phase, *places: Array) -> None:
+        """Enter the first phase of the way over places [m], (3,) each, to the plan's start and heading."""
+        limits = (self.settings.cruise_speed, self.settings.cruise_acceleration)
+        legs = pairwise((*places, self._start))
+        self._routes = [rest_to_rest(begin, end, *limits) for begin, end in legs]
         yaw = yaw_of(observed.body.q_world_body)
-        return yaw, (self._heading - yaw + pi) % (2 * pi) - pi
+        self._turn = yaw, (self._heading - yaw + pi) % (2 * pi) - pi
+        self._enter(phase, now)
 
     def _enter(self, phase: Phase, now: float) -> None:
         self.phase, self.began = phase, now
