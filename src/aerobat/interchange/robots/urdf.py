@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,25 +53,17 @@ def _poses(root: Element, links: dict[str, Element]) -> dict[str, RigidTransform
     if len(roots) != 1:
         which = " and ".join(f"'{name}'" for name in roots[:2]) or "none"
         raise SpecError(f"one link must be the root of the others, got {which}; join them")
+    parents = {child: [parent] for child, (parent, _) in above.items()}
+    try:
+        parents_first = [*TopologicalSorter(parents).static_order()]
+    except CycleError as error:
+        raise SpecError(f"link '{error.args[1][0]}' hangs on itself by its joints") from None
     poses = {roots[0]: IDENTITY}
-    for name in links:
-        _follow(name, above, poses)
+    for name in parents_first:
+        if name in above:
+            parent, joint_frame = above[name]
+            poses[name] = poses[parent].then(joint_frame)
     return poses
-
-
-def _follow(
-    name: str, above: dict[str, tuple[str, RigidTransform]], poses: dict[str, RigidTransform]
-) -> None:
-    """Find the poses of a link and of those between it and one whose pose is known."""
-    chain = [name]
-    while chain[-1] not in poses:
-        parent = above[chain[-1]][0]
-        if parent in chain:
-            raise SpecError(f"link '{parent}' hangs on itself by its joints")
-        chain.append(parent)
-    for child in reversed(chain[:-1]):
-        parent, joint = above[child]
-        poses[child] = poses[parent].then(joint)
 
 
 def _link(name: str, element: Element, pose: RigidTransform, joint: Element | None) -> Link:
