@@ -1,4 +1,4 @@
-"""Flights that another system recorded, from a CSV file of documented columns, as inspection takes them."""
+"""Flights that another system recorded, read from a CSV file with named columns, for inspection."""
 
 from __future__ import annotations
 
@@ -23,36 +23,31 @@ from aerobat.storage import read_whole
 from aerobat.vehicle import Vehicle
 
 MAX_LOG = 2**27  # bytes: ten minutes at 1 kHz
-FEWEST = 3  # rows, of which rates can be told
-SHORTEST = 1e-6  # [s] from row to row
-LARGEST = 1e6  # [m], [m/s], [rad/s], [N] of what a multirotor does
-GAP, LONG = 20.0, 0.25  # times the usual step, and [s]: a longer one is a gap
-STRONGER = 2.0  # times a rotor's most: a thrust that is more has another unit
-# of the plan's extent, and [m]: a path that is as far from the plan's most of the time is another one
-ELSEWHERE = (0.5, 0.5)
-AT_LIMIT = 1e-3  # of a rotor's range, within which a command is at its limit
-ESTIMATED = ("est_x", "est_y", "est_z")
-ESTIMATED_RATES = ("est_vx", "est_vy", "est_vz")
+MIN_ROWS = 3  # for rates by differences
+MIN_STEP = 1e-6  # [s] between rows
+MAX_VALUE = 1e6  # [m], [m/s], [rad/s] or [N]; no multirotor reaches that
+ESTIMATED_POSITION = ("est_x", "est_y", "est_z")
+ESTIMATED_VELOCITY = ("est_vx", "est_vy", "est_vz")
 _GROUPS = tuple(NAMES[name] for name in ("time", "position", "attitude", "velocity", "rates"))
-_KNOWN = frozenset(chain(*_GROUPS, ESTIMATED, ESTIMATED_RATES))  # beside f0, u0 and so on
+_KNOWN = frozenset(chain(*_GROUPS, ESTIMATED_POSITION, ESTIMATED_VELOCITY))  # beside f0, u0 and so on
 
 
 @validated
 def read_flight_log(path: PathName, plan: Plan, vehicle: Vehicle | str | None = None) -> Flight:
     """Read a recorded flight of a plan from a CSV file with a header.
 
-    Columns: `t` [s] on the plan's clock; `x, y, z` [m] and `qw, qx, qy, qz`, the true pose, world ENU and
-    body FLU; of each rotor `f0, f1, ...` [N], its thrust, or `u0, u1, ...` [N], its command, or both. Where
-    they are there, `vx, vy, vz` [m/s] world, `wx, wy, wz` [rad/s] body, and `est_x, ..., est_vz`, position
-    and velocity as the observer had them; rates that are not are told from the pose, thrusts and commands
-    from each other by the rotors' lags. Other columns, and rows outside the plan's time, are left out.
+    Required columns are `t` [s] on the plan's clock, the true pose `x, y, z` [m] and `qw, qx, qy, qz` (world
+    ENU, body FLU), and for each rotor its thrust `f0, f1, ...` [N], its command `u0, u1, ...` [N], or both.
+    Optional columns are `vx, vy, vz` [m/s] world, `wx, wy, wz` [rad/s] body, and the observer's position and
+    velocity, `est_x, ..., est_vz`. Missing rates are computed from the pose, and missing thrusts or commands
+    from each other by the rotors' lags. Other columns, and rows outside the plan's time, are ignored.
 
     Args:
         path: The file.
-        plan: What was flown, whose set-points the flight has.
-        vehicle: The vehicle that it was flown for, or its name, by default the plan's.
+        plan: The plan that was flown; the flight has its set-points.
+        vehicle: The nominal vehicle, or its name; by default the plan's.
 
-    Raises SpecError, naming the line or the column, for what is no such table.
+    Raises SpecError, naming the line or the column, for a file without such a table.
     """
     nominal = vehicle_of(plan, vehicle)
     try:
@@ -63,7 +58,7 @@ def read_flight_log(path: PathName, plan: Plan, vehicle: Vehicle | str | None = 
 
 
 def _columns(path: Path, duration: float) -> dict[str, Array]:
-    """The columns by their names, of the rows within the plan's time."""
+    """Return the used columns by their names, with the rows within the plan's time."""
     try:
         text = read_whole(path, MAX_LOG).decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -74,18 +69,18 @@ def _columns(path: Path, duration: float) -> dict[str, Array]:
         raise SpecError("line 1: it names no columns; a log needs t, x, y, z, qw, qx, qy, qz and f0, f1, ...")
     needed = (*NAMES["time"], *NAMES["position"], *NAMES["attitude"])
     columns = named_columns(text, needed, "a log needs t, x, y, z, qw, qx, qy, qz")
-    close = np.diff(columns["t"]) < SHORTEST
+    close = np.diff(columns["t"]) < MIN_STEP
     if close.any():
         line = 3 + int(np.argmax(close))
-        raise SpecError(f"line {line}: times, the column t, must rise, by {SHORTEST:g} s or more")
+        raise SpecError(f"line {line}: times, the column t, must rise, by {MIN_STEP:g} s or more")
     flown = (columns["t"] >= 0.0) & (columns["t"] <= duration)
-    if flown.sum() < FEWEST:
+    if flown.sum() < MIN_ROWS:
         raise SpecError(
             f"{flown.sum()} of its rows lie within the plan's time, 0 to {duration:.3f} s; "
             "let t be 0 where the plan begins"
         )
     steps = np.diff(columns["t"][flown])
-    if steps.max() > max(GAP * np.median(steps), LONG):
+    if steps.max() > max(20.0 * np.median(steps), 0.25):  # [s] longer steps are gaps
         line = 3 + int(np.argmax(flown)) + int(np.argmax(steps))
         raise SpecError(
             f"line {line}: t rises by {steps.max():.3g} s, where rows are {np.median(steps):.2g} s apart; "
@@ -93,9 +88,9 @@ def _columns(path: Path, duration: float) -> dict[str, Array]:
         )
     used = {name: column[flown] for name, column in columns.items() if _is_known(name)}
     for name, column in used.items():
-        if np.abs(column).max() > LARGEST:
+        if np.abs(column).max() > MAX_VALUE:
             line = 2 + int(np.argmax(np.abs(columns[name]) * flown))
-            raise SpecError(f"line {line}: the column {name} is beyond {LARGEST:g}; see its unit")
+            raise SpecError(f"line {line}: the column {name} is beyond {MAX_VALUE:g}; see its unit")
     return used
 
 
@@ -118,22 +113,22 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
     margin = np.minimum(commands - nominal.min_thrusts, nominal.max_thrusts - commands)
     series = {
         "position": position,
-        "velocity": _group(columns, ("vx", "vy", "vz"), _rate(times, position)),
+        "velocity": _group(columns, NAMES["velocity"], _rate(times, position)),
         "q_world_body": q,
         "omega_body": _group(columns, NAMES["rates"], _turning(times, q)),
         "commands": commands,
         "thrusts": thrusts,
-        "saturated": (margin <= AT_LIMIT * span).any(axis=1),
+        "saturated": (margin <= 1e-3 * span).any(axis=1),
         "min_thrusts": nominal.min_thrusts,
         "max_thrusts": nominal.max_thrusts,
         "ends": times[-1],
         **setpoint_series(planned.setpoint),
     }
-    if all(name in columns for name in ESTIMATED):
-        seen = _group(columns, ESTIMATED)
+    if all(name in columns for name in ESTIMATED_POSITION):
+        seen = _group(columns, ESTIMATED_POSITION)
         series |= {
             "observed_position": seen,
-            "observed_velocity": _group(columns, ESTIMATED_RATES, _rate(times, seen)),
+            "observed_velocity": _group(columns, ESTIMATED_VELOCITY, _rate(times, seen)),
             "observed_q_world_body": q,
             "since_pose": np.zeros(len(times)),
         }
@@ -149,9 +144,9 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
 
 
 def _require_newtons(names: tuple[str, ...], thrusts: Array, nominal: Vehicle) -> None:
-    """Refuse thrusts (T, n) that no such rotor gives."""
+    """Refuse thrusts (T, n) of which one is above twice its rotor's maximum, as in another unit."""
     for name, thrust, most in zip(names, thrusts.T, nominal.max_thrusts, strict=True):
-        if thrust.max() > STRONGER * most:
+        if thrust.max() > 2.0 * most:
             raise SpecError(
                 f"the column {name} reaches {thrust.max():.3g}, where {nominal.name}'s rotor gives "
                 f"{most:.3g} N at most; give newtons"
@@ -159,10 +154,12 @@ def _require_newtons(names: tuple[str, ...], thrusts: Array, nominal: Vehicle) -
 
 
 def _require_near(position: Array, planned: Array) -> None:
-    """Refuse positions of another path, in other units or along other axes."""
+    """Refuse positions of another path, in other units or along other axes.
+
+    Their median distance from the plan is above half of the plan's extent, and above 0.5 m.
+    """
     off = float(np.median(np.linalg.norm(position - planned, axis=1)))
-    fraction, least = ELSEWHERE
-    if off > max(fraction * float(np.linalg.norm(np.ptp(planned, axis=0))), least):
+    if off > max(0.5 * float(np.linalg.norm(np.ptp(planned, axis=0))), 0.5):
         raise SpecError(
             f"x, y, z are {off:.3g} m from the plan's path half of the time; give metres, x east, y north, "
             "z up, of a flight of this plan"
@@ -170,7 +167,7 @@ def _require_near(position: Array, planned: Array) -> None:
 
 
 def _require_aligned(q_world_body: Array, planned: Array) -> None:
-    """Refuse attitudes of other axes, or of another order of the quaternion."""
+    """Refuse attitudes between other axes, and quaternions in another order."""
     off = float(np.median(so3.angle_between(planned, q_world_body)))
     if off > np.pi / 2.0:
         raise SpecError(
@@ -180,16 +177,16 @@ def _require_aligned(q_world_body: Array, planned: Array) -> None:
 
 
 def _group(columns: Mapping[str, Array], names: tuple[str, ...], otherwise: Array | None = None) -> Array:
-    """Columns side by side, (T, len(names)), or what stands for them where one is not there."""
+    """Return columns side by side, (T, len(names)), or `otherwise`, if given, where one is missing."""
     if otherwise is not None and not all(name in columns for name in names):
         return otherwise
     return np.stack([columns[name] for name in names], axis=1)
 
 
 def _of_rotors(columns: Mapping[str, Array], first: Array, nominal: Vehicle) -> tuple[Array, Array]:
-    """Thrusts and commands [N] of every rotor, (T, n) each, the one from the other where it is not there.
+    """Return thrusts and commands [N] of all rotors, (T, n) each; a missing one follows from the other.
 
-    Thrusts that are not there begin with those that the plan asks `first`.
+    Thrusts that are computed begin with `first` [N], the plan's, (n,).
     """
     times, count = columns["t"], len(nominal.rotors)
     given = {}
@@ -216,7 +213,7 @@ def _of_rotors(columns: Mapping[str, Array], first: Array, nominal: Vehicle) -> 
 
 
 def _followed(times: Array, first: Array, commands: Array, lags: Array) -> Array:
-    """Thrusts [N] of rotors that follow commands from row to row from the first ones on, by their lags."""
+    """Return the thrusts [N] of rotors that follow commands by their lags, from the first thrusts on."""
     decays = np.exp(-np.diff(times)[:, None] / np.maximum(lags, 1e-9))
     thrusts = [first]
     for command, decay in zip(commands[:-1], decays, strict=True):
@@ -229,6 +226,6 @@ def _rate(times: Array, values: Array) -> Array:
 
 
 def _turning(times: Array, q: NDArray[np.float64]) -> Array:
-    """The body rates [rad/s] between attitudes, (T, 3), the first one twice."""
+    """Return the body rates [rad/s] between attitudes, (T, 3), the first one twice."""
     turns = so3.box_minus(q[1:], q[:-1]) / np.diff(times)[:, None]
     return np.concatenate([turns[:1], turns])
