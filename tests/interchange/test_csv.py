@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from aerobat.errors import SpecError
 from aerobat.interchange import read_csv, read_plan, read_rows, write_csv
-from aerobat.interchange.rows import SHORT
+from aerobat.interchange.rows import SHORT_STEP
 from aerobat.trajectory import Trajectory
 from suites import examples
 
@@ -41,7 +41,7 @@ def test_rows_come_back_exactly_and_so_does_the_duration(seed, order, dt, tmp_pa
     back = read_csv(path)
     assert back.duration == pytest.approx(trajectory.duration, abs=1e-11)
     times = trajectory.sample(100.0)
-    if times[-1] - times[-2] < SHORT * 0.01:  # a row that the grid leaves so near the end is left out
+    if times[-1] - times[-2] < SHORT_STEP * 0.01:  # a row that the grid leaves so near the end is left out
         times = np.delete(times, -2)
     for k in range(4):
         rows = trajectory.evaluate(times, k)

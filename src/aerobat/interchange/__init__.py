@@ -1,6 +1,6 @@
-"""Plans, trajectories and vehicles in other systems' formats, and whichever file holds a plan.
+"""Plans, trajectories and vehicles in other systems' formats, and readers for all files that hold a plan.
 
-The public names stand in `__init__.pyi`; each is imported when first used: no format waits for another.
+The public names are in `__init__.pyi`; each is imported at its first use, without the other formats.
 """
 
 import lazy_loader

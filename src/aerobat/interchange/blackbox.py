@@ -13,24 +13,24 @@ from aerobat.errors import SpecError, import_extra
 from aerobat.storage import read_whole
 
 MAX_LOG = 2**27  # bytes
-_STEP = 0.005  # [s] between the beginnings that are tried
+_STEP = 0.005  # [s] between the starts that are tried
 
 
 @by_value
 class Blackbox:
-    """The rates of a flight by a flight controller's own log, on its own clock. Axes are FLU."""
+    """The rates of a flight in a flight controller's log, by its own clock. Axes are FLU."""
 
     times: Array  # [s], (T,), rising
     omega_body: Array  # [rad/s] by the gyro, filtered, (T, 3)
-    rate_setpoint: Array  # [rad/s] asked by the sticks, (T, 3)
-    motors: Array  # [-] of the range, in the firmware's order, (T, n)
+    rate_setpoint: Array  # [rad/s] commanded by the sticks, (T, 3)
+    motors: Array  # [-] fractions of the range, in the firmware's order, (T, n)
 
     def begin(self, times: Array, omega_body: Array) -> float:
-        """Return the time [s] of the log's clock at which rates that were planned fit those measured best.
+        """Return the start of the plan by the log's clock [s], at which planned and measured rates fit best.
 
         Args:
-            times: Of the plan [s], rising, (N,).
-            omega_body: Planned then [rad/s], (N, 3).
+            times: Times of the plan [s], rising, (N,).
+            omega_body: Planned rates at these times [rad/s], (N, 3).
 
         Raises SpecError for a log that is shorter than the plan.
         """
@@ -47,7 +47,7 @@ class Blackbox:
 
 @validated
 def read_blackbox(path: PathName) -> Blackbox:
-    """Read the last flight of a Betaflight blackbox log, as of `aerobat fly --autopilot betaflight`.
+    """Read the last flight of a Betaflight blackbox log, such as `aerobat fly --autopilot betaflight` writes.
 
     Raises SpecError for a file that is no such log, BackendMissing without betaflight-chirp-core.
     """
@@ -79,7 +79,7 @@ def _three(columns: dict[str, Array], name: str) -> Array:
 
 
 def _decoded(raw: bytes) -> tuple[list[str], Array, dict[str, Any]]:
-    """Names and rows of the last flight's frames, and the settings before them."""
+    """Return the names and rows of the last flight's frames, and its settings."""
     package = "betaflight-chirp-core"
     decoder = import_extra("betaflight_chirp_core.decoder", f"blackbox logs need {package}", package)
     parser = decoder.FlightLogParser(raw, *decoder.split_sessions(raw)[-1])

@@ -1,10 +1,11 @@
-"""Plans as tables that other programs read: a header, time first, and whichever columns are wanted.
+"""Plans as tables for other programs: a header, then rows with the requested groups of columns.
 
-A header names each column; units are SI, world axes, attitude body to world, rates in body axes:
+The header names each column. Units are SI; vectors are in world axes, the attitude is body to world, and
+rates are in body axes:
 
     t | x y z | vx vy vz | ax ay az | jx jy jz | qw qx qy qz | wx wy wz | f0 f1 ... (thrusts [N])
 
-Columns are read back by their names, in any order; unknown ones are left out.
+Columns are read back by their names, in any order; unknown columns are ignored.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ ALL = tuple(NAMES)
 
 
 def column_groups(text: str) -> tuple[str, ...]:
-    """The groups of columns that a text lists with commas between. Raises SpecError for any that is none."""
+    """Return the groups of columns that a text lists, separated by commas. Raises SpecError for others."""
     groups = tuple(name.strip() for name in text.split(","))
     if groups == PAPER:
         return PAPER
@@ -44,13 +45,13 @@ def column_groups(text: str) -> tuple[str, ...]:
 
 @validated
 def write_columns(plan: Plan, path: PathName, columns: Sequence[str] = ALL, rate: Positive = 100.0) -> None:
-    """Write a plan's columns at `rate` and at the very end, digits enough to read them back exactly.
+    """Write a plan's columns at `rate` and at its end, with all digits, so that they are read back exactly.
 
-    Without a vehicle, the columns that follow from one are left out. Lost is what lies between rows. Raises
-    SpecError for groups that are none, where nothing is left, and where the file cannot be written.
+    Without a vehicle, the columns that follow from one are left out. The path between rows is lost. Raises
+    SpecError for unknown groups, where no column is left, and where the file cannot be written.
 
     Args:
-        plan: What is written.
+        plan: The plan to write.
         path: The file.
         columns: Groups of NAMES, or PAPER.
         rate: Rows a second [1/s].
@@ -63,7 +64,7 @@ def write_columns(plan: Plan, path: PathName, columns: Sequence[str] = ALL, rate
 
 
 def columns_text(plan: Plan, columns: Sequence[str], rate: float) -> str:
-    """The table that `write_columns` writes of known groups. Raises SpecError where nothing is left."""
+    """Return the table that `write_columns` writes. Raises SpecError where no column is left."""
     times = plan.trajectory.sample(rate)
     groups: dict[str, Array] = {"time": times[:, None]}
     groups |= {name: plan.trajectory.evaluate(times, k) for k, name in enumerate(PATH)}

@@ -1,10 +1,10 @@
-"""Trajectories as CSV in the layout of the paper's reference code, and back; tables with a header too.
+"""Trajectories as CSV in the layout of the paper's reference code, and back; tables with a header, too.
 
-The layout is that of `fliptraj.csv`: no header, comma-separated rows of twelve numbers, position, velocity,
-acceleration and jerk (x, y, z each, SI units, world axes), at a fixed rate, 100 Hz there. That code drops
-the rest of every segment that is no whole number of periods; here the last row is always the trajectory's
-end. Where its step is shorter than a period, every row has a thirteenth number, its time [s]: code that takes
-the first twelve columns, as the reference code does, reads both.
+The layout is that of `fliptraj.csv`: no header, and comma-separated rows of twelve numbers at a fixed rate,
+there 100 Hz: position, velocity, acceleration and jerk (x, y, z each, SI units, world axes). The reference
+code drops the rest of a segment that is no whole number of periods. Here the last row is always the end of
+the trajectory. Where the last step is shorter than a period, every row has its time [s] as a thirteenth
+number. The reference code reads both, as it takes the first twelve columns.
 """
 
 from __future__ import annotations
@@ -29,39 +29,38 @@ from aerobat.trajectory.piecewise import MAX_DURATION
 
 CSV_COLUMNS = 12
 MAX_CSV = 2**27  # bytes: an hour and a half at 100 Hz
-SAME_TIME = 1e-12  # [s], a step this near to a period is one
 
 
 @validated
 def write_csv(trajectory: Trajectory | Carrier, path: PathName, rate: Positive = 100.0) -> None:
-    """Write rows of p, v, a, j at `rate` [1/s] and at the very end, digits enough to read them back exactly.
+    """Write rows of p, v, a, j at `rate` [1/s] and at the end, with all digits, so that they are read back.
 
-    At a knot the row shows the later segment. The file appears whole or not at all. Raises SpecError for a
+    A row at a knot belongs to the later segment. The file appears whole or not at all. Raises SpecError for a
     rate that is not positive, and where the file cannot be written.
     """
     trajectory = as_trajectory(trajectory)
     times = trajectory.sample(rate)
     rows = np.concatenate([trajectory.evaluate(times, k) for k in range(4)], axis=1)
-    if abs(times[-1] - (len(times) - 1) / rate) > SAME_TIME:
+    if abs(times[-1] - (len(times) - 1) / rate) > 1e-12:  # [s] the last step is shorter
         rows = np.column_stack([rows, times])
     write_whole(path, csv_text(rows.tolist()))
 
 
 @validated
 def read_csv(path: PathName, rate: Positive = 100.0) -> Trajectory:
-    """The trajectory of degree 7 through p, v, a, j of all rows, `rate` [1/s] apart unless times are given.
+    """Return the trajectory through p, v, a, j of all rows, which are at `rate` [1/s] unless times are given.
 
-    Between rows it differs from what was written by the error of that interpolation. A file whose first line
-    names its columns, x, y and z among them, is read by those names, see `columns`; where velocity,
-    acceleration or jerk is not there, the path is that of minimum snap through what is. Raises SpecError,
-    naming the line, for rows that are not 12 or 13 finite numbers, all as many, with rising times from 0.
+    Between rows, it differs from the written trajectory by the error of interpolation. A file whose first
+    line names its columns, x, y and z among them, is read by these names, see `columns`. Where velocity,
+    acceleration or jerk is missing, the path is that of minimum snap through the given columns. Raises
+    SpecError, naming the line, for rows that are not 12 or 13 finite numbers, with rising times from 0.
     """
     return read_rows(path, rate).trajectory
 
 
 @validated
 def read_rows(path: PathName, rate: Positive = 100.0) -> PathRows:
-    """The rows that `read_csv` makes a trajectory of. Raises SpecError as it does."""
+    """Return the rows of which `read_csv` makes a trajectory. Raises SpecError as `read_csv` does."""
     text = _text(Path(path))
     if not text.count("\n") / rate <= MAX_DURATION:
         raise SpecError(f"rate must make it {MAX_DURATION:g} s at most, got {rate:g} rows a second")

@@ -1,4 +1,4 @@
-"""Whatever holds a plan or a bare trajectory: our own files, rows of a CSV, or a folder with one of them."""
+"""Plans and bare trajectories, read from .plan, .npz and CSV files, or from a folder with such a file."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from aerobat.interchange.csv import read_csv
 from aerobat.planning import Plan, load_plan
 from aerobat.trajectory import Trajectory, load_trajectory
 
-PATTERNS = ("*.plan", "plan.npz", "plan.csv")  # of what a folder may hold, the first that is there counts
+PATTERNS = ("*.plan", "plan.npz", "plan.csv")  # of a folder's files, in order of preference
 
 
 @validated
 def read_plan(path: PathName, rate: Positive = 100.0) -> Plan | Trajectory:
-    """Read a .plan file as a plan, or the bare trajectory in an .npz or CSV file with `rate` [1/s] rows.
+    """Read a .plan file as a plan, or an .npz or CSV file, with rows at `rate` [1/s], as a bare trajectory.
 
-    Of a folder, the plan that a run has left there is read. Raises SpecError, one sentence, when there is
-    none, when there are several, or when the file is malformed.
+    From a folder, the plan of the run there is read. Raises SpecError, one sentence, where there is none,
+    where there are several, and where the file is malformed.
     """
     path = plan_file(Path(path))
     if path.suffix == ".toml" and path.is_file():
@@ -31,7 +31,7 @@ def read_plan(path: PathName, rate: Positive = 100.0) -> Plan | Trajectory:
 
 @validated
 def read_trajectory(path: PathName, rate: Positive = 100.0) -> Trajectory:
-    """Read the trajectory alone of whatever `read_plan` reads. Raises SpecError as it does."""
+    """Read the trajectory alone from what `read_plan` reads. Raises SpecError as `read_plan` does."""
     found = read_plan(path, rate)
     return found.trajectory if isinstance(found, Plan) else found
 

@@ -1,4 +1,4 @@
-"""Rows of a path as somebody's file has them, and the trajectory through them."""
+"""Tables of numbers in text files, the rows of a path in such a table, and the trajectory through them."""
 
 from __future__ import annotations
 
@@ -26,34 +26,32 @@ NAMES: Mapping[str, tuple[str, ...]] = {  # of columns, by groups
     "jerk": ("jx", "jy", "jz"),
     "attitude": ("qw", "qx", "qy", "qz"),
     "rates": ("wx", "wy", "wz"),
-    "thrusts": (),  # f0 and as many as there are rotors
+    "thrusts": (),  # f0, f1, ..., one for each rotor
 }
 PATH = ("position", "velocity", "acceleration", "jerk")
 SYNONYMS = {"time": "t", "time_s": "t", "px": "x", "py": "y", "pz": "z"}
 MAX_ROWS = 2_000_000  # five hours at 100 Hz, half an hour at 1 kHz
 MAX_COLUMNS = 1000
-MEETING = len(PATH) + 1  # the derivative that is continuous, and the number of those that meet at rows
-SHORT = 0.2  # of the usual step: a last one that is shorter has derivatives of rounding
-DENSE = 6e-3  # [s] from row to row: half of 100 Hz's, and a little more
-REPEATED = 1e-7  # [m]: a row that is met so nearly adds nothing to a path
-SEVERAL = 8  # columns, that are named
-FEWEST = 5  # rows, of which every second can be left out
+CONTINUOUS = len(PATH) + 1  # the highest derivative that is continuous at rows, the fifth
+SHORT_STEP = 0.2  # of the usual step; derivatives over a last step that is shorter are rounding errors
+DENSE_STEP = 6e-3  # [s] between rows, a little more than at 200 Hz
+REDUNDANT = 1e-7  # [m] error of a path without every second row, below which these rows are left out
 
 
 @dataclass(frozen=True, eq=False)
 class PathRows:
-    """Derivatives of a position at instants."""
+    """The derivatives of a position at instants."""
 
-    knots: Array  # [m/s^d] position to jerk, world, (rows, 4, 3), NaN where a derivative is not there
+    knots: Array  # [m/s^d] position to jerk, world, (rows, 4, 3); NaN for a missing derivative
     steps: Array  # [s] from row to row, (rows - 1,)
     attitude: Array | None = None  # body to world at the first row, (4,)
-    unused: tuple[str, ...] = ()  # what else the file holds, in words
+    unused: tuple[str, ...] = ()  # other content of the file, in words
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The path with all derivatives of every row, up to its fifth derivative continuous.
+        """The path with all derivatives of every row, continuous up to its fifth derivative.
 
-        Where some derivatives are not there, the path of minimum snap. Its heading is that of the attitude.
+        Where derivatives are missing, this is the path of minimum snap. Its heading is that of the attitude.
         Raises SpecError for numbers that are too large.
         """
         rows = self._without_repeats
@@ -62,14 +60,14 @@ class PathRows:
 
     @property
     def fit_error(self) -> float | None:
-        """The largest distance [m] of the path through every second row from the rest.
+        """The largest distance [m] of the path through every second row from the other rows.
 
-        Twice as far from row to row, that path errs by more than the path through all rows does between them.
-        None below five rows, or where every second row does not determine a path.
+        Its steps are twice as long, so it errs by more than the path through all rows does between them.
+        None for fewer than five rows, or where every second row does not determine a path.
         """
         rows = len(self.knots) - (len(self.knots) + 1) % 2
         kept = self.knots[:rows:2]
-        if rows < FEWEST or _known_numbers(kept) < len(PATH):
+        if rows < 5 or _known_numbers(kept) < len(PATH):
             return None
         times = np.concatenate([[0.0], np.cumsum(self.steps)])[:rows]
         missed = self._through(kept, np.diff(times[::2])).evaluate(times[1::2]) - self.knots[1:rows:2, 0]
@@ -79,10 +77,10 @@ class PathRows:
     def _without_repeats(self) -> PathRows:
         """Every second row, and every second of these, as long as the path through them meets the others.
 
-        Where rows are dense, high derivatives of the path from one to the next are those of rounding.
+        Between dense rows, the high derivatives of a path would be those of rounding errors.
         """
-        error = None if np.median(self.steps) > DENSE or np.isnan(self.knots).any() else self.fit_error
-        if error is None or not error < REPEATED:
+        error = None if np.median(self.steps) > DENSE_STEP or np.isnan(self.knots).any() else self.fit_error
+        if error is None or not error < REDUNDANT:
             return self
         kept = np.unique(np.append(np.arange(0, len(self.knots), 2), len(self.knots) - 1))
         times = np.concatenate([[0.0], np.cumsum(self.steps)])
@@ -98,7 +96,7 @@ class PathRows:
                     "give more rows, or velocities too"
                 )
             return minimum_effort(knots, steps)
-        if len(steps) > 1 and steps[-1] < SHORT * np.median(steps):  # what a grid leaves over of a duration
+        if len(steps) > 1 and steps[-1] < SHORT_STEP * np.median(steps):
             knots, steps = np.delete(knots, -2, axis=0), np.append(steps[:-2], steps[-2:].sum())
         with np.errstate(over="ignore", invalid="ignore"):
             if len(steps) > 1:
@@ -109,7 +107,7 @@ class PathRows:
             return Trajectory(steps, hermite(scaled * knots[:-1], scaled * knots[1:]))
 
     def _heading(self, path: Trajectory) -> float:
-        """The turn about the thrust [rad] in the first attitude, drag left out."""
+        """Return the turn about the thrust [rad] in the first attitude, without drag."""
         thrust = path.evaluate(0.0, 2) + Environment().weight
         if self.attitude is None or not np.linalg.norm(thrust) > 0.0:
             return 0.0
@@ -118,7 +116,7 @@ class PathRows:
 
 
 def _known_numbers(knots: Array) -> int:
-    """Count the derivatives that rows (rows, 4, 3) give along the axis that they give the fewest of."""
+    """Return the number of known derivatives of rows (rows, 4, 3) along the axis with the fewest."""
     return int(np.sum(~np.isnan(knots), axis=(0, 1)).min())
 
 
@@ -129,16 +127,16 @@ def _snaps(knots: Array, steps: Array) -> Array:
     """
     from scipy.linalg import solve_banded
 
-    unit = np.eye(2 * MEETING)
-    coefficients = hermite(unit[:MEETING], unit[MEETING:])  # by the derivatives at both ends
-    powers = coefficients[MEETING:]
-    at_left = math.factorial(MEETING) * powers[0]
-    at_right = np.array([math.perm(MEETING + k, MEETING) for k in range(MEETING)]) @ powers
+    unit = np.eye(2 * CONTINUOUS)
+    coefficients = hermite(unit[:CONTINUOUS], unit[CONTINUOUS:])  # by the derivatives at both ends
+    powers = coefficients[CONTINUOUS:]
+    at_left = math.factorial(CONTINUOUS) * powers[0]
+    at_right = np.array([math.perm(CONTINUOUS + k, CONTINUOUS) for k in range(CONTINUOUS)]) @ powers
     scaled = steps[:, None, None] ** np.arange(len(PATH))[:, None]
     ends = np.concatenate([scaled * knots[:-1], scaled * knots[1:]], axis=1)
-    known = [*range(len(PATH)), *range(MEETING, MEETING + len(PATH))]
+    known = [*range(len(PATH)), *range(CONTINUOUS, CONTINUOUS + len(PATH))]
     left, right = (
-        np.tensordot(ends, weights[known], (1, 0)) / steps[:, None] ** MEETING
+        np.tensordot(ends, weights[known], (1, 0)) / steps[:, None] ** CONTINUOUS
         for weights in (at_left, at_right)
     )
     system, target = np.zeros((3, len(knots))), np.zeros((len(knots), 3))
@@ -146,15 +144,15 @@ def _snaps(knots: Array, steps: Array) -> Array:
     target[0] = _snap(knots[:3], np.array([0.0, *np.cumsum(steps[:2])]))
     target[-1] = _snap(knots[:-4:-1], -np.array([0.0, *np.cumsum(steps[:-3:-1])]))
     before, after = 1.0 / steps[:-1], 1.0 / steps[1:]
-    system[2, :-2] = at_right[MEETING - 1] * before
-    system[1, 1:-1] = at_right[-1] * before - at_left[MEETING - 1] * after
+    system[2, :-2] = at_right[CONTINUOUS - 1] * before
+    system[1, 1:-1] = at_right[-1] * before - at_left[CONTINUOUS - 1] * after
     system[0, 2:] = -at_left[-1] * after
     target[1:-1] = left[1:] - right[:-1]
     return np.asarray(solve_banded((1, 1), system, target, check_finite=False))
 
 
 def _snap(knots: Array, times: Array) -> Array:
-    """The snap at the first of three rows (3, 4, 3) of the polynomial through all of them, (3,)."""
+    """Return the snap at the first of three rows (3, 4, 3) of the polynomial through them, (3,)."""
     size, orders = np.abs(times).max(), np.arange(len(PATH))
     table = np.array(
         [
@@ -168,14 +166,14 @@ def _snap(knots: Array, times: Array) -> Array:
 
 
 def has_header(text: str) -> bool:
-    """True if a file's first line names columns and holds no numbers."""
+    """Return True if a file's first line names columns and has no numbers."""
     first = text.partition("\n")[0].strip().lstrip("#")
-    words = first.split(",", MAX_COLUMNS)  # the last one of more is no identifier
+    words = first.split(",", MAX_COLUMNS)  # of more columns, the last part is no identifier
     return all(word.strip().strip('"').isidentifier() and not _is_number(word) for word in words)
 
 
 def require_numbers(text: str) -> None:
-    """Refuse a first line that neither is numbers nor names columns. Raises SpecError."""
+    """Raise SpecError for a first line that has neither numbers nor names of columns."""
     first = text.partition("\n")[0].strip()
     is_table = first.count(",") < MAX_COLUMNS
     if first and is_table and not any(map(_is_number, first.split(","))):
@@ -186,12 +184,12 @@ def require_numbers(text: str) -> None:
 
 
 def rows_of_columns(text: str, rate: float) -> PathRows:
-    """The rows of a table with a header; columns of other names are left out.
+    """Return the rows of a table with a header; unknown columns are ignored.
 
-    Raises SpecError, naming the line or the column, for what is no such table.
+    Raises SpecError, naming the line or the column, for a text without such a table.
 
     Args:
-        text: The file's.
+        text: The text of the file.
         rate: Rows a second [1/s], where there is no column of time.
     """
     columns = named_columns(text, NAMES["position"], "a path needs x, y and z [m], and t [s]")
@@ -208,7 +206,7 @@ def rows_of_columns(text: str, rate: float) -> PathRows:
 
 
 def _unused(columns: Mapping[str, Array]) -> Iterator[str]:
-    """What a table holds beside a path, in words."""
+    """Yield what a table holds beside a path, in words."""
     used = set(NAMES["time"])
     for group in (*PATH, "attitude"):
         if all(name in columns for name in NAMES[group]):
@@ -217,19 +215,19 @@ def _unused(columns: Mapping[str, Array]) -> Iterator[str]:
         yield "attitudes after the first row"
     others = [name for name in columns if name not in used]
     if others:
-        more = f" and {len(others) - SEVERAL} more" if len(others) > SEVERAL else ""
-        yield f"column{'s' * (len(others) > 1)} {', '.join(others[:SEVERAL])}{more}"
+        more = f" and {len(others) - 8} more" if len(others) > 8 else ""
+        yield f"column{'s' * (len(others) > 1)} {', '.join(others[:8])}{more}"
 
 
 def named_columns(text: str, needed: Sequence[str], remedy: str) -> dict[str, Array]:
-    """The columns of a table with a header by their names, small letters, synonyms by the usual name.
+    """Return the columns of a table with a header by their names, in small letters and without synonyms.
 
-    Raises SpecError, naming the line or the column, for what is no such table.
+    Raises SpecError, naming the line or the column, for a text without such a table.
 
     Args:
-        text: The file's.
-        needed: The names of columns that must be there.
-        remedy: What messages say of that, without a full stop.
+        text: The text of the file.
+        needed: The names of required columns.
+        remedy: The end of the message where one is missing, without a full stop.
     """
     words = text.partition("\n")[0].strip().lstrip("#").split(",")
     header = [SYNONYMS.get(name, name) for name in (word.strip().strip('"').lower() for word in words)]
@@ -254,15 +252,15 @@ def _first_attitude(columns: Mapping[str, Array]) -> Array | None:
 
 
 def number_table(text: str, first: int, counts: Sequence[int], expected: str) -> Array:
-    """The numbers of a file's lines, (rows, columns), two rows or more, in each as many as in the first.
+    """Return the numbers of a file's lines, (rows, columns), of two rows or more.
 
-    Raises SpecError, naming the line, for what is no such table.
+    Raises SpecError, naming the line, for a text without such a table.
 
     Args:
-        text: The file's.
-        first: The number of the first line that counts, from 1.
-        counts: The numbers of columns that may be.
-        expected: What messages say of that, without a full stop.
+        text: The text of the file.
+        first: The number of the first line of the table, counted from 1.
+        counts: The allowed numbers of columns.
+        expected: The end of the message for other numbers, without a full stop.
     """
     if text.count("\n") > MAX_ROWS:
         raise SpecError(f"it has more than {MAX_ROWS} lines; give the part that is a path's")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from aerobat.environment.obstacles.surface import Surface, flattening, surface_of
 from aerobat.planning import Plan
 
-REACH = 100.0  # [m] from the path, at which what has no end is cut off
+REACH = 100.0  # [m] from the path, at which infinite surfaces are cut off
 
 
 def solid_surfaces(plan: Plan) -> tuple[Surface, ...]:
@@ -20,5 +20,5 @@ def solid_surfaces(plan: Plan) -> tuple[Surface, ...]:
 
 
 def flattened(plan: Plan) -> float:
-    """Return how far [m] the triangles lie inside obstacles that are round, at most."""
+    """Return the largest distance [m] by which triangles of round obstacles lie inside of them."""
     return max((flattening(piece) for piece in plan.problem.surroundings.pieces.pieces), default=0.0)

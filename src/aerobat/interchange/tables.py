@@ -1,4 +1,4 @@
-"""Tables as files: CSV, or Parquet for what reads columns with their types; both are read back equal."""
+"""Tables as files: CSV, or Parquet, which keeps the types of columns; both are read back equal."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ MAX_CELLS = MAX_TABLE // 8
 
 @validated
 def write_table(table: Mapping[str, Any], path: PathName) -> None:
-    """Write columns by their names, as a sweep's table, to a CSV or Parquet file, by the path's suffix.
+    """Write columns by their names, as of a sweep's table, to a CSV or Parquet file, by the path's suffix.
 
-    Whole numbers, numbers or text, true and false as 1 and 0; digits enough to read all numbers back exactly.
-    Raises SpecError for another suffix, and where the file cannot be written, BackendMissing for Parquet
-    without pyarrow.
+    Columns are whole numbers, numbers or text; true and false are written as 1 and 0, and all numbers with
+    all digits. Raises SpecError for another suffix, and where the file cannot be written, BackendMissing for
+    Parquet without pyarrow.
     """
     columns = _columns(table)
     if _suffix(path) == CSV:
@@ -58,14 +58,14 @@ def read_table(path: PathName) -> dict[str, NDArray[Any]]:
 
 
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:
-    """Return lines of numbers or text with commas between, digits enough to read all numbers back exactly."""
+    """Return lines of numbers or text, separated by commas; numbers have all digits."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
 
 
 def require_writable(path: PathName) -> None:
-    """Refuse, before anything is flown, what `write_table` cannot write. Raises as that does."""
+    """Raise, before anything is flown, what `write_table` would raise for this path."""
     if _suffix(path) == PARQUET:
         _parquet()
 
@@ -78,7 +78,7 @@ def _suffix(path: PathName) -> str:
 
 
 def _columns(table: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """The columns as arrays. Raises SpecError for what are none."""
+    """Return the columns as arrays. Raises SpecError for values that are none."""
     try:
         columns = {str(name): np.asarray(column) for name, column in table.items()}
     except ValueError:  # ragged
@@ -123,7 +123,7 @@ def _from_csv(text: str) -> dict[str, NDArray[Any]]:
 
 
 def _parsed(column: Sequence[str]) -> NDArray[Any]:
-    """Whole numbers where all are, else numbers where all are, else text."""
+    """Return whole numbers if all entries are such, else numbers if all are such, else text."""
     for kind in (int, float):
         try:
             return np.array([kind(text) for text in column])
