@@ -36,11 +36,13 @@ _KNOWN = frozenset(chain(*_GROUPS, ESTIMATED_POSITION, ESTIMATED_VELOCITY))  # b
 def read_flight_log(path: PathName, plan: Plan, vehicle: Vehicle | str | None = None) -> Flight:
     """Read a recorded flight of a plan from a CSV file with a header.
 
-    Required columns are `t` [s] on the plan's clock, the true pose `x, y, z` [m] and `qw, qx, qy, qz` (world
-    ENU, body FLU), and for each rotor its thrust `f0, f1, ...` [N], its command `u0, u1, ...` [N], or both.
-    Optional columns are `vx, vy, vz` [m/s] world, `wx, wy, wz` [rad/s] body, and the observer's position and
-    velocity, `est_x, ..., est_vz`. Missing rates are computed from the pose, and missing thrusts or commands
-    from each other by the rotors' lags. Other columns, and rows outside the plan's time, are ignored.
+    Required columns are `t` [s] on the plan's clock and the true pose `x, y, z` [m] and `qw, qx, qy, qz`
+    (world ENU, body FLU). For each rotor, its thrust `f0, f1, ...` [N], its command `u0, u1, ...` [N], or
+    both are required, too. Optional columns are `vx, vy, vz` [m/s] world, `wx, wy, wz` [rad/s] body, and
+    `est_x, ..., est_vz`, the observer's position and velocity.
+
+    Missing rates are computed from the pose, and missing thrusts or commands from each other by the rotors'
+    lags. Other columns, and rows outside the plan's time, are ignored.
 
     Args:
         path: The file.
