@@ -1,4 +1,4 @@
-"""Plans in the files of other systems: `export`, one module a format, and what each loses."""
+"""Plans in the files of other systems: `export`, with one module for each format and the loss of each."""
 
 from aerobat.interchange.exports.export import FORMATS, Export, export
 from aerobat.interchange.exports.loss import Loss

@@ -18,7 +18,7 @@ from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, Stamped
 from aerobat.interchange.solids import flattened
 from aerobat.planning import Plan
 
-_BLANK: Mapping[str, Any] = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}  # others are whole
+_BLANK: Mapping[str, Any] = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}  # else integers
 NAME = "plan"
 ROS2_BAG = ("metadata.yaml", f"{NAME}.db3")
 
@@ -48,9 +48,9 @@ class StoredTypes:
 
 
 def _bag(container: str, plan: Plan, rate: float) -> Content:
-    """The bag of a plan with a vehicle, messages at `rate` [1/s] and at the end.
+    """Return the bag of a plan with a vehicle, with messages at `rate` [1/s] and at the end.
 
-    Lost is what lies between them. Raises BackendMissing without rosbags.
+    The plan between messages is lost. Raises BackendMissing without rosbags.
     """
     import_extra("rosbags", "bags need rosbags", "aerobat[ros]", "export to csv")
     from rosbags.typesys import Stores, get_typestore
@@ -61,7 +61,7 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
     made = PlanMessages(Messages(StoredTypes(store)), plan).all(found)
     messages = sorted(made, key=lambda each: each.stamp)
     loss = replace(ExportRows.of(found).loss(plan), obstacles=flattened(plan))
-    with tempfile.TemporaryDirectory() as scratch:  # the writers want a place of their own
+    with tempfile.TemporaryDirectory() as scratch:  # rosbags writes to folders only
         write = _write_ros1 if container == "ros1" else partial(_write_ros2, container)
         return Content(write(store, messages, Path(scratch) / NAME), loss)
 
@@ -91,13 +91,13 @@ def _write_ros2(container: str, store: Any, messages: Sequence[Stamped], path: P
 
 
 def _fill(bag: Any, store: Any, serialize: Callable[[Any, str], Any], messages: Sequence[Stamped]) -> None:
-    """Write messages to an open bag, each topic's type before its first.
+    """Write messages to an open bag; each topic is added before its first message.
 
     Args:
         bag: A writer of `rosbags`.
         store: The types of the messages.
-        serialize: A message of a kind, as bytes.
-        messages: In order of time.
+        serialize: Returns a message of a kind as bytes.
+        messages: The messages, in order of time.
     """
     connections: dict[str, Any] = {}
     for each in messages:

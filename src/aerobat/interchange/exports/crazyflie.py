@@ -24,22 +24,22 @@ PIECE = np.dtype([("polynomials", "<f4", (4, POWERS)), ("duration", "<f4")])  # 
 MEMORY = 4096  # bytes that the firmware has for trajectories
 MAX_PIECES = MEMORY // PIECE.itemsize
 MAX_ERROR = 2e-3  # [m] a fortieth of the vehicle's width: more is another path
-MAX_EXTENT = 100.0  # [m] float32 tells 8 µm apart there
+MAX_EXTENT = 100.0  # [m] from the origin, where float32 has a resolution of 8 µm
 PIECES = ("trajectory.bin", "trajectory.csv")
 AXES = ("x", "y", "z", "yaw")
 Pieces: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.void]]"  # of the type PIECE
 
 
 def crazyflie_pieces(plan: Plan, rate: float) -> Content:
-    """The pieces as bytes and as CSV, without a rate: it has no rows; see `fitted_pieces`."""
+    """Return the pieces as bytes and as CSV, see `fitted_pieces`; there are no rows, so `rate` is ignored."""
     pieces, loss = fitted_pieces(plan)
     return Content(dict(zip(PIECES, (pieces.tobytes(), _csv(pieces)), strict=True)), loss)
 
 
 def fitted_pieces(plan: Plan) -> tuple[Pieces, Loss]:
-    """The pieces of a plan. Lost is what a refit and float32 cost, and heading that no yaw can say.
+    """Return the pieces of a plan, and the loss by the refit, by float32, and by headings that no yaw gives.
 
-    Raises SpecError where 31 pieces do not follow the path, or it is too far.
+    Raises SpecError where 31 pieces do not follow the path, and where the path is too far from the origin.
     """
     fitted = refit(plan.trajectory, MAX_PIECES)
     if not np.abs(fitted.coefficients[:, 0]).max() <= MAX_EXTENT:
@@ -61,10 +61,7 @@ def fitted_pieces(plan: Plan) -> tuple[Pieces, Loss]:
 
 
 def as_path(pieces: Pieces, heading: float = 0.0) -> Trajectory:
-    """The path of pieces of the type PIECE, as the vehicle has it but for its arithmetic's rounding.
-
-    The heading [rad] is the path's all along.
-    """
+    """Return the path of pieces of the type PIECE, as the vehicle flies it, with a constant heading [rad]."""
     durations = pieces["duration"].astype(float)
     powers = durations[:, None, None] ** np.arange(POWERS)[:, None]
     coefficients = np.moveaxis(pieces["polynomials"][:, :3].astype(float), 2, 1)

@@ -1,4 +1,4 @@
-"""A plan in the files of other systems, each with what it lost on the way."""
+"""A plan in the files of other systems, each with its loss."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class Format:
     """A format that plans are exported to."""
 
     content: Callable[[Plan, float], Content]
-    suffix: str = ""  # of its one file
-    files: tuple[str, ...] = ()  # in a folder, where there are several
-    rate: float | None = 100.0  # [1/s] of its rows unless another is given; None where it has no rows
+    suffix: str = ""  # of the file, if the format is one file
+    files: tuple[str, ...] = ()  # in a folder, if the format has several
+    rate: float | None = 100.0  # [1/s] of its rows, by default; None for a format without rows
 
 
 def _table(plan: Plan, rate: float) -> Content:
-    """Every column that there is, as in a run's plan.csv. Lost is what lies between rows."""
+    """Return all columns, as in a run's plan.csv. The plan between rows is lost."""
     rows = ExportRows.of(reference(plan, rate=rate))
     return Content({"plan.csv": columns_text(plan, ALL, rate).encode()}, rows.loss(plan))
 
@@ -52,30 +52,29 @@ FORMATS: Mapping[str, Format] = {
 
 @dataclass(frozen=True)
 class Export:
-    """The files that an export wrote, and what they lost."""
+    """The files that an export wrote, and their loss."""
 
     format: str
     files: tuple[Path, ...]
     loss: Loss
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line of text."""
         return f"{', '.join(map(str, self.files))}: {self.loss}"
 
 
 @validated
 def export(plan: Plan, path: PathName, to: str, rate: Positive | None = None) -> Export:
-    """Write a plan for its vehicle as another system reads it, and return what that lost.
+    """Write a plan for its vehicle as another system reads it, and return the files and their loss.
 
-    An earlier file of the format's suffix is replaced, and a folder that holds nothing but an earlier export.
-    All is made before anything is written, and appears whole or not at all. Frames, units and readers of each
-    format are in docs/exports.md.
+    An earlier file with the format's suffix is replaced, and a folder that holds only an earlier export. All
+    files appear, or none. Frames, units and readers of each format are in docs/exports.md.
 
-    Raises SpecError for a format that is none, a plan without a vehicle or one that the format cannot hold, a
-    path of another suffix and a place that cannot be written; BackendMissing for bags without rosbags.
+    Raises SpecError for an unknown format, a plan without a vehicle or one that the format cannot hold, a
+    path with another suffix and a place that cannot be written; BackendMissing for bags without rosbags.
 
     Args:
-        plan: What is exported.
+        plan: The plan to export.
         path: The file to write, with the format's suffix; of crazyflie, px4 and ros2-bag a folder.
         to: csv, crazyflie, ros1-bag, ros2-bag, mcap, px4, blender or mujoco.
         rate: Rows a second [1/s], by default 100, of px4 250; crazyflie has none.
@@ -105,7 +104,7 @@ def export(plan: Plan, path: PathName, to: str, rate: Positive | None = None) ->
 
 
 def _require_place(target: Path, to: str, form: Format) -> None:
-    """Refuse a path that something else has, before anything is made."""
+    """Raise SpecError for a path that the format does not fit, before anything is made."""
     if form.files:
         require_replaceable(target, form.files.__contains__)
     elif target.suffix != form.suffix:

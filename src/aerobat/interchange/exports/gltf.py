@@ -1,8 +1,8 @@
 """A plan as an animated scene, a .glb file of glTF 2.0: Blender and other 3D programs import its keyframes.
 
 The vehicle's node has a position and an attitude at each key, joined by straight lines and turns at constant
-rates, as the format says of LINEAR. The format's y is up and our y is its -z, world and body alike: a reader
-with z up, as Blender, turns all of it back and has our axes, in the world and in the body.
+rates, the format's interpolation LINEAR. The format's y axis is up, and our y axis is its -z axis, for the
+world and for bodies. Programs whose z axis is up, such as Blender, turn all back to our axes.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ COLORS: Mapping[str, Sequence[float]] = {  # red, green, blue, opacity
 
 
 def blender_scene(plan: Plan, rate: float) -> Content:
-    """The scene of a plan with a vehicle, keys at `rate` [1/s] and at the end.
+    """Return the scene of a plan with a vehicle, with keys at `rate` [1/s] and at the end.
 
-    Lost is what straight lines from key to key cut off, and float32's digits.
+    The differences from straight lines between keys are lost, and digits beyond float32.
     """
     assert plan.vehicle is not None, "exports are of plans with a vehicle"
     times = plan.trajectory.sample(rate).astype(np.float32)
@@ -75,7 +75,7 @@ def blender_scene(plan: Plan, rate: float) -> Content:
 
 @dataclass
 class _Scene:
-    """What a file holds, while it is put together."""
+    """The content of a file under construction."""
 
     nodes: list[dict[str, Any]] = field(default_factory=list)
     meshes: list[dict[str, Any]] = field(default_factory=list)
@@ -85,7 +85,7 @@ class _Scene:
     buffer: bytearray = field(default_factory=bytearray)
 
     def accessor(self, values: Floats, kind: str) -> int:
-        """The number of an array in the buffer, of float32, with its bounds."""
+        """Add an array of float32, with its bounds, and return its number."""
         columns = values.reshape(len(values), -1)
         self.views.append({"buffer": 0, "byteOffset": len(self.buffer), "byteLength": values.nbytes})
         self.buffer += values.tobytes()
@@ -102,22 +102,22 @@ class _Scene:
         return len(self.accessors) - 1
 
     def primitive(self, points: Array | Floats, mode: int, color: str) -> dict[str, Any]:
-        """Points (n, 3) in our axes, joined as lines or triangles."""
+        """Return points (n, 3) in our axes, joined as lines or triangles."""
         position = self.accessor(_y_up(np.asarray(points, dtype=np.float32)), "VEC3")
         return {"attributes": {"POSITION": position}, "mode": mode, "material": list(COLORS).index(color)}
 
     def mesh(self, name: str, primitives: Sequence[dict[str, Any]]) -> int:
-        """The number of a mesh."""
+        """Add a mesh and return its number."""
         self.meshes.append({"name": name, "primitives": list(primitives)})
         return len(self.meshes) - 1
 
     def node(self, name: str, mesh: int) -> int:
-        """The number of a node that shows a mesh."""
+        """Add a node that shows a mesh, and return its number."""
         self.nodes.append({"name": name, "mesh": mesh})
         return len(self.nodes) - 1
 
     def animate(self, node: int, times: Floats, curves: Mapping[str, Floats]) -> None:
-        """Move a node: curves by the names of its properties, (T, 3) or (T, 4)."""
+        """Move a node by curves, (T, 3) or (T, 4), by the names of its properties."""
         key = self.accessor(times, "SCALAR")
         outputs = [self.accessor(curve, f"VEC{curve.shape[1]}") for curve in curves.values()]
         self.animations.append(
@@ -131,7 +131,7 @@ class _Scene:
         )
 
     def binary(self, name: str) -> bytes:
-        """The file: a header, the description as JSON, the buffer."""
+        """Return the file: a header, the description as JSON, and the buffer."""
         description = {
             "asset": {"version": "2.0", "generator": "aerobat"},
             "scene": 0,
@@ -150,7 +150,7 @@ class _Scene:
 
 
 def _y_up(vectors: Floats) -> Floats:
-    """Vectors of our axes in the format's, (n, 3)."""
+    """Return vectors in our axes, (n, 3), in the format's axes."""
     return np.ascontiguousarray(vectors[:, [0, 2, 1]] * np.array([1, 1, -1], dtype=np.float32))
 
 
@@ -166,8 +166,8 @@ def _material(color: str) -> dict[str, Any]:
 
 
 def _vehicle(scene: _Scene, vehicle: Vehicle) -> Sequence[dict[str, Any]]:
-    """Discs of the rotors, and arms to them and forward."""
-    angles = np.linspace(0.0, 2.0 * np.pi, 24 + 1)  # of a disc's corners, the last again the first
+    """Return discs of the rotors, and lines to each of them and forward."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 24 + 1)  # of a disc's corners; the last is the first
     rim = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
     fan = np.stack([np.zeros_like(rim[1:]), rim[:-1], rim[1:]], axis=1).reshape(-1, 3)
     centres = np.array([rotor.position_body for rotor in vehicle.rotors])
@@ -182,7 +182,7 @@ def _vehicle(scene: _Scene, vehicle: Vehicle) -> Sequence[dict[str, Any]]:
 
 
 def _frame(gate: Gate) -> Array:
-    """Triangles of a gate's frame around its opening, two for each side of that, (6 sides, 3)."""
+    """Return triangles of a gate's frame, two for each side of its opening, (6 sides, 3)."""
     inner = gate.outline
     outer = gate.frame(0.05)  # [m] wide
     inner_next, outer_next = np.roll(inner, -1, axis=0), np.roll(outer, -1, axis=0)

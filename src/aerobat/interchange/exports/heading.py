@@ -1,8 +1,9 @@
-"""The yaw that makes of a path the attitudes of a plan, where a vehicle derives them from both.
+"""The yaw with which a vehicle that derives its attitude from path and yaw gets the attitudes of a plan.
 
-The Crazyflie, as others after Mellinger and Kumar (ICRA 2011), puts the body's z along the thrust, drag left
-out, and y along z × (cos ψ, sin ψ, 0). Where the thrust is horizontal, the attitude does not depend on yaw
-ψ, or, where it is along that very direction, is undefined, and beyond it turned round.
+The Crazyflie, as other vehicles after Mellinger and Kumar (ICRA 2011), puts the body's z axis along the
+thrust without drag, and its y axis along z × (cos ψ, sin ψ, 0). Where the thrust is horizontal, the attitude
+does not depend on the yaw ψ. Where the thrust is along (cos ψ, sin ψ, 0), the attitude is undefined, and
+beyond that direction it is turned round.
 """
 
 from __future__ import annotations
@@ -18,27 +19,27 @@ from aerobat.interchange.exports.refit import DEGREE
 from aerobat.planning import Plan
 from aerobat.trajectory import Trajectory
 
-GRAVITY = 9.81  # [m/s²] the firmware's
+GRAVITY = 9.81  # [m/s²] of the Crazyflie's firmware
 POWERS = DEGREE + 1
 SAMPLES = 257  # of a piece
-FIRST_GUESSES = 64  # constants among which the fit begins
-ROUNDS = 40  # of Levenberg-Marquardt: more gain nothing
-MAX_SLOPE = 1e3  # of attitude over yaw: beyond, where the heading is along the thrust, no yaw is of use
-REGULARIZATION = 1e-2  # [-] of coefficients: where attitude hardly depends on yaw, that fits no rounding
-DEFINED = 1e-9  # [m/s²] of thrust, or the sine of its angle to the heading: less defines no attitude
+INITIAL_GUESSES = 64  # constant yaws, of which the best begins the fit
+MAX_EVALUATIONS = 40  # of Levenberg-Marquardt; more gain nothing
+MAX_SLOPE = 1e3  # of attitude over yaw; it is larger where the heading is along the thrust
+REGULARIZATION = 1e-2  # [-] of coefficients, against a fit of rounding where attitude hardly depends on yaw
+DEFINED = 1e-9  # [m/s²] of thrust, or sine of its angle to the heading, below which no attitude is defined
 
 
 @dataclass(frozen=True, eq=False)
 class YawFit:
-    """Polynomials of yaw, and the attitudes that come of them."""
+    """Polynomials of yaw, and the errors of the attitudes that follow from them."""
 
-    coefficients: Array  # [rad/s^k] as float32 has them, (pieces, POWERS)
-    attitude_error: float  # [rad] the largest, heading and all
-    thrust_axis_error: float  # [rad] the largest, heading aside
+    coefficients: Array  # [rad/s^k] rounded to float32, (pieces, POWERS)
+    attitude_error: float  # [rad] the largest, with the heading
+    thrust_axis_error: float  # [rad] the largest, without the heading
 
 
 def fit_yaw(plan: Plan, path: Trajectory) -> YawFit:
-    """Polynomials of yaw on each of the path's segments that give attitudes nearest to the plan's."""
+    """Return polynomials of yaw, one for each segment of the path, with attitudes nearest to the plan's."""
     s = np.linspace(0.0, 1.0, SAMPLES)
     instants = path.knots[:-1, None] + s * path.durations[:, None]
     planned = attitudes(plan, instants.ravel()).reshape(*instants.shape, 4)
@@ -55,28 +56,28 @@ def fit_yaw(plan: Plan, path: Trajectory) -> YawFit:
 
 
 def _ends_before(fitted: Array) -> Array:
-    """The yaw with which each piece's predecessor ends, turns aside, (pieces,)."""
+    """Return the yaw at the end of the piece before each piece, without the turns between, (pieces,)."""
     ends = fitted.sum(axis=1)
     whole_turns = 2.0 * np.pi * np.cumsum(np.round((ends[:-1] - fitted[1:, 0]) / (2.0 * np.pi)))
     return np.concatenate([[0.0], ends[:-1] + np.concatenate([[0.0], whole_turns[:-1]])])
 
 
 def _fitted(z: Array, axes: Array, powers: Array) -> Array:
-    """One piece's coefficients in normalised time, (POWERS,).
+    """Return the coefficients of one piece in normalised time, (POWERS,).
 
     Args:
         z: Directions of the thrust, (samples, 3).
-        axes: The planned body's in the world, its columns, (samples, 3, 3).
-        powers: Of normalised time, (samples, POWERS).
+        axes: The planned body axes in the world, as columns, (samples, 3, 3).
+        powers: The powers of normalised time, (samples, POWERS).
     """
     from scipy.optimize import least_squares  # takes a quarter of a second, and no other format needs it
 
-    guesses = np.linspace(-np.pi, np.pi, FIRST_GUESSES, endpoint=False)
-    cost = (_turn(z, axes, np.broadcast_to(guesses[:, None], (FIRST_GUESSES, len(z)))) ** 2).sum(axis=1)
+    guesses = np.linspace(-np.pi, np.pi, INITIAL_GUESSES, endpoint=False)
+    cost = (_turn(z, axes, np.broadcast_to(guesses[:, None], (INITIAL_GUESSES, len(z)))) ** 2).sum(axis=1)
     best = np.zeros(POWERS)
     best[0] = guesses[np.argmin(cost)]
     weights = np.full(POWERS, REGULARIZATION)
-    weights[0] = 0.0  # a constant yaw is as good as any
+    weights[0] = 0.0  # constants are not penalised
 
     def residual(fit: Array) -> Array:
         return np.concatenate([_turn(z, axes, powers @ fit), weights * fit])
@@ -84,31 +85,31 @@ def _fitted(z: Array, axes: Array, powers: Array) -> Array:
     def slopes(fit: Array) -> Array:
         return np.concatenate([_slope(z, powers @ fit)[:, None] * powers, np.diag(weights)])
 
-    return np.asarray(least_squares(residual, best, slopes, method="lm", max_nfev=ROUNDS).x)
+    return np.asarray(least_squares(residual, best, slopes, method="lm", max_nfev=MAX_EVALUATIONS).x)
 
 
 def _slope(z: Array, yaw: Array) -> Array:
-    """By how much an attitude turns about its thrust with yaw [-], (samples,)."""
+    """Return the derivative of the turn about the thrust with respect to yaw [-], (samples,)."""
     across_sq = (_across(z, yaw) ** 2).sum(axis=-1)
     slopes = z[:, 2] / np.maximum(across_sq, DEFINED**2)
     return np.asarray(np.clip(slopes, -MAX_SLOPE, MAX_SLOPE))
 
 
 def _turn(z: Array, axes: Array, yaw: Array) -> Array:
-    """How far the attitude of a yaw is turned about the thrust from planned axes [rad], (..., samples)."""
+    """Return the turn about the thrust from planned axes to the attitude of a yaw [rad], (..., samples)."""
     y = _across(z, yaw)
     x_planned, y_planned = axes[..., 0], axes[..., 1]
     return np.asarray(np.arctan2(-(y * x_planned).sum(axis=-1), (y * y_planned).sum(axis=-1)))
 
 
 def _across(z: Array, yaw: Array) -> Array:
-    """The direction of the body's y, z × (cos ψ, sin ψ, 0), not scaled to length one, (..., 3)."""
+    """Return the direction of the body's y axis, z × (cos ψ, sin ψ, 0), not normalised, (..., 3)."""
     heading = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)], axis=-1)
     return so3.cross(z, heading)
 
 
 def _attitude(z: Array, yaw: Array) -> Array:
-    """Attitudes, body to world, of thrust directions and yaw, (..., 4)."""
+    """Return the attitudes, body to world, of thrust directions and yaw, (..., 4)."""
     upright = so3.smallest_rotation(so3.UP, z)
     y = so3.unrotate(upright, _across(z, yaw))
     return so3.multiply(upright, so3.about_axis(so3.UP, np.arctan2(-y[..., 0], y[..., 1])))

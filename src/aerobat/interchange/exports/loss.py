@@ -1,9 +1,9 @@
-"""Differences between a plan and a file made of it, over continuous time: what an export costs.
+"""Differences between a plan and a file made of it, over continuous time: the loss of an export.
 
-A file of rows says nothing of what is between them. The file is read as its format has it, along straight
-lines (attitudes by the shortest turn at a constant rate), or, where it is a stream of set-points, by holding
-the last. Differences of positions and of velocities are then piecewise polynomials, whose peaks are exact.
-Attitudes are compared at many instants; between two of these they are apart as far as what they turn allows.
+Between its rows, a file is read as its format requires: along straight lines, with attitudes by the shortest
+turn at a constant rate, or, for a stream of set-points, by holding the last row. Differences of positions and
+of velocities are then piecewise polynomials, whose peaks are exact. Attitudes are compared at many instants.
+Between two of these, their difference is bounded by the angle that they turn.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.piecewise import TIME_TOLERANCE
 
-PARTS = 16  # of the time between two rows, at whose ends attitudes are compared: off by some percent at most
-AT_ONCE = 2000  # rows whose attitudes are compared together: some tens of megabytes
+PARTS = 16  # of the time between two rows, at whose ends attitudes are compared; errs by some percent
+ROWS_AT_ONCE = 2000  # whose attitudes are compared together, in some tens of megabytes
 STRAIGHT = "straight lines between rows"
 HELD = "each row held until the next"
 
 
 @dataclass(frozen=True)
 class Loss:
-    """The largest differences, over continuous time, between a plan and what the reader of a file has."""
+    """The largest differences, over continuous time, between a plan and a file as its readers take it."""
 
     position: float  # [m]
     velocity: float  # [m/s]
-    attitude: float  # [rad] the angle between attitudes, heading and all
-    thrust_axis: float  # [rad] the angle between thrust axes, heading aside
-    reading: str  # how the file is read
-    obstacles: float = 0.0  # [m] by which triangles of round obstacles lie inside these
-    without: str = ""  # what the format has no place for, in words
+    attitude: float  # [rad] between attitudes, with the heading
+    thrust_axis: float  # [rad] between thrust axes, without the heading
+    reading: str  # the way to read the file between its rows
+    obstacles: float = 0.0  # [m] by which triangles of round obstacles lie inside of them
+    without: str = ""  # content for which the format has no place, in words
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return one line of text."""
         flat = f"; round obstacles drawn up to {length(self.obstacles)} inside" if self.obstacles else ""
         lacks = f"; the file has no place for {self.without}" if self.without else ""
         return (
@@ -51,7 +51,7 @@ class Loss:
         )
 
     def record(self) -> dict[str, object]:
-        """Plain data, units in the keys."""
+        """Return plain data, with units in the keys."""
         return {
             "position_m": self.position,
             "velocity_m_s": self.velocity,
@@ -65,7 +65,7 @@ class Loss:
 
 @dataclass(frozen=True)
 class Content:
-    """Content made of a plan before anything is written: files by their names, and what they lost."""
+    """Files made of a plan, by their names, before they are written, and their loss."""
 
     files: Mapping[str, bytes]
     loss: Loss
@@ -73,21 +73,21 @@ class Content:
 
 @dataclass(frozen=True, eq=False)
 class ExportRows:
-    """Content of the rows of a file, as it is rounded there, in our axes."""
+    """Rows of a file, as rounded there, in our axes."""
 
     times: Array  # [s] rising, (T,)
     position: Array  # [m] world, (T, 3)
-    velocity: Array | None  # [m/s] world, (T, 3); None where it is read off the position
+    velocity: Array | None  # [m/s] world, (T, 3); None where readers differentiate the position
     q_world_body: Array  # (T, 4)
 
     @classmethod
     def of(cls, found: Reference) -> ExportRows:
-        """Return rows that have a reference's numbers as they are."""
+        """Return rows with the exact numbers of a reference."""
         flat = found.setpoint.flat
         return cls(found.times, flat.position, flat.velocity, found.setpoint.q_world_body)
 
     def loss(self, plan: Plan, held: bool = False) -> Loss:
-        """The loss of these rows, read along straight lines, or `held`."""
+        """Return the loss of these rows, if they are read along straight lines, or `held`."""
         position = self._curve(self.position, held)
         velocity = position if self.velocity is None else self._curve(self.velocity, held)
         attitude, thrust_axis = self._angles(plan, held)
@@ -100,14 +100,14 @@ class ExportRows:
         )
 
     def _curve(self, rows: Array, held: bool) -> Trajectory:
-        """Rows (T, 3) as they are read, over the time from the first to the last."""
+        """Return rows (T, 3) as they are read, from the first to the last."""
         powers = rows[:-1, None] if held else np.stack([rows[:-1], np.diff(rows, axis=0)], axis=1)
         return Trajectory(np.diff(self.times), powers)
 
     def _angles(self, plan: Plan, held: bool) -> tuple[float, float]:
-        """The largest angles between attitudes and between thrust axes [rad]."""
-        starts = range(0, len(self.times) - 1, AT_ONCE)
-        parts = [self._angles_of(slice(start, start + AT_ONCE + 1), plan, held) for start in starts]
+        """Return the largest angles between attitudes and between thrust axes [rad]."""
+        starts = range(0, len(self.times) - 1, ROWS_AT_ONCE)
+        parts = [self._angles_of(slice(start, start + ROWS_AT_ONCE + 1), plan, held) for start in starts]
         return max(attitude for attitude, _ in parts), max(axis for _, axis in parts)
 
     def _angles_of(self, rows: slice, plan: Plan, held: bool) -> tuple[float, float]:
@@ -122,41 +122,41 @@ class ExportRows:
 
 
 def _degrees(angle: float) -> str:
-    """An angle [rad] in degrees, two digits of small ones."""
+    """Return an angle [rad] in degrees, small angles with two digits."""
     value = degrees(angle)
     return f"{value:.2g}°" if value < 10.0 else f"{value:.0f}°"
 
 
 def attitudes(plan: Plan, times: Array) -> Array:
-    """A plan's attitudes, body to world, at times [s] that fall by rounding at most, (T,) -> (T, 4)."""
+    """Return a plan's attitudes, body to world, (T, 4), at times [s], (T,), that may fall by rounding."""
     rising = np.minimum(np.maximum.accumulate(times), plan.duration)
     return reference(plan, times=rising).setpoint.q_world_body
 
 
 def peak_difference(path: Trajectory, derivative: int, read: Trajectory, read_derivative: int = 0) -> float:
-    """The largest distance between two curves over the time that both last, exactly.
+    """Return the exact largest distance between derivatives of two paths, over the time that both last.
 
     Args:
         path: One path.
-        derivative: The order of its derivative that is one curve.
+        derivative: The order of its derivative.
         read: The other path.
-        read_derivative: The order of its derivative that is the other curve.
+        read_derivative: The order of its derivative.
     """
     end = min(path.duration, read.duration)
     cuts = np.unique(np.concatenate([path.knots, read.knots]))
     cuts = np.concatenate([[0.0], cuts[(cuts > TIME_TOLERANCE) & (cuts < end - TIME_TOLERANCE)], [end]])
-    cuts = cuts[np.append(np.diff(cuts) > TIME_TOLERANCE, True)]  # of two that are one the later, see knots
+    cuts = cuts[np.append(np.diff(cuts) > TIME_TOLERANCE, True)]  # of two equal ones the later, see knots
     size = 1 + max(path.degree - derivative, read.degree - read_derivative, 0)
     apart = _expanded(path, derivative, cuts, size) - _expanded(read, read_derivative, cuts, size)
     return Trajectory(np.diff(cuts), apart).peak(0).value
 
 
 def peak_angles(attitude: Array, other: Array) -> tuple[float, float]:
-    """Bounds on the angles [rad] between attitudes, and between their thrust axes.
+    """Return bounds on the angles [rad] between attitudes, and between their thrust axes.
 
     Args:
-        attitude: Sampled along intervals, (intervals, samples, 4).
-        other: At the same instants.
+        attitude: Samples along intervals, (intervals, samples, 4).
+        other: Other attitudes at the same instants.
     """
     apart = so3.multiply(so3.conjugate(attitude), other)
     axes = so3.thrust_axis(apart)
@@ -169,16 +169,16 @@ def peak_angles(attitude: Array, other: Array) -> tuple[float, float]:
 
 
 def _peak(angles: Array, turned: Array) -> float:
-    """The largest angle that may be, by samples (n, m) and the turns from each to the next (n, m - 1)."""
-    between = (angles[:, :-1] + angles[:, 1:] + turned) / 2.0  # it changes by no more than is turned,
-    rise = np.abs(np.diff(angles, 2, axis=1)) / 8.0  # or rises and falls between samples, as a parabola does
+    """Return a bound on angles by samples (n, m), and by the turns from each to the next (n, m - 1)."""
+    between = (angles[:, :-1] + angles[:, 1:] + turned) / 2.0  # an angle changes by the turn at most,
+    rise = np.abs(np.diff(angles, 2, axis=1)) / 8.0  # and between samples has the peak of a parabola
     rise = np.pad(rise, ((0, 0), (1, 1)), mode="edge")  # (n, m)
     between += np.maximum(rise[:, :-1], rise[:, 1:])
     return float(min(between.max(), np.pi))
 
 
 def _expanded(path: Trajectory, derivative: int, cuts: Array, size: int) -> Array:
-    """The powers of normalised time of d^k p/dt^k from each cut to the next, (cuts - 1, size, 3)."""
+    """Return d^k p/dt^k in powers of normalised time from each cut to the next, (cuts - 1, size, 3)."""
     steps = np.diff(cuts)[:, None]
     powers = np.zeros((len(steps), size, 3))
     for power in range(min(path.degree - derivative + 1, size)):

@@ -1,7 +1,7 @@
-"""A plan as a MuJoCo model, an .xml file: the vehicle, gates, obstacles and ground, and a keyframe a row.
+"""A plan as a MuJoCo model, an .xml file: the vehicle, gates, obstacles, ground, and a keyframe for each row.
 
-A keyframe holds pose, velocity, rotor thrusts and commands of an instant, at which a simulation may begin,
-and where gates and obstacles that move are then. A command leads the thrust by the rotor's lag.
+A simulation may begin at any keyframe. A keyframe has the pose, the velocity, the rotor thrusts and the
+commands of an instant, and the places of moving gates and obstacles. A command leads the thrust by the lag.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from aerobat.simulation.plants.plant import PlantScene
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
-BESIDE = 1e-5  # [s] of an instant: thrusts there tell how fast they change
+DIFFERENCE_STEP = 1e-5  # [s] to both sides of an instant, for the derivatives of thrusts
 
 
 def mujoco_scene(plan: Plan, rate: float) -> Content:
-    """The model of a plan with a vehicle, keyframes at `rate` [1/s] and at the end.
+    """Return the model of a plan with a vehicle, with keyframes at `rate` [1/s] and at the end.
 
-    Lost is what lies between them, and the vehicle's drag, which MuJoCo has no element for.
+    The plan between keyframes is lost, and the vehicle's drag, for which MuJoCo has no element.
     """
     assert plan.vehicle is not None, "exports are of plans with a vehicle"
     problem, vehicle = plan.problem, plan.vehicle
@@ -55,8 +55,8 @@ def mujoco_scene(plan: Plan, rate: float) -> Content:
 
 
 def _commands(plan: Plan, vehicle: Vehicle, found: Reference) -> Array:
-    """The commands f + τ f' of all rotors [N] at a reference's times, (T, n)."""
-    beside = np.clip(found.times[:, None] + [-BESIDE, BESIDE], 0.0, plan.duration)
+    """Return the commands f + τ f' of all rotors [N] at a reference's times, (T, n)."""
+    beside = np.clip(found.times[:, None] + [-DIFFERENCE_STEP, DIFFERENCE_STEP], 0.0, plan.duration)
     thrusts = reference(plan, times=beside.ravel()).rotor_thrusts.reshape(*beside.shape, -1)
     slopes = np.diff(thrusts, axis=1)[:, 0] / np.diff(beside, axis=1)
     return np.asarray(found.rotor_thrusts + vehicle.lags * slopes)

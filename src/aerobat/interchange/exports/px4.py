@@ -1,7 +1,8 @@
-"""Set-points for PX4: attitude, rates and thrust, and the path, in its messages' fields and axes.
+"""Set-points for PX4: attitude, rates and thrust, and the path, in the fields and axes of its messages.
 
-A table for each message, named and laid out as `ulog2csv` writes those messages of a flight's log, so that
-the same lines read plan and log. World axes are NED, body axes FRD, numbers float32 as in the messages.
+Each message is a table with the name and layout that `ulog2csv` gives to the messages of a flight's log. The
+same program can thus read plan and log. World axes are NED, body axes FRD, and numbers float32, as in the
+messages.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ ATTITUDE, RATES, PATH = SETPOINTS = (
     "trajectory_setpoint_0.csv",
 )
 MICROSECONDS = 1e6
-NED_ENU = np.array([0.0, -np.sqrt(0.5), -np.sqrt(0.5), 0.0])  # ENU to NED: x and y change places, z turns
-FLU_FRD = np.array([0.0, 1.0, 0.0, 0.0])  # FRD to FLU: half a turn about x, and back by the same
+NED_ENU = np.array([0.0, -np.sqrt(0.5), -np.sqrt(0.5), 0.0])  # ENU to NED: swaps x and y, negates z
+FLU_FRD = np.array([0.0, 1.0, 0.0, 0.0])  # FRD to FLU, or back: half a turn about x
 
 
 def _indexed(name: str, count: int) -> Sequence[str]:
@@ -46,9 +47,10 @@ HEADERS: Mapping[str, Sequence[str]] = {
 
 
 def px4_setpoints(plan: Plan, rate: float) -> Content:
-    """The set-points of a plan with a vehicle at `rate` [1/s] and at the end.
+    """Return the set-points of a plan with a vehicle at `rate` [1/s] and at the end.
 
-    Lost is what lies between rows, each of which is held until the next, microseconds, float32's digits.
+    Each row is held until the next. The plan between rows is lost, and digits beyond microseconds and
+    float32.
     """
     timestamps = np.unique(np.floor(plan.trajectory.sample(rate) * MICROSECONDS))
     found = reference(plan, times=timestamps / MICROSECONDS)
@@ -75,12 +77,12 @@ def px4_setpoints(plan: Plan, rate: float) -> Content:
 
 
 def ned(vectors: Array) -> Array:
-    """Vectors of ENU axes in NED ones, or the other way round, (..., 3)."""
+    """Convert vectors (..., 3) from ENU to NED axes, or back."""
     return np.asarray(vectors[..., [1, 0, 2]] * np.array([1.0, 1.0, -1.0]))
 
 
 def _thrust_body(found: Reference, plan: Plan) -> Array:
-    """Thrust along the body's axes, FRD, as a fraction of that of all rotors at their limits, (T, 3)."""
+    """Return the thrust along body axes, FRD, (T, 3), as a fraction of the maximum collective thrust."""
     assert plan.vehicle is not None, "exports are of plans with a vehicle"
     thrust = np.zeros((len(found.times), 3))
     thrust[:, 2] = -found.setpoint.wrench.thrust / plan.vehicle.max_thrusts.sum()
@@ -88,18 +90,18 @@ def _thrust_body(found: Reference, plan: Plan) -> Array:
 
 
 def _yaw(q_ned_frd: Array) -> Array:
-    """The heading of the body's x axis [rad], from north to east, (T,)."""
+    """Return the heading of the body's x axis [rad], from north to east, (T,)."""
     forward = so3.rotate(q_ned_frd, np.array([1.0, 0.0, 0.0]))
     return np.asarray(np.arctan2(forward[:, 1], forward[:, 0]))
 
 
 def _float32(values: Array) -> Array:
-    """The values as the messages have them; no negative zeros."""
+    """Return the values as float32, without negative zeros."""
     return np.asarray(np.asarray(values, dtype=np.float32) + np.float32(0.0))
 
 
 def _table(timestamps: Array, header: Sequence[str], columns: Sequence[Array]) -> bytes:
-    """A table with the timestamps [µs] first, numbers with the digits of float32."""
+    """Return a table of timestamps [µs] and columns of float32."""
     times, rows = timestamps.astype(int), np.concatenate(columns, axis=1)
     table = [["timestamp", *header], *([time, *row] for time, row in zip(times, rows, strict=True))]
     return csv_text(table).encode()
