@@ -1,6 +1,6 @@
 """Robot descriptions, URDF and SDF, read as vehicles.
 
-The public names stand in `__init__.pyi`; each is imported when first used: a suffix takes no reader.
+The public names are in `__init__.pyi`; each is imported at its first use.
 """
 
 import lazy_loader

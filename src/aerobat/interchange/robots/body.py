@@ -13,14 +13,14 @@ from aerobat.errors import SpecError
 
 
 class RigidTransform(NamedTuple):
-    """A frame in another one: what is at x there is at `rotation` x + `origin` here."""
+    """A frame in an outer frame: its point x is at `rotation` x + `origin` in the outer frame."""
 
     rotation: Array  # (3, 3)
     origin: Array  # [m], (3,)
 
     @classmethod
     def of(cls, origin: Array, roll_pitch_yaw: Array) -> RigidTransform:
-        """The frame at an origin, turned by roll, pitch and yaw [rad] about the fixed x, y and z."""
+        """Return the frame at an origin, turned by roll, pitch and yaw [rad] about the outer x, y, z axes."""
         (cr, cp, cy), (sr, sp, sy) = np.cos(roll_pitch_yaw), np.sin(roll_pitch_yaw)
         about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
         about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
@@ -28,7 +28,7 @@ class RigidTransform(NamedTuple):
         return cls(about_z @ about_y @ about_x, origin)
 
     def then(self, inner: RigidTransform) -> RigidTransform:
-        """The frame `inner` of this one, where this one is given."""
+        """Return a frame that is given in this one, in the outer frame."""
         return RigidTransform(self.rotation @ inner.rotation, self.rotation @ inner.origin + self.origin)
 
 
@@ -43,28 +43,28 @@ class Link:
     name: str
     pose: RigidTransform
     mass: float  # [kg]
-    centre: Array  # [m] of its mass, (3,)
-    inertia: Array  # [kg·m²] about that centre, the model's axes, (3, 3)
-    radius: float | None  # [m] of what collides around its z axis
-    axis: Array | None  # about which its joint lets it turn, the model's axes, (3,); None where none is given
+    centre: Array  # [m] of mass, (3,)
+    inertia: Array  # [kg·m²] about the centre of mass, the model's axes, (3, 3)
+    radius: float | None  # [m] of its collision shape about its z axis
+    axis: Array | None  # of its joint, the model's axes, (3,); None where none is given
 
 
 @dataclass(frozen=True)
 class Motor:
-    """A rotor of which more is known than its place, by the link that turns."""
+    """A rotor whose motor is described."""
 
-    link: str
+    link: str  # name of the link that turns
     spin: int  # 1 counter-clockwise seen from above
     k_f: float  # [N/(rad/s)²]
     torque_coefficient: float  # [m]
     max_speed: float  # [rad/s]
     lag: float  # [s]
-    drag: float  # [N/(rad/s · m/s)] across its axis
+    drag: float  # [N/(rad/s · m/s)] perpendicular to its axis
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot's links and motors; what a file says of all its rotors stands in `rotor_defaults`."""
+    """A robot's links and motors; `rotor_defaults` are the values that a file gives for all rotors."""
 
     name: str
     links: tuple[Link, ...]
@@ -82,16 +82,16 @@ def link_of(
     radius: float | None,
     axis: Array | None,
 ) -> Link:
-    """A link of what its file says. Raises SpecError for a mass below zero.
+    """Return a link with the values in its file. Raises SpecError for a mass below zero.
 
     Args:
         name: of the link.
-        pose: its frame in the model's.
-        inertial: the frame of its inertia in its own, at its centre of mass.
+        pose: its frame in that of the model.
+        inertial: the frame of its inertia in the link's, with its origin at the centre of mass.
         mass: [kg].
         moments: ixx, iyy, izz, ixy, ixz, iyz [kg·m²], (6,).
-        radius: [m] of what collides.
-        axis: about which its joint lets it turn, the model's axes, (3,).
+        radius: [m] of its collision shape.
+        axis: of its joint, the model's axes, (3,).
     """
     if mass < 0.0:
         raise SpecError(f"link '{name}': mass must be 0 or more, got {mass:g} kg")
@@ -102,7 +102,7 @@ def link_of(
 
 
 def merged(links: Iterable[Link]) -> tuple[float, Array, Array]:
-    """Mass [kg], centre of mass [m] (3,) and inertia [kg·m²] about it (3, 3) of links that hold together.
+    """Return mass [kg], centre of mass [m] (3,) and inertia [kg·m²] about it (3, 3) of links as one body.
 
     By the parallel-axis theorem, J = Σ J_i + m_i (|r_i|² 1 − r_i r_iᵀ) with r_i from the common centre.
     """

@@ -1,12 +1,14 @@
-"""Vehicles from robot descriptions, URDF and SDF, with what is lost on the way.
+"""Vehicles from robot descriptions, URDF and SDF, and the loss of the conversion.
 
-All links together are one rigid body, joints at zero, turning rotors included: their angular momentum is
-lost. A rotor is at its link's centre of mass, pushes along the body's +z and turns about it; tilted ones, and
-joints about another axis, are refused. Of
-Gazebo's motor models the largest thrust motorConstant · maxRotVelocity², momentConstant and turningDirection
-are kept; of the two time constants of the speed the slower one, as the lag of the thrust; of the drag of the
-rotors, rotorDragCoefficient, its slope in hover. Lost are rollingMomentCoefficient, what other plugins do,
-sensors, and shapes but for the rotors' radii. A URDF says nothing of thrusts unless it has such plugins.
+All links together are one rigid body with joints at zero. The rotors are part of it, so their angular
+momentum is lost. A rotor is at its link's centre of mass, pushes along the body's +z axis and turns about
+it. Tilted rotors, and joints about another axis, are refused.
+
+Of Gazebo's motor models, the largest thrust motorConstant · maxRotVelocity², momentConstant and
+turningDirection are kept. The slower of the two time constants of the speed becomes the lag of the thrust.
+The rotors' drag, rotorDragCoefficient, is kept as its slope in hover. Lost are rollingMomentCoefficient, the
+effects of other plugins, sensors, and shapes except for the rotors' radii. A URDF has no thrusts unless it
+has such plugins.
 """
 
 from __future__ import annotations
@@ -32,9 +34,8 @@ from aerobat.vehicle import Vehicle
 
 READERS = {"robot": read_urdf, "sdf": read_sdf}  # by the root's name
 ROTOR_NAME = re.compile("rotor|prop", re.IGNORECASE)
-MAX_TILT_DEG = 0.5  # of a rotor's axis, beyond what is rounding in a file
-DIGITS = 12  # of what is computed
-REQUIRED = {  # of a rotor, and where a file might have said it
+MAX_TILT_DEG = 0.5  # of a rotor's axis, more than by rounding in a file
+REQUIRED = {  # keys of a rotor, with their meanings
     "spin": "1 counter-clockwise seen from above, -1 clockwise",
     "max_thrust": "[N] at full throttle",
     "torque_coefficient": "[m] drag torque over thrust",
@@ -45,14 +46,14 @@ REQUIRED = {  # of a rotor, and where a file might have said it
 
 @dataclass(frozen=True)
 class VehicleDescription:
-    """A vehicle as far as a robot's file describes it."""
+    """A vehicle, as far as a robot's file describes it."""
 
-    table: dict[str, Any]  # as a vehicle's file holds it
-    missing: tuple[str, ...]  # keys of rotors that the file does not give
-    notes: tuple[str, ...]  # sentences about what was taken for what
+    table: dict[str, Any]  # as in a vehicle's file
+    missing: tuple[str, ...]  # keys of rotors that the robot's file does not give
+    notes: tuple[str, ...]  # sentences about the conversion
 
     def vehicle(self) -> Vehicle:
-        """Return the vehicle. Raises SpecError where something is missing, or it cannot be a vehicle."""
+        """Return the vehicle. Raises SpecError where keys are missing or values are wrong."""
         if self.missing:
             raise SpecError(
                 f"nothing is said of the rotors' {', '.join(self.missing)}; write a vehicle's file of it and "
@@ -61,7 +62,7 @@ class VehicleDescription:
         return from_table(Vehicle, self.table)
 
     def toml(self) -> str:
-        """The text of a vehicle's file, to be completed where something is missing."""
+        """Return the text of a vehicle's file, with comments on missing keys."""
         lines = [f"# {note}" for note in self.notes]
         lines += [f"# to be added, for each rotor or for all: {key}, {REQUIRED[key]}" for key in self.missing]
         return "\n".join([*lines, "", to_toml(self.table)])
@@ -69,10 +70,10 @@ class VehicleDescription:
 
 @validated
 def import_vehicle(path: PathName) -> Vehicle:
-    """Return the vehicle that a URDF or SDF file describes; `aerobat.interchange.robots` says what is lost.
+    """Return the vehicle that a URDF or SDF file describes; see `aerobat.interchange.robots` for the loss.
 
-    Raises SpecError, one sentence that names the file, when it is malformed, describes no multirotor, or does
-    not say what its rotors give.
+    Raises SpecError, one sentence that names the file, where it is malformed, describes no multirotor, or
+    lacks properties of its rotors.
     """
     with in_document(Path(path), "robot"):
         return read_robot_description(path).vehicle()
@@ -80,12 +81,12 @@ def import_vehicle(path: PathName) -> Vehicle:
 
 @validated
 def read_robot_description(path: PathName) -> VehicleDescription:
-    """Return what a URDF or SDF file says of a vehicle. Raises SpecError, a sentence, for nonsense."""
+    """Return a vehicle as far as a URDF or SDF file describes it. Raises SpecError for a malformed file."""
     path = Path(path)
     root = parse_xml(path)
     if root.tag not in READERS:
         raise SpecError(f"its root is <{root.tag[:40]}>; a URDF's is <robot>, an SDF's <sdf>")
-    with np.errstate(all="ignore"):  # numbers beyond all reason are refused as what they become
+    with np.errstate(all="ignore"):  # overflow is refused by the checks of its results
         return _described(READERS[root.tag](root, path), path)
 
 
@@ -115,7 +116,7 @@ def _described(robot: Robot, path: Path) -> VehicleDescription:
 
 
 def _rotor_links(robot: Robot, motors: dict[str, Motor]) -> Sequence[Link]:
-    """The links with a motor, in the motors' order; without any, those named after rotors or propellers."""
+    """Return the links with motors, in the motors' order, or else the links named after rotors."""
     links = {link.name: link for link in robot.links}
     for name in motors:
         if name not in links:
@@ -149,7 +150,7 @@ def _rotor(link: Link, motor: Motor | None) -> dict[str, Any]:
 
 
 def _defaults(robot: Robot, mass: float, rotors: int) -> dict[str, float]:
-    """The values that all rotors share; their least thrust is 0."""
+    """Return the values that all rotors share; their minimum thrust is 0."""
     defaults = {"min_thrust": 0.0} | robot.rotor_defaults
     if "thrust_to_weight" in defaults:
         total = defaults.pop("thrust_to_weight") * mass * STANDARD_GRAVITY
@@ -169,9 +170,7 @@ def _notes(path: Path, robot: Robot, hover: float, drag: float) -> list[str]:
 
 
 def _rounded(value: Any) -> Any:
-    """A number, or nested lists of them, without the last digits of what was computed."""
+    """Return a number, or nested lists of numbers, with 12 digits."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
-    return (
-        [_rounded(each) for each in value] if isinstance(value, list) else float(f"{value:.{DIGITS}g}") + 0.0
-    )
+    return [_rounded(each) for each in value] if isinstance(value, list) else float(f"{value:.12g}") + 0.0

@@ -1,8 +1,8 @@
-"""XML as robots are described in: read whole, without entities, its numbers checked.
+"""XML of robot descriptions, parsed without entities, with checks of its numbers.
 
-Python's own parser does it. What makes XML from strangers dangerous, entities that grow or name other files,
-stands in a document type declaration, which neither format has: a file with one is refused. Libraries for
-URDF and SDF bring meshes, lxml or a simulator along for what are a few elements here.
+Python's own parser is used. XML from strangers is dangerous by entities that grow or name other files. These
+are declared in a document type declaration, which neither format has, so a file with one is refused.
+Libraries for URDF and SDF depend on meshes, lxml or a simulator, and only a few elements are needed here.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
 SUFFIXES = (".urdf", ".sdf", ".xml")  # of files that describe robots
-MAX_ELEMENTS = 1000  # in a chain of so many, poses take two seconds
-SIGNS = {  # of files from which others are made, and the remedy
+MAX_ELEMENTS = 1000  # the poses in a chain of so many take two seconds
+REFUSED = {  # texts that no plain description has, and the remedy
     "xacro:": "a xacro macro; expand it first: xacro FILE > FILE.urdf",
     "{{": "a template; let its program write the file first",
     "{%": "a template; let its program write the file first",
@@ -37,7 +37,7 @@ def parse_xml(path: Path) -> Element:
     from xml.etree import ElementTree
 
     text = read_text(path)
-    for sign, what in SIGNS.items():
+    for sign, what in REFUSED.items():
         if sign in text:
             raise SpecError(f"this is {what}")
     try:
@@ -47,7 +47,7 @@ def parse_xml(path: Path) -> Element:
 
 
 def numbers(text: str | None, count: int, what: str) -> Array:
-    """Numbers with spaces between, (count,); zeros for no text. Raises SpecError, naming `what`."""
+    """Return numbers separated by spaces, (count,), zeros for no text. Raises SpecError, naming `what`."""
     words = (text or "").split()
     if not words:
         return np.zeros(count)
@@ -62,7 +62,7 @@ def numbers(text: str | None, count: int, what: str) -> Array:
 
 
 def direction(text: str | None, what: str) -> Array | None:
-    """The unit vector (3,) along three numbers; None for no text. Raises SpecError, naming `what`."""
+    """Return the unit vector (3,) along three numbers, None for no text. Raises SpecError, naming `what`."""
     if not (text or "").split():
         return None
     vector = numbers(text, 3, what)
@@ -73,17 +73,17 @@ def direction(text: str | None, what: str) -> Array | None:
 
 
 def child_number(element: Element, tag: str, what: str) -> float:
-    """The number in a child element, 0 where there is none."""
+    """Return the number in a child element, 0 where there is no such element."""
     return float(numbers(element.findtext(tag), 1, f"{what}: {tag}")[0])
 
 
 def collision_radius(link: Element, name: str, text_of: Callable[[Element, str], str | None]) -> float | None:
-    """The radius [m] of the cylinder that collides, or half the longer side of the box; None without either.
+    """Return the radius [m] of the collision cylinder, or half the longer side of the box; None without both.
 
     Args:
-        link: The link's element.
-        name: The link's name.
-        text_of: Gives what an element says under a key: its child's text in SDF, its attribute in URDF.
+        link: The element of the link.
+        name: The name of the link.
+        text_of: Returns the value of a key of an element: the text of a child in SDF, an attribute in URDF.
     """
     for cylinder in link.iterfind("collision/geometry/cylinder"):
         return float(numbers(text_of(cylinder, "radius"), 1, f"link '{name}': cylinder radius")[0])
@@ -93,9 +93,9 @@ def collision_radius(link: Element, name: str, text_of: Callable[[Element, str],
 
 
 def by_name(elements: Iterable[Element]) -> dict[str, Element]:
-    """Elements by their names.
+    """Return elements by their names.
 
-    Raises SpecError where one has none, two of a kind have the same, or there are more than a robot has.
+    Raises SpecError for an element without a name, for two with the same name, and for too many elements.
     """
     found: dict[str, Element] = {}
     for element in elements:
@@ -109,7 +109,7 @@ def by_name(elements: Iterable[Element]) -> dict[str, Element]:
 
 
 def name_of(element: Element, kind: str) -> str:
-    """The element's name. Raises SpecError where it has none."""
+    """Return the element's name. Raises SpecError where it has none."""
     name = element.get("name", "").strip()
     if not name or not name.isprintable():
         raise SpecError(f"a {kind} has no name; give it one")

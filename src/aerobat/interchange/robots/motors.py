@@ -21,10 +21,10 @@ SPINS = {"ccw": 1, "cw": -1}
 
 
 def read_motors(model: Element, children: Mapping[str, str]) -> tuple[Motor, ...]:
-    """Return the motors of a model's plugins, in their order; those that hold a position have none.
+    """Return the motors of a model's plugins, in their order, except for motors that hold a position.
 
     Args:
-        model: whose elements hold the plugins, at whatever depth.
+        model: its elements have the plugins, at any depth.
         children: the link that each joint moves.
     """
     plugins = [plugin for plugin in model.iter("plugin") if plugin.find("motorConstant") is not None]

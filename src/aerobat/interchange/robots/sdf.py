@@ -24,15 +24,15 @@ from aerobat.interchange.robots.motors import read_motors
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-FRAMES = ("link", "joint", "frame")  # what a pose may be relative to
+FRAMES = ("link", "joint", "frame")  # elements that a pose may be relative to
 MODEL_FRAME = "__model__"
 
 
 def read_sdf(root: Element, path: Path) -> Robot:
     """Return the only model under an SDF file's root, in the model's frame.
 
-    A model that it includes with merge="true" counts as its own, where its folder lies beside that of the
-    file, as Gazebo's model://NAME says. Raises SpecError, naming the link, for what is malformed.
+    A model that is included with merge="true" is part of it; its folder must lie beside that of the file, as
+    for Gazebo's model://NAME. Raises SpecError, naming the link, for a malformed file.
     """
     models = [*root.findall("model"), *root.findall("world/model")]
     if len(models) != 1:
@@ -59,7 +59,7 @@ def read_sdf(root: Element, path: Path) -> Robot:
 
 
 def _merged(model: Element, path: Path) -> list[Element]:
-    """The models that are merged into this one, without those that they merge in turn."""
+    """Return the models that are merged into this one, without models that these merge."""
     found = []
     for include in filter(_is_merged, model.findall("include")):
         uri = _uri(include)
@@ -77,7 +77,7 @@ def _merged(model: Element, path: Path) -> list[Element]:
 
 
 def _is_merged(include: Element) -> bool:
-    """True for what becomes part of the model; other inclusions are models of their own, held by joints."""
+    """Return True for a model that becomes part of this one; others are held by joints."""
     return include.get("merge") in ("true", "1")
 
 
@@ -86,7 +86,7 @@ def _uri(include: Element) -> str:
 
 
 def _axes(frames: dict[str, Element]) -> dict[str, Array]:
-    """The axes, in the model's frame, of the joints that turn, by the links that these turn."""
+    """Return the axes of turning joints, in the model's frame, by the names of the links that they turn."""
     found = {}
     for name, joint in frames.items():
         axis = joint.find("axis") if joint.tag == "joint" and joint.get("type") != "fixed" else None
@@ -117,7 +117,7 @@ def _link(name: str, element: Element, pose: RigidTransform, axis: Array | None)
 
 
 def _pose(element: Element, what: str) -> RigidTransform:
-    """The pose that stands in an element, relative to whatever it is relative to."""
+    """Return the pose in an element, relative to its reference frame."""
     pose = element.find("pose")
     if pose is None:
         return IDENTITY
@@ -129,7 +129,7 @@ def _pose(element: Element, what: str) -> RigidTransform:
 
 
 def _pose_of(name: str, frames: dict[str, Element]) -> RigidTransform:
-    """The pose of a link, joint or frame in the model's frame, by whatever it is relative to."""
+    """Return the pose of a link, joint or frame in the model's frame, by the chain of reference frames."""
     chain: list[Element] = []
     while name != MODEL_FRAME:
         if name not in frames:
@@ -145,7 +145,7 @@ def _pose_of(name: str, frames: dict[str, Element]) -> RigidTransform:
 
 
 def _reference_frame(element: Element) -> str:
-    """The frame that an element's pose is relative to: by default the model's, of a joint its child's."""
+    """Return the reference frame of an element's pose: by default the model's, for a joint its child's."""
     pose = element.find("pose")
     given = "" if pose is None else pose.get("relative_to", "")
     usual = (element.findtext("child") or "") if element.tag == "joint" else element.get("attached_to", "")

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 
 def read_urdf(root: Element, path: Path) -> Robot:
-    """Return the robot under a URDF file's root, in the frame of its first link.
+    """Return the robot under a URDF file's root, in the frame of its root link.
 
-    gym-pybullet-drones' `<properties>`, thrust2weight, kf, km and prop_radius, are read too. Raises
-    SpecError, naming the link or the joint, for what is malformed.
+    The `<properties>` of gym-pybullet-drones, thrust2weight, kf, km and prop_radius, are read too. Raises
+    SpecError, naming the link or the joint, for a malformed file.
     """
     elements = by_name(root.findall("link"))
     poses = _poses(root, elements)
@@ -39,7 +39,7 @@ def read_urdf(root: Element, path: Path) -> Robot:
 
 
 def _poses(root: Element, links: dict[str, Element]) -> dict[str, RigidTransform]:
-    """Each link's frame in that of the first one, by the joints between."""
+    """Return the frames of all links in that of the root, by the joints between."""
     above: dict[str, tuple[str, RigidTransform]] = {}
     for joint in root.findall("joint"):
         name, parent, child = name_of(joint, "joint"), _end(joint, "parent"), _end(joint, "child")
@@ -88,7 +88,7 @@ def _link(name: str, element: Element, pose: RigidTransform, joint: Element | No
 
 
 def _axis(joint: Element, pose: RigidTransform) -> Array | None:
-    """The axis of a joint that turns, whose frame is that of its child, at `pose` in the first link's."""
+    """Return the axis of a turning joint, whose frame is its child's, at `pose` in that of the root."""
     axis = joint.find("axis")
     if axis is None or joint.get("type") == "fixed":
         return None
@@ -117,7 +117,7 @@ def _end(joint: Element, which: str) -> str:
 
 
 def _properties(element: Element | None, links: tuple[Link, ...]) -> dict[str, float]:
-    """The properties of all rotors by gym-pybullet-drones; the thrust is a ratio to the weight."""
+    """Return the properties of all rotors by gym-pybullet-drones; the thrust is a ratio to the weight."""
     if element is None:
         return {}
     found = {

@@ -1,4 +1,4 @@
-"""ROS messages, filled and read at one place: for bags, and for live nodes of ROS 1 and ROS 2."""
+"""ROS messages for bags and for live nodes of ROS 1 and ROS 2."""
 
 from aerobat.interchange.ros.messages import BODY, NANOSECONDS, WORLD, JointMotion, Make, Messages, RosMessage
 from aerobat.interchange.ros.plan_messages import PlanMessages, Stamped

@@ -1,6 +1,6 @@
 """ROS messages of states and shapes, for ROS 1 and ROS 2 alike.
 
-World axes are ENU and body axes FLU, as REP 103 has them and we do. Frames are named `world` and `base_link`.
+World axes are ENU and body axes FLU, as in REP 103. Frames are named `world` and `base_link`.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ class Make(Protocol):
     """A maker of one distribution's messages."""
 
     def __call__(self, kind: str, /, **given: Any) -> RosMessage:
-        """A message of a kind, as in "geometry_msgs/msg/Pose"; what is not given is zero, empty or false."""
+        """Return a message of a kind, as "geometry_msgs/msg/Pose"; other fields are zero, empty or false."""
 
 
 class JointMotion(NamedTuple):
-    """The motion of one joint of a trajectory's point, all of it in world axes."""
+    """The motion of one joint at a point of a trajectory, in world axes."""
 
     position: Array  # [m], (3,)
     q_world_body: Array  # (4,)
@@ -47,36 +47,36 @@ class Messages:
     make: Make
 
     def header(self, stamp: int) -> RosMessage:
-        """The header of what is in the world."""
+        """Return a header with the frame `world`."""
         return self.make("std_msgs/msg/Header", stamp=self.time("Time", stamp), frame_id=WORLD)
 
     def time(self, kind: str, nanoseconds: int) -> RosMessage:
-        """An instant, kind `Time`, or a `Duration`."""
+        """Return a `Time` or a `Duration`."""
         sec, nanosec = divmod(nanoseconds, NANOSECONDS)
         return self.make(f"builtin_interfaces/msg/{kind}", sec=sec, nanosec=nanosec)
 
     def vector(self, kind: str, components: Array) -> RosMessage:
-        """A `Vector3` or a `Point`."""
+        """Return a `Vector3` or a `Point`."""
         x, y, z = components.tolist()
         return self.make(f"geometry_msgs/msg/{kind}", x=x, y=y, z=z)
 
     def quaternion(self, q: Array) -> RosMessage:
-        """A rotation, (w, x, y, z)."""
+        """Return a `Quaternion` of (w, x, y, z)."""
         w, x, y, z = q.tolist()
         return self.make("geometry_msgs/msg/Quaternion", w=w, x=x, y=y, z=z)
 
     def pose(self, position: Array, q: Array) -> RosMessage:
-        """A place [m] and an attitude."""
+        """Return a pose of a position [m] and an attitude."""
         place, turn = self.vector("Point", position), self.quaternion(q)
         return self.make("geometry_msgs/msg/Pose", position=place, orientation=turn)
 
     def twist(self, linear: Array, angular: Array) -> RosMessage:
-        """A velocity [m/s] and a rate [rad/s], or what they change by in a second."""
+        """Return a twist of a velocity [m/s] and a rate [rad/s], or of their derivatives."""
         vectors = self.vector("Vector3", linear), self.vector("Vector3", angular)
         return self.make("geometry_msgs/msg/Twist", linear=vectors[0], angular=vectors[1])
 
     def odometry(self, stamp: int, state: BodyState) -> RosMessage:
-        """The pose in the world, velocities in the body's axes, as the message has it."""
+        """Return the odometry of a state: the pose in world axes, velocities in body axes."""
         velocity = so3.unrotate(state.q_world_body, state.velocity)
         pose, twist = self.pose(state.position, state.q_world_body), self.twist(velocity, state.omega_body)
         return self.make(
@@ -88,7 +88,7 @@ class Messages:
         )
 
     def trajectory_point(self, time_from_start: int, *joints: JointMotion) -> RosMessage:
-        """The point of a trajectory at a time [ns] since it began."""
+        """Return the point of a trajectory at a time [ns] since its start."""
         transforms = [
             self.make(
                 "geometry_msgs/msg/Transform",
@@ -119,19 +119,19 @@ class Messages:
         position: Array = _ORIGIN,
         q: Array = so3.IDENTITY,
     ) -> RosMessage:
-        """A marker for RViz.
+        """Return a marker for RViz.
 
         Args:
             kind: LINE_STRIP, LINE_LIST, CYLINDER or TRIANGLE_LIST.
-            stamp: when [ns].
-            name: what it is, or belongs to.
-            number: of it there.
-            scale: its size [m]; of lines the width, of points that are in metres 1.
+            stamp: its time [ns].
+            name: its namespace.
+            number: its number in the namespace.
+            scale: its size [m]; for lines, the width; for triangles, 1.
             color: red, green and blue, 0 to 1.
             opacity: 0 to 1.
-            points: along lines, or the corners of triangles [m], in its own axes, (3,) each.
-            position: of its axes' origin [m], (3,).
-            q: its attitude, (4,).
+            points: along lines, or the corners of triangles [m], in the marker's axes, (3,) each.
+            position: the origin of these axes [m], (3,).
+            q: their attitude, (4,).
         """
         red, green, blue = color
         return self.make(

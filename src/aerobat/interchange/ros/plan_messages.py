@@ -27,8 +27,8 @@ from aerobat.interchange.solids import solid_surfaces
 from aerobat.planning import Plan
 from aerobat.states import BodyState
 
-START = 1  # [s] stamp of the plan's start: ROS takes a stamp of 0 for none
-PATH, FRAME = (0.02, 0.0, 0.0), (0.05, 0.0, 0.0)  # [m] the width of lines
+START = 1  # [s] stamp of the plan's start; in ROS, a stamp of 0 means none
+PATH, FRAME = (0.02, 0.0, 0.0), (0.05, 0.0, 0.0)  # [m] scales of lines: the width
 BLUE, ORANGE = (0.05, 0.2, 0.6), (0.85, 0.35, 0.05)
 GREY, BLACK = (0.4, 0.4, 0.4), (0.1, 0.1, 0.1)
 KIND_OF_MARKERS = "visualization_msgs/msg/MarkerArray"
@@ -36,7 +36,7 @@ KIND_OF_MARKERS = "visualization_msgs/msg/MarkerArray"
 
 @dataclass(frozen=True)
 class Stamped:
-    """A message and when it is published."""
+    """A message with its topic and time."""
 
     topic: str
     kind: str
@@ -50,11 +50,11 @@ class PlanMessages:
 
     messages: Messages
     plan: Plan
-    start: int = START * NANOSECONDS  # [ns] the stamp of its start
-    origin: Array = field(default_factory=lambda: np.zeros(3))  # [m] where the plan's lies in the world
+    start: int = START * NANOSECONDS  # [ns] stamp of the plan's start
+    origin: Array = field(default_factory=lambda: np.zeros(3))  # [m] position of its origin in the world
 
     def all(self, found: Reference) -> Iterator[Stamped]:
-        """Each of them, the plan sampled as `found`, in no order of time."""
+        """Yield all messages of the plan with the samples `found`, not sorted by time."""
         stamps = [self._stamp(time) for time in found.times]
         yield self._trajectory(found, stamps)
         setpoint = found.setpoint
@@ -84,13 +84,13 @@ class PlanMessages:
             yield self._array(self._stamp(time), discs)
 
     def lines(self, found: Reference) -> Sequence[RosMessage]:
-        """Markers of the path, sampled as `found`, and of the gates and obstacles that stand still."""
+        """Return markers of the path with the samples `found`, and of unmoving gates and obstacles."""
         stamp, path = self._stamp(0.0), found.setpoint.flat.position + self.origin
         line = self.messages.marker(LINE_STRIP, stamp, "path", scale=PATH, color=GREY, points=path)
         return [line, *self._around(0.0, moving=False)]
 
     def _around(self, time: float, moving: bool, when: str = "") -> Iterator[RosMessage]:
-        """Markers of the gates and obstacles that move, or that do not, where they are at a time [s]."""
+        """Yield markers of moving, or of unmoving, gates and obstacles at a time [s]."""
         stamp = self._stamp(time)
         for gate in self.plan.problem.gates:
             if (gate.motion is not None) is moving:
@@ -117,9 +117,9 @@ class PlanMessages:
         return solid_surfaces(self.plan)
 
     def snapshots(self, every: float = np.inf) -> Iterator[tuple[float, Sequence[RosMessage]]]:
-        """Markers of the vehicle and all that moves: at the start, stages and the end, after their times [s].
+        """Yield times [s] with markers of the vehicle and all that moves: the start, the stages and the end.
 
-        `every`: so often [s] on the way, too.
+        `every`: the interval [s] of further times.
         """
         stages = ((stage.name, stage.time) for stage in self.plan.stages)
         between = np.arange(every, self.plan.duration, every) if np.isfinite(every) else ()
@@ -133,14 +133,14 @@ class PlanMessages:
             yield time, [*vehicle, *self._around(time, moving=True, when=f": {name}")]
 
     def _vehicle(self, name: str, row: int, position: Array, q: Array, stamp: int) -> Sequence[RosMessage]:
-        """The rotors and arms of the vehicle at one instant, numbered apart from those of others of its name.
+        """Return markers of the vehicle's rotors and arms at one instant.
 
         Args:
-            name: what is then.
-            row: the number of the instant.
+            name: namespace of the markers, which other instants may share.
+            row: the number of the instant, by which the markers' numbers differ from those of others.
             position: [m] world, (3,).
             q: body to world, (4,).
-            stamp: when [ns].
+            stamp: the time [ns].
         """
         assert self.plan.vehicle is not None, "messages are of plans with a vehicle"
         rotors = self.plan.vehicle.rotors
@@ -173,7 +173,7 @@ class PlanMessages:
         return [arms, *discs]
 
     def _trajectory(self, found: Reference, stamps: Sequence[int]) -> Stamped:
-        """All points in one message, everything in world axes, as controllers of multirotors take them."""
+        """Return all points in one message, in world axes, as controllers of multirotors take them."""
         setpoint = found.setpoint
         rates, accelerations = (
             so3.rotate(setpoint.q_world_body, vectors)
@@ -202,5 +202,5 @@ class PlanMessages:
         return Stamped("/aerobat/markers", KIND_OF_MARKERS, stamp, message)
 
     def _stamp(self, time: float) -> int:
-        """The stamp [ns] of a time of the plan [s]."""
+        """Return the stamp [ns] of a time of the plan [s]."""
         return self.start + int(np.floor(time * NANOSECONDS))
