@@ -135,9 +135,11 @@ class Commander:
 
         `late`: by how much the goal is late [s].
         """
-        if self.doing is Doing.MANEUVERING:
-            goal = self._of_mission(now, late)
-            return PathGoal.upright(goal, self._gravity) if isinstance(goal, PositionGoal) else goal
+        goal = self._of_mission(now, late) if self.doing is Doing.MANEUVERING else self._of_route(now)
+        return PathGoal.upright(goal, self._gravity) if isinstance(goal, PositionGoal) else goal
+
+    def _of_route(self, now: float) -> PositionGoal | None:
+        """Return the goal of a climb, hover, braking or landing; None once the vehicle is left to itself."""
         if self.route is None or self._leave_silent(now):
             return None
         if self._is_behind and not self._restart_route(now):
@@ -151,7 +153,7 @@ class Commander:
         if self.doing is Doing.LANDING and since > self.route.path.duration + _STANDING:
             self.doing, self.route = Doing.NOTHING, None
             return None
-        return PathGoal.upright(self._goal_on_route(now), self._gravity)
+        return self._goal_on_route(now)
 
     def _of_mission(self, now: float, late: float) -> PathGoal | PositionGoal | None:
         """Return the goal of the mission, or of the hover or braking that follows it."""

@@ -128,12 +128,12 @@ class ManeuverNode:
             piece,
             commander.observed,
             now,
-            self.origin + round((now if piece is None else piece.stamp) * NANOSECONDS),
-            commander.doing,
-            commander.route,
-            commander.ground,
-            self._flown if maneuvers else None,
-            maneuvers and mission is not None and mission.phase is Phase.MANEUVER,
+            stamp=self.origin + round((now if piece is None else piece.stamp) * NANOSECONDS),
+            doing=commander.doing,
+            route=commander.route,
+            ground=commander.ground,
+            flown=self._flown if maneuvers else None,
+            is_flown=maneuvers and mission is not None and mission.phase is Phase.MANEUVER,
         )
 
     def _send(self, publish: Callable[[object], None], tick: Tick) -> None:
@@ -208,11 +208,11 @@ class ManeuverNode:
             problem,
             self._vehicle,
             planner,
-            np.array(observed.body.position),
-            yaw_of(observed.body.q_world_body),
-            self.commander.ground,
-            self.settings.in_world,
-            self.settings.in_pieces,
+            position=np.array(observed.body.position),
+            yaw=yaw_of(observed.body.q_world_body),
+            ground=self.commander.ground,
+            in_world=self.settings.in_world,
+            in_pieces=self.settings.in_pieces,
         )
         self._planning = self._executor.submit(prepare, request), answer
 
