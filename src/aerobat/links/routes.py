@@ -34,14 +34,11 @@ class Route(NamedTuple):
 
     def goal(self, now: float) -> PositionGoal:
         """Return the goal at a time [s]."""
-        return goal_on(self.path, max(now - self.began, 0.0), self.yaw)
+        return goal_on(self.path, now - self.began, self.yaw)
 
     def reference(self, times: Array, gravity: float) -> ReferencePoint:
         """Return references for a controller at times [s], leaves (T,)."""
-        since = times - self.began
-        flat = self.path.flat(np.clip(since, 0.0, self.path.duration))
-        jerk = np.where((since < self.path.duration)[:, None], flat.jerk, 0.0)  # discontinuous at the end
-        return point_reference(flat.position, flat.velocity, flat.acceleration, jerk, self.yaw, gravity)
+        return point_reference(*_motion(self.path, times - self.began), self.yaw, gravity)
 
 
 def rest_to_rest(
@@ -72,7 +69,13 @@ def straight_down(start: Array, ground: float) -> Trajectory:
 
 
 def goal_on(route: Trajectory, time: float, yaw: float) -> PositionGoal:
-    """Return the goal at a time [s] on a route, constant from its end on, at a yaw [rad]."""
-    flat = route.flat(min(time, route.duration))
-    jerk = flat.jerk if time < route.duration else np.zeros(3)  # jerk is discontinuous at the end
-    return PositionGoal(flat.position, flat.velocity, flat.acceleration, yaw, jerk)
+    """Return the goal at a time [s] since a route's start, at a yaw [rad]."""
+    position, velocity, acceleration, jerk = _motion(route, np.array(time))
+    return PositionGoal(position, velocity, acceleration, yaw, jerk)
+
+
+def _motion(route: Trajectory, times: Array) -> tuple[Array, Array, Array, Array]:
+    """Return position to jerk [m/s^k] at times [s] (...) since a route's start; constant beyond its ends."""
+    flat = route.flat(np.clip(times, 0.0, route.duration))
+    jerk = np.where((times < route.duration)[..., None], flat.jerk, 0.0)  # jerk is discontinuous at the end
+    return flat.position, flat.velocity, flat.acceleration, jerk
