@@ -1,6 +1,6 @@
-"""The beginning and the end of a run: each way in which it can go has an exit code and a sentence.
+"""The beginning and the end of a run: every outcome has an exit code, and every failure a sentence.
 
-Little is imported here, so that signals and broken terminals are provided for when the rest is.
+Few modules are imported here, so that signals and broken terminals are handled while the others are imported.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from aerobat.errors import AerobatError, Infeasible, chain_of
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line on `arguments`, by default those of the process.
 
-    Whatever is foreseen ends in one sentence on standard error, and an exit code.
+    A foreseen failure ends in one sentence on standard error, and an exit code.
     """
     errors = sys.stderr
     tokens = sys.argv[1:] if arguments is None else arguments
@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             provide_streams()
             code = _run(tokens)
     except KeyboardInterrupt as interrupt:
-        sys.stderr = errors or sys.stderr  # a solver may have been interrupted while it was led elsewhere
+        sys.stderr = errors or sys.stderr  # an interrupted solver may have redirected it
         code = interrupted_by()
         stopped_by(code).tell([] if REPORTED in interrupt.args else tokens)
     if code is not ExitCode.WELL:
@@ -37,11 +37,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(arguments: Sequence[str]) -> ExitCode:
-    """Run a command; a failure is told in a sentence."""
-    # matrices are small: a pool of threads takes longer to begin than all of them
+    """Run a command, report its failure in a sentence, and return the exit code."""
+    # matrices are small: starting a pool of threads takes longer than all of their algebra
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    gc.set_threshold(500_000, 10, 10)  # a short process need not look for cyclic garbage,
-    atexit.register(gc.freeze)  # and least of all when it ends: a tenth of the main job
+    gc.set_threshold(500_000, 10, 10)  # a short process need not collect cyclic garbage,
+    atexit.register(gc.freeze)  # least of all at its end, which saves a tenth of the main job
     try:
         from aerobat.cli.app import run
 
@@ -56,22 +56,22 @@ def _run(arguments: Sequence[str]) -> ExitCode:
 
 
 def _unforeseen(error: BaseException, arguments: Sequence[str]) -> ExitCode:
-    """Say why a plugin failed, or what the operating system refused; raise what is a defect of ours."""
+    """Report the failure of a plugin or of the operating system; raise an error that is a defect of ours."""
     if isinstance(error, SystemExit) and any(isinstance(each, BrokenPipeError) for each in chain_of(error)):
-        return ExitCode.BROKEN_PIPE  # of rich's tables and help, for which it is no error of the system
+        return ExitCode.BROKEN_PIPE  # rich exits where its pipe is broken
     if isinstance(error, OSError) and error.filename is None and is_broken(sys.stdout):
         discard(sys.stdout)
-        if isinstance(error, BrokenPipeError):  # whoever read has enough
+        if isinstance(error, BrokenPipeError):  # the reader has closed the pipe
             return ExitCode.BROKEN_PIPE
         say(f"cannot write to standard output: {error.strerror or error}")
         return ExitCode.BAD_INPUT
-    if is_interrupted():  # and what was raised was taken for another error
+    if is_interrupted():  # the interrupt was turned into another error
         raise error
     failure = None if TRACEBACK_FLAG in arguments else of_plugins(error, arguments)
     if failure is not None:
         failure.tell(arguments)
         return ExitCode.BAD_INPUT
-    if not isinstance(error, OSError) or error.filename is not None:  # of a file, which is nobody's but ours
+    if not isinstance(error, OSError) or error.filename is not None:  # about a file: a defect of ours
         raise error
     say(f"the operating system refused: {error.strerror or error}")
     return ExitCode.BAD_INPUT

@@ -1,4 +1,4 @@
-"""Failures of runs: a sentence each, and with --json the same as data."""
+"""Failures of runs: one sentence each, and with --json the same as data."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ class Failure:
 
     kind: str  # bad_input, no_plan, missing_backend, plugin, interrupted or terminated
     message: str  # one sentence
-    field: str | None = None  # the key, or the option, that it is about; None where it is about none
+    field: str | None = None  # the key or the option that is wrong, if any
 
     def tell(self, arguments: Sequence[str]) -> None:
-        """Say the sentence on standard error; where JSON is asked for, write all to standard output."""
+        """Print the sentence to standard error and, with --json, the failure to standard output."""
         say(self.message)
         if "--json" in arguments:
             print_json(json.dumps({"error": asdict(self)}, indent=2, ensure_ascii=False))
 
 
 def stopped_by(code: ExitCode) -> Failure:
-    """The failure of a run that a signal ended: interrupted or terminated."""
+    """Return the failure of a run that was interrupted or terminated by a signal."""
     name = code.name.lower()
     return Failure(name, name)
 
 
 def foreseen(error: AerobatError) -> Failure:
-    """The failure that an error of ours stands for."""
+    """Return the failure of a foreseen error."""
     if isinstance(error, Infeasible):
         sentence = error.with_remedy("add --explain to `aerobat plan` to try changes that would help")
         return Failure("no_plan", sentence, next(iter(error.limits), None))
@@ -64,14 +64,14 @@ def foreseen(error: AerobatError) -> Failure:
 
 
 def of_plugins(error: BaseException, arguments: Sequence[str]) -> Failure | None:
-    """The failure of a plugin that an unforeseen error stands for; None where it is a defect of ours.
+    """Return the failure of a plugin that raised an unforeseen error; None where it is a defect of ours.
 
-    It names the plugin's file and line where the error passed through one, in a worker's process too. Others
-    may come of what a plugin returned.
+    The failure names the plugin's file and line where the error passed through one, in a worker's process
+    too. Other errors may follow from a value that a plugin returned.
 
     Args:
-        error: What was raised.
-        arguments: Of the command line.
+        error: The error.
+        arguments: The arguments of the command line.
     """
     from aerobat.declaration.registry import imported_plugins
 
@@ -91,7 +91,7 @@ def of_plugins(error: BaseException, arguments: Sequence[str]) -> Failure | None
 
 
 def _field(error: AerobatError) -> str | None:
-    """The field that an error is about: the outermost name of it, or the option that its sentence names."""
+    """Return the field that is wrong: the outermost name of it, or the option that the message names."""
     named = next((name for each in chain_of(error) if (name := getattr(each, "field", ""))), None)
     option = _FLAG.search(str(error))
     return named or (option and option[0]) or next(iter(error.limits), None)

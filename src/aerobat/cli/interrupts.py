@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM from a run's first instant to the one from which nothing takes it back."""
+"""Ctrl-C and SIGTERM, from the start of a run until its results are in place."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from types import FrameType
 from aerobat.cli.failures import ExitCode
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-REPORTED = "reported"  # of an interrupt whose command has written its report: nothing else is JSON then
+REPORTED = "reported"  # argument of an interrupt after which no failure is printed as JSON: a report was
 _noticed: list[int] = []
 
 

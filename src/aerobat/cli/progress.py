@@ -1,4 +1,4 @@
-"""Progress of long work: on a terminal always, in a pipe a line on standard error every few seconds."""
+"""Progress of long work: always visible on a terminal, in a pipe a line every few seconds."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ VARIABLE = "AEROBAT_PROGRESS"
 
 
 class Progress:
-    """Progress of long work by now, as a line.
+    """Progress of long work, as a line.
 
     Args:
-        doing: What is counted, in words.
-        total: How many there shall be; 0 where nobody knows.
-        clock: Seconds that rise.
+        doing: The kind of parts that are counted, in words.
+        total: The number of all parts; 0 if it is unknown.
+        clock: Returns a monotonic time [s].
     """
 
     def __init__(self, doing: str, total: int = 0, clock: Callable[[], float] = perf_counter) -> None:
@@ -38,19 +38,19 @@ class Progress:
         self._done, self._note = 0, ""
 
     def tell(self, done: int, note: str = "") -> None:
-        """Record how many are done, with a note."""
+        """Record the number of finished parts, with a note."""
         self._done, self._note = done, note
 
     def step(self, note: str) -> None:
-        """Record that one more is done, with a note."""
+        """Record one more finished part, with a note."""
         self.tell(self._done + 1, note)
 
     def counting(self, name: str) -> Callable[[int, int], None]:
-        """Return a callback that records how many are done, and how many of these are so named."""
+        """Return a callback that records the numbers of finished parts and of those with a property."""
         return lambda done, some: self.tell(done, f"{some} {name}")
 
     def __str__(self) -> str:
-        """The count, the time spent, the note, and the time left."""
+        """Return the count, the time spent, the note, and the time left."""
         spent = self._clock() - self._began
         of = f" of {self._total}" if self._total else ""
         text = f"{self._doing} {self._done}{of} in {spent:.0f} s" + (f": {self._note}" if self._note else "")
@@ -59,7 +59,7 @@ class Progress:
         return f"{text}; {(self._total - self._done) * spent / self._done:.0f} s to go"
 
     def __rich__(self) -> str:
-        """The line, drawn anew whenever a terminal shows it, and none of its brackets taken for markup."""
+        """Return the line for rich, which asks for it at every refresh, with its brackets escaped."""
         from rich.markup import escape
 
         return escape(str(self))
@@ -69,11 +69,11 @@ P = TypeVar("P", bound=Progress)
 
 
 class PlanningProgress(Progress):
-    """Progress of planning by now.
+    """Progress of planning.
 
     Args:
         planner: The name of the planner that begins.
-        clock: Seconds that rise.
+        clock: Returns a monotonic time [s].
     """
 
     def __init__(self, planner: str = "", clock: Callable[[], float] = perf_counter) -> None:
@@ -81,28 +81,28 @@ class PlanningProgress(Progress):
         self.begin(planner)
 
     def begin(self, planner: str) -> None:
-        """Start anew with another planner."""
+        """Start again, with another planner."""
         self._planner = planner
         self._began = self._clock()
-        self._best = inf  # [s] the shortest duration that will do
+        self._best = inf  # [s] the shortest feasible duration
         self._tried = self._rounds = 0
         self._last = self._trial = ""
 
     def tried(self, trial: Round) -> None:
-        """Record a round of flights; after it the plan is sought anew."""
+        """Record a round of flights, after which the search for a plan starts again."""
         self._best = inf
         self._rounds += 1
         self._trial = f"; round {self._rounds}, {trial}"
 
     def record(self, attempt: Attempt) -> None:
-        """Record an attempt that ended."""
+        """Record a finished attempt."""
         self._tried += 1
         self._last = f"{attempt.duration:.3f} s, {attempt.outcome}"
         if attempt.feasible:
             self._best = min(self._best, attempt.duration)
 
     def __str__(self) -> str:
-        """The planner, the time spent, its best duration, and its last attempt."""
+        """Return the planner, the time spent, its best duration, and its last attempt."""
         best = "no plan so far" if self._best == inf else f"{self._best:.3f} s so far"
         last = f"; attempt {self._tried}: {self._last}" if self._tried else ""
         spent, number = self._clock() - self._began, f"round {self._rounds + 1}, " if self._rounds else ""
@@ -111,7 +111,7 @@ class PlanningProgress(Progress):
 
 @contextmanager
 def showing(progress: P) -> Iterator[P]:
-    """Show progress while the block runs: live on a terminal, else as lines on standard error."""
+    """Show progress during the block: live on a terminal, else as lines on standard error."""
     if sys.stderr.isatty():
         from rich.console import Console
 
@@ -132,16 +132,16 @@ def tell(progress: Progress, wait: Callable[[float], bool], seconds: float) -> N
     """Print a line of progress at intervals until the work ends.
 
     Args:
-        progress: What is printed.
-        wait: Waits for so many seconds, and returns true as soon as the work ends.
-        seconds: From one line to the next [s].
+        progress: The progress.
+        wait: Waits for a number of seconds, and returns true as soon as the work ends.
+        seconds: The interval between lines [s].
     """
     while not wait(seconds):
         say(str(progress))
 
 
 def period() -> float:
-    """The seconds between lines. Raises SpecError where the environment gives no such number."""
+    """Return the seconds between lines. Raises SpecError where the environment gives no such number."""
     text = os.environ.get(VARIABLE, "")
     try:
         seconds = float(text or PERIOD)

@@ -1,4 +1,4 @@
-"""Standard streams as they come: closed, full, or of few characters."""
+"""Standard streams that may be closed, full, or without characters beyond ASCII."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TextIO
 
-# what tables and sentences hold beside ASCII, for terminals that have no more
+# replacements of other characters in tables and sentences, for terminals with ASCII alone
 ASCII = {
     "·": "-",
     "–": "-",
@@ -37,9 +37,9 @@ _ERRORS = "aerobat-in-ascii"  # the name of the error handler below
 
 
 def provide_streams() -> None:
-    """Give closed streams a place that takes everything, and each stream a way to write any character.
+    """Open closed streams to the null device, and let each stream write any character.
 
-    A closed descriptor would be the next file's that is opened, and printing would end in it.
+    Otherwise the next file that is opened would get the closed descriptor, and printing would write to it.
     """
     for name, mode in (
         ("stdin", "r"),
@@ -55,13 +55,13 @@ def provide_streams() -> None:
 
 
 def discard(stream: TextIO) -> None:
-    """Redirect a stream that takes nothing more to the null device, with what is left in its buffer."""
+    """Redirect a broken stream to the null device, with the rest of its buffer."""
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def is_broken(stream: TextIO) -> bool:
-    """True if a stream cannot be written to any more; an empty line is written to find out."""
+    """Return True if a stream cannot be written any more, after writing an empty line to it."""
     try:
         stream.write("\n")
         stream.flush()
@@ -71,7 +71,7 @@ def is_broken(stream: TextIO) -> bool:
 
 
 def say(sentence: str) -> None:
-    """Print a sentence to standard error, on one line whatever names it holds; ignore a broken stream."""
+    """Print a sentence to standard error, on one line even with unprintable names; ignore a broken stream."""
     line = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in sentence)
     try:
         print(f"aerobat: {line}", file=sys.stderr, flush=True)
@@ -80,8 +80,8 @@ def say(sentence: str) -> None:
 
 
 def open_in_browser(place: Path | str) -> None:
-    """Open a file or an address in the browser, or say that nothing does."""
-    import webbrowser  # most commands open nothing
+    """Open a file or an address in the browser, or report that there is no browser."""
+    import webbrowser  # not needed by most commands
 
     address = place if isinstance(place, str) else place.resolve().as_uri()
     if not webbrowser.open(address):
@@ -97,7 +97,7 @@ def print_json(text: str) -> None:
 
 
 def _in_ascii(error: UnicodeError) -> tuple[str, int]:
-    """What a codec cannot write, in ASCII: known signs in kind, letters without their accents, else "?"."""
+    """Return ASCII for characters that a codec cannot write: known ones, letters without accents, or "?"."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     signs = error.object[error.start : error.end]
