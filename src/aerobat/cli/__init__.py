@@ -1,4 +1,4 @@
-"""The command line: plan | fly | sweep | check | compare | export | repeat | vehicles | problems."""
+"""The command line; its commands are listed in `app`."""
 
 from aerobat.cli.entry import main
 

@@ -1,4 +1,4 @@
-"""The command line: which commands there are, and how each run ends."""
+"""The command line: its commands, help, and exit codes."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from cyclopts import App, CycloptsError, Group, Parameter
 from aerobat.cli.failures import IMPORT_FLAG, ExitCode
 from aerobat.errors import SpecError
 
-# each command is one file and one function of this name, imported when it is asked for
-# those of `link` are two a file
+# each command is a function in a file of the same name, imported when the command is run;
+# the commands of `link` are two to a file
 COMMANDS: dict[str, dict[str, str | dict[str, str]]] = {
     "Plan and fly": {
         "fly": "Plan a maneuver, fly it in simulation, and report.",
@@ -85,7 +85,7 @@ START = """Plan, fly and prove aggressive maneuvers for multirotors. To begin wi
 
 
 def run(arguments: Sequence[str]) -> ExitCode:
-    """Run the command that `arguments` name. Raises SpecError for those that make no sense."""
+    """Run the command that `arguments` name. Raises SpecError for wrong arguments."""
     if not arguments:
         print(START)
         return ExitCode.WELL
@@ -94,13 +94,13 @@ def run(arguments: Sequence[str]) -> ExitCode:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         raise SpecError(" ".join(str(error).split())) from None
-    return code if isinstance(code, ExitCode) else ExitCode.WELL  # some, and help, have nothing to judge
+    return code if isinstance(code, ExitCode) else ExitCode.WELL  # help and some commands return none
 
 
 def _import_plugins(tokens: Sequence[str]) -> None:
     """Run the Python files that `--import` names, which register maneuvers and planners.
 
-    Their planners bring options of their own: this comes before the options are read.
+    The planners add options of their own, so the files run before the options are read.
     """
     for path in _import_paths(tokens):
         from aerobat.declaration import import_plugin

@@ -19,7 +19,7 @@ FRACTION = validators.Number(gte=0, lt=1)
 
 @dataclass(frozen=True, kw_only=True)
 class MissionOptions(PluginOptions):
-    """Options of what ends a flight by a link."""
+    """Options of the abort criteria of a flight over a link."""
 
     max_error: Annotated[float, Parameter(group=bounds, validator=POSITIVE)] = 1.0
     """Metres off the path at which the flight is given up: the vehicle is brought to a hover, and by MAVLink
@@ -33,7 +33,7 @@ class MissionOptions(PluginOptions):
 
     @property
     def mission(self) -> "MissionSettings":
-        """The same as settings of a mission."""
+        """The options as settings of a mission."""
         from aerobat.links.mission import MissionSettings
 
         return MissionSettings(
@@ -44,7 +44,7 @@ class MissionOptions(PluginOptions):
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class EndOptions:
-    """Options of what runs until it is interrupted."""
+    """Options of commands that run until they are interrupted."""
 
     seconds: Annotated[float | None, Parameter(name="--for", group=trials, validator=POSITIVE)] = None
     """Seconds after which it ends. Default: when it is interrupted."""
@@ -52,7 +52,7 @@ class EndOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class RosNodeOptions(EndOptions):
-    """Options of a node of ROS."""
+    """Options of a ROS node."""
 
     generation: Annotated[
         Literal["1", "2"], Parameter(name="--ros", group=linking, env_var="ROS_VERSION")
@@ -108,7 +108,7 @@ class MavlinkOptions(MissionOptions, RunOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class MavlinkVehicleOptions(EndOptions):
-    """Options of a simulated vehicle that speaks MAVLink."""
+    """Options of a simulated vehicle for MAVLink clients."""
 
     dialect: Annotated[Literal["px4", "ardupilot"], Parameter(group=linking)] = "px4"
     """The autopilot that clients take it for."""

@@ -3,7 +3,7 @@
 `@Parameter(name="*")` has a command take the fields of a class, and of those that extend it, as its options.
 """
 
-# no postponed annotations here: the class of options is made from them, where nobody could look names up
+# no postponed annotations here: `make_dataclass` needs annotations that are types, not their names
 
 import dataclasses
 from dataclasses import dataclass, field, make_dataclass
@@ -47,7 +47,7 @@ Options = TypeVar("Options", bound=type[Any])
 
 
 def how_many(least: int, most: int) -> Parameter:
-    """The option of a number of flights, by the same names in every command."""
+    """Return the option of a number of flights, which has the same names in every command."""
     flights = validators.Number(gte=least, lte=most)
     return Parameter(name=("--runs", "--flights"), group=flying, validator=flights)
 
@@ -55,7 +55,7 @@ def how_many(least: int, most: int) -> Parameter:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class PluginOptions:
-    """Options of all commands that code of one's own may take part in."""
+    """Options of all commands that may use plugins."""
 
     plugins: Annotated[tuple[Path, ...], Parameter(name="--import", group=output, show_default=False)] = ()
     """A Python file that registers maneuvers, planners or control laws of your own; may be given several
@@ -64,7 +64,7 @@ class PluginOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions(PluginOptions):
-    """Options of all commands that report what they made."""
+    """Options of all commands that print a report."""
 
     json: Annotated[bool, Parameter(group=output, show_default=False)] = False
     """Print the report as JSON on standard output, and nothing else."""
@@ -72,7 +72,7 @@ class RunOptions(PluginOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleOptions(RunOptions):
-    """Options of all commands that are about a vehicle."""
+    """Options of all commands that need a vehicle."""
 
     vehicle: Annotated[str | None, Parameter(group=planning)] = None
     """The vehicle: a name that `aerobat show` lists, or a TOML file. Default: that of a plan or a flight,
@@ -106,7 +106,7 @@ class FlightsOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(RunOptions):
-    """Options of the results: where they go."""
+    """Options of the place of results."""
 
     out: Annotated[Path | None, Parameter(group=output)] = None
     """The folder to write to, replaced as a whole. Default: out/PROBLEM, with all that is not default in its
@@ -126,7 +126,7 @@ class ExplainingOptions:
 
 
 def offered_options() -> dict[str, dict[str, PlannerOption]]:
-    """The options of all registered planners: by flag, then by planner."""
+    """Return the options of all registered planners: by flag, then by planner."""
     offered: dict[str, dict[str, PlannerOption]] = {}
     for name, cls in registered_planners().items():
         for option in planner_options(cls):
@@ -135,17 +135,17 @@ def offered_options() -> dict[str, dict[str, PlannerOption]]:
 
 
 def option_name(flag: str) -> str:
-    """The field of PlanningOptions behind a flag."""
+    """Return the field of PlanningOptions of a flag."""
     return flag.removeprefix("--").replace("-", "_")
 
 
 def is_given(value: Any) -> bool:
-    """True for an option that was given, a zero among them."""
+    """Return True for an option that was given; it may be zero."""
     return value is not None and value is not False
 
 
 def _with_planner_options(cls: Options) -> Options:
-    """The class with a field for each option that some planner offers, None where it was not given."""
+    """Return the class with a field for each option of a planner, None by default."""
     offered = offered_options()
     for flag in sorted({f"--{each.name}" for each in dataclasses.fields(cls)} & offered.keys()):
         takers = " and ".join(offered[flag])
@@ -166,7 +166,7 @@ def _field(flag: str, offers: dict[str, PlannerOption]) -> tuple[str, Any, Any]:
 
 
 def _help(offers: dict[str, PlannerOption]) -> str:
-    """The help of an option, said once for planners that mean the same by it."""
+    """Return the help of an option, once for all planners with the same meaning."""
     takers: dict[str, list[str]] = {}
     for planner, option in offers.items():
         value = option.default if option.command_default is None else option.command_default
@@ -219,7 +219,7 @@ class TableOptions(PlanningOptions):
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class ConditionsOptions:
-    """Options of the conditions, of what flies under them, and of planning for both."""
+    """Options of the conditions, of the controller under them, and of planning for both."""
 
     probability: Annotated[
         float | None,

@@ -44,7 +44,7 @@ from aerobat.vehicle import Vehicle
 
 
 def read_task(name: str, options: ProblemOptions, paper: bool = False) -> tuple[Problem, Vehicle]:
-    """The problem and the vehicle that a command names."""
+    """Return the problem and the vehicle that a command names."""
     problem = load_problem(name)
     vehicle = named_vehicle(options.vehicle or default_vehicle(paper))
     if options.angle is not None:
@@ -58,15 +58,15 @@ def read_run(
     command: Literal["fly", "plan", "sweep"],
     flight: FlightSettings = FlightSettings(),
 ) -> tuple[RunRecord, Plan | None]:
-    """Return all that it takes to do a run, and its plan where that is read from a file and not made.
+    """Return the record of a run, and its plan where that is read from a file.
 
     A plan that is read is certified for its vehicle.
 
     Args:
-        name: Of a problem, or a plan's file or folder.
-        options: As they were given.
-        command: That plans.
-        flight: How the plan is flown.
+        name: The name of a problem, or the file or folder of a plan.
+        options: The given options.
+        command: The command that plans.
+        flight: The settings of the flight.
     """
     source = plan_source(name)
     columns = column_groups(options.columns) if isinstance(options, TableOptions) else ALL
@@ -106,10 +106,10 @@ def flight_settings(options: ConditionsOptions, plant: str | None = None) -> Fli
     """Return the settings by which a plan is flown.
 
     Args:
-        options: As they were given.
-        plant: The name of the physics, None for the built-in.
+        options: The given options.
+        plant: The name of another simulator, None for the built-in one.
 
-    Raises SpecError for names, or pairs, that cannot fly.
+    Raises SpecError for unknown names, and for options that exclude each other.
     """
     named = options.conditions
     if named is None and options.probability is not None:
@@ -128,7 +128,7 @@ def flight_settings(options: ConditionsOptions, plant: str | None = None) -> Fli
 
 
 def _controller(options: ConditionsOptions) -> str:
-    """The name of the controller asked for. Raises SpecError for names, or pairs, that cannot fly."""
+    """Return the controller's name. Raises SpecError for unknown names and for an unfit autopilot."""
     name = options.controller or ("full" if options.autopilot is None else "rates")
     gives_rates = getattr(named_controller(name), "GIVES_RATES", False)
     if AUTOPILOTS.instance(options.autopilot) is not None and not gives_rates:
@@ -142,16 +142,16 @@ def _controller(options: ConditionsOptions) -> str:
 def plan_of(
     record: RunRecord, saved: Plan | None = None, explain: bool = False, workers: str | None = None
 ) -> Plan:
-    """The plan of a run, saved or made anew; explained on request, in what is left of its time.
+    """Return the plan of a run, read or planned; with an explanation if it is requested and time is left.
 
-    Raises Infeasible where there is none; on request with the changes that would help, once it is said that
-    there is none.
+    Raises Infeasible where no plan is found. If an explanation is requested, this failure is reported at
+    once, and the error names the changes that would help.
 
     Args:
-        record: What is planned, and how.
-        saved: The plan, where it is not made.
-        explain: Whether what takes seconds to know is found out too.
-        workers: Who flies what tells whether flights pass.
+        record: The run.
+        saved: The plan, if it was read from a file.
+        explain: Whether to find the facts that take seconds, too.
+        workers: The workers of the flights for --pass.
     """
     if saved is not None:
         return with_explanation(saved) if explain else saved
@@ -170,7 +170,7 @@ def plan_of(
 
 
 def _advice(record: RunRecord, refusal: Infeasible) -> str:
-    """The changes with which a problem that was refused is planned."""
+    """Return the changes with which a plan for an infeasible problem is found."""
     from aerobat.studies.why import Request, explained
 
     task = Request(record.problem, None if record.paper else record.vehicle, record.planner)
@@ -183,10 +183,10 @@ def _advice(record: RunRecord, refusal: Infeasible) -> str:
 
 
 def _plan_made(record: RunRecord, planner: Planner, explain: bool) -> Plan:
-    """The plan that the run's planner finds."""
+    """Return the plan that the run's planner finds."""
     limit = getattr(planner, "time_limit", None)
     with showing(PlanningProgress(record.planner_name)) as progress, within_time(limit):
-        if record.paper:  # without a vehicle; whether this one can fly it is told all the same
+        if record.paper:  # planned without a vehicle, then certified for this one
             found = plan(record.problem, planner, progress=progress.record, vehicle=None)
             found = found.for_vehicle(record.vehicle)
         else:
@@ -196,7 +196,7 @@ def _plan_made(record: RunRecord, planner: Planner, explain: bool) -> Plan:
 
 
 def _steadied(found: Plan, record: RunRecord, planner: Planner, progress: Callable[[Attempt], None]) -> Plan:
-    """The plan, or one as fast of which more flights succeed under the run's conditions, or a lab's."""
+    """Return the plan, or one as fast with which more flights succeed under the run's or lab conditions."""
     from aerobat.studies.passing import steadied
 
     flight = record.flight
@@ -214,10 +214,10 @@ def _steadied(found: Plan, record: RunRecord, planner: Planner, progress: Callab
 
 
 def _plan_that_passes(record: RunRecord, planner: Planner, workers: str | None) -> Plan:
-    """The plan of a run that is tightened until flights pass."""
+    """Return the plan of a run, with a reserve with which flights pass with the requested probability."""
     flight = record.flight
-    assert flight.probability is not None, "a probability is asked"
-    assert flight.conditions is not None, "with conditions"
+    assert flight.probability is not None, "--pass was given"
+    assert flight.conditions is not None, "--pass has conditions by default"
     if record.paper:
         raise SpecError("--pass keeps a reserve, the paper none; leave out --pass or --paper")
     from aerobat.studies.passing import plan_to_pass
@@ -238,13 +238,13 @@ def _plan_that_passes(record: RunRecord, planner: Planner, workers: str | None) 
 
 
 def make_planner(options: PlannerOptions, problem: Problem, vehicle: Vehicle, paper: bool = False) -> Planner:
-    """The planner that the options name, or one that suits problem and options.
+    """Return the planner that the options name, or one that suits the problem and the options.
 
     Args:
-        options: As they were given.
-        problem: What is planned.
-        vehicle: What flies it.
-        paper: Whether it is planned as in the paper.
+        options: The given options.
+        problem: The problem to plan.
+        vehicle: The vehicle to plan for.
+        paper: Whether to plan as in the paper.
 
     Raises:
         SpecError: Options belong to another planner.
@@ -265,7 +265,7 @@ def make_planner(options: PlannerOptions, problem: Problem, vehicle: Vehicle, pa
 
 
 def _suited(options: PlannerOptions, problem: Problem, vehicle: Vehicle) -> str:
-    """The name of the planner that suits a problem, or of the usual one, whose options were given."""
+    """Return the planner's name that suits a problem, or the usual one if options of others were given."""
     name = suited_planner(problem, vehicle)
     try:
         _check_options(options, name)
@@ -285,16 +285,16 @@ def _tilted(problem: Problem, angle: float) -> Problem:
 
 
 def _check_options(options: PlannerOptions, planner: str) -> None:
-    """Refuse options that mean nothing to a planner."""
+    """Raise SpecError for options of other planners."""
     for flag, offers in offered_options().items():
-        # a planner registered after the command's options were made brings some that nobody can have given
+        # options of a planner that was registered after the class of options was made are not fields of it
         if planner not in offers and is_given(getattr(options, option_name(flag), None)):
             takers = " or ".join(offers)
             raise SpecError(f"{flag} is for --planner {takers}, not {planner}; leave one of them out")
 
 
 def _check_paper(options: PlannerOptions, planner: str) -> None:
-    """Refuse options that the paper's formulation leaves no choice in."""
+    """Raise SpecError for options that contradict the paper's formulation."""
     if planner != "miqp":
         raise SpecError(f"--paper is for --planner miqp, not {planner}; leave one of them out")
     order = getattr(options, "order", None)

@@ -1,1 +1,1 @@
-"""The folder of a run: what is written to it, what repeats it, and the plans that are read from it."""
+"""The folder of a run: its files, its record for repetition, and the plans that are read from it."""

@@ -1,4 +1,4 @@
-"""A run's folder: everything that one command made, put in place as one."""
+"""A run's folder: all files that a command made, put in place together."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ from aerobat.studies.share import Share, Trials
 
 FLIGHT = "flight.npz"
 CALM = "none"  # the conditions under which nothing varies, so that no flights are counted
-AUTOPILOT = "autopilot.txt"  # the settings of the firmware that flew
-BLACKBOX = "blackbox.bfl"  # its own log of the flight
-INSPECTION = "inspect.png"  # so does its inspection, by `aerobat inspect`
-REPLAY = "replay.html"  # joins the run later, by `aerobat view`
+AUTOPILOT = "autopilot.txt"  # the settings of the firmware of the autopilot
+BLACKBOX = "blackbox.bfl"  # the firmware's log of the flight
+INSPECTION = "inspect.png"  # added later, by `aerobat inspect`
+REPLAY = "replay.html"  # added later, by `aerobat view`
 FILES = (
     RECORD,
     FLIGHT,
@@ -64,7 +64,7 @@ FILES = (
 
 
 def is_of_a_run(name: str) -> bool:
-    """True for the name of a file that runs write."""
+    """Return True for the name of a file that runs write."""
     return name in FILES or name.endswith(".plan")
 
 
@@ -81,12 +81,12 @@ def written(
     Ctrl-C discards the run until the folder is in its place, and is ignored afterwards.
 
     Args:
-        record: What it takes to do it again.
-        options: Where to write, and whether to print JSON.
-        write: Writes all but the record to a folder.
+        record: The record of the run.
+        options: Options of the place of results, and of JSON.
+        write: Writes all files but the record to a folder.
         facts: The report as JSON.
-        tables: The report for people.
-        hint: What to type next.
+        tables: The report as tables.
+        hint: A hint to further commands.
     """
     folder = options.out or record.folder
     replaced = os.path.isdir(folder) and any(folder.iterdir())  # False for names that no folder can have
@@ -105,13 +105,13 @@ def written(
 def finish_study(
     result: Any, record: RunRecord, options: OutputOptions, write_others: Callable[[Path], None] | None = None
 ) -> None:
-    """Write a study's facts and its picture, where it has one, as COMMAND.json and COMMAND.png, then show it.
+    """Write a study's facts and its picture, if it has one, as COMMAND.json and COMMAND.png, then print it.
 
     Args:
-        result: What the study came to.
-        record: What it takes to do it again.
-        options: Where to write, and in what form to say it.
-        write_others: Writes what else there is to a folder.
+        result: The result of the study.
+        record: The record of the run.
+        options: Options of the place of results, and of JSON.
+        write_others: Writes further files to a folder.
     """
     facts, figure = to_json(result), picture(result)
     pixels = None if figure is None else png(figure)
@@ -128,14 +128,14 @@ def finish_study(
 
 @dataclass(frozen=True)
 class Flown:
-    """A plan's flight, its score, and the names of what flew it."""
+    """A plan's flight, its score, and the names of the controller and the simulator."""
 
     flight: Flight
     score: Score
     controller: str
     plant: str | None  # the name of another simulator
-    settings: str = ""  # of a firmware that flew, for its command line
-    own_log: bytes = b""  # of that firmware
+    settings: str = ""  # of an autopilot's firmware, for its command line
+    own_log: bytes = b""  # of an autopilot's firmware
 
 
 def finish(
@@ -144,11 +144,11 @@ def finish(
     """Write a plan, with its flight if it was flown, then print the report; return the exit code.
 
     Args:
-        plan: What was planned.
-        record: What it takes to do it again.
-        options: Where to write, and in what form to say it.
+        plan: The plan.
+        record: The record of the run.
+        options: Options of the place of results, and of JSON.
         flown: The plan's flight, if it was flown.
-        explain: Whether all facts are told, and flights are counted of a plan that was not flown.
+        explain: Whether to report all facts, and to count flights of a plan that was not flown.
     """
     assert plan.vehicle is not None, "a command plans for a vehicle"
     flight, score = (flown.flight, flown.score) if flown else (None, None)
@@ -180,10 +180,10 @@ def finish(
 
 
 def _sweep_hint(record: RunRecord, folder: Path) -> str:
-    """The command that flies more of a run's flights; empty where no options of a sweep name how it flew."""
+    """Return the command that counts more flights; empty where a sweep has no options for these flights."""
     flight = record.flight
     conditions = None if flight.conditions is None else flight.conditions.name
-    is_own = conditions is not None and conditions not in dispersion_names()  # its file's name is not known
+    is_own = conditions is not None and conditions not in dispersion_names()  # of an unknown file
     if flight.plant is not None or flight.autopilot is not None or is_own:
         return ""
     options = [f" --import {file}" for file in record.plugins]
@@ -195,17 +195,17 @@ def _sweep_hint(record: RunRecord, folder: Path) -> str:
 
 
 def trial_flights(plan: Plan, record: RunRecord) -> Trials | None:
-    """Fly a plan under the run's conditions, or a lab's.
+    """Return the outcomes of many flights of a plan under the run's conditions, by default lab.
 
-    Of a plan made with --pass the flights that proved it are taken. None is returned where nothing varies,
-    for the paper's plans, which leave nothing to the controller, for another simulator's physics, which take
+    For a plan made with --pass, these are the flights that proved it. None is returned where nothing varies,
+    for the paper's plans, which leave no reserve to the controller, for another simulator, which takes
     minutes, and for a vehicle that cannot hover.
 
     Args:
         plan: The plan, for a vehicle.
-        record: The run, whose controller and seed are taken.
+        record: The run, of which the controller and the seed are used.
     """
-    from aerobat.studies.flights import FlightTask, fly_trials  # which take long to import, for nothing else
+    from aerobat.studies.flights import FlightTask, fly_trials  # slow to import, and needed only here
 
     assert plan.vehicle is not None, "a command plans for a vehicle"
     flight = record.flight

@@ -1,4 +1,4 @@
-"""Record of a run: all that it takes to repeat it, as `run.toml` in its folder."""
+"""Record of a run: all that is needed to repeat it, as `run.toml` in its folder."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from aerobat.provenance import installed_versions
 from aerobat.vehicle import Vehicle
 
 RECORD = "run.toml"
-USUAL_CONDITIONS = "lab"  # under which flights are counted where a run names no others
-DEFAULT_TOLERANCE = 0.01  # of a search for the least
+USUAL_CONDITIONS = "lab"  # under which flights are counted by default
+DEFAULT_TOLERANCE = 0.01  # of a search for least values
 MAX_NAME = 200  # bytes of a folder's name; most systems take 255
 LIBRARIES = (
     "aerobat",
@@ -62,9 +62,9 @@ class FlightSettings:
 
 @declared
 class RunRecord:
-    """A run in full: with the same libraries it gives the same numbers again.
+    """A run in full: with the same libraries, its repetition gives the same numbers.
 
-    Without a planner, the plan came from a file and lies in the folder; `compare` takes all planners.
+    Without a planner, the plan came from a file and is in the folder; `compare` uses all planners.
     """
 
     command: Literal["fly", "plan", "compare", "sweep", "map", "need"]
@@ -86,7 +86,7 @@ class RunRecord:
 
     @property
     def folder(self) -> Path:
-        """The folder of the run unless another place is given: whatever is not default is in its name."""
+        """The default folder of the run; its name tells all options that are not default."""
         parts = [self.problem.name]
         if self.vehicle.name != default_vehicle(self.paper):
             parts.append(self.vehicle.name)
@@ -106,7 +106,7 @@ class RunRecord:
 
     @property
     def _planner_settings(self) -> Iterator[str]:
-        """The planner's options that are not as the command has them by default, in words."""
+        """The planner's options that differ from the command's defaults, in words."""
         if self.planner is None:
             return
         usual = command_settings(type(self.planner)) | ({"order": 3} if self.paper else {})
@@ -118,9 +118,9 @@ class RunRecord:
 
     @property
     def _study_settings(self) -> Iterator[str]:
-        """How a run flies and what it asks, where that is not default, in words.
+        """The settings of flights and of a study that are not default, in words.
 
-        The number of flights is left out: a sweep of more goes on from an unfinished one of fewer.
+        The number of flights is left out, since a sweep with more flights continues one with fewer.
         """
         flight = self.flight
         if flight.probability is not None:
@@ -152,7 +152,7 @@ class RunRecord:
 
 
 def _short(name: str) -> str:
-    """The name, of one that is too long its beginning and a digest."""
+    """Return the name, shortened to its beginning and a digest if it is too long."""
     encoded = name.encode()
     if len(encoded) <= MAX_NAME:
         return name
@@ -160,23 +160,23 @@ def _short(name: str) -> str:
 
 
 def _in_a_name(value: Any) -> str:
-    """A number without digits that say nothing, or text as it is."""
+    """Return a number with six digits at most, or text as it is."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def default_vehicle(paper: bool = False) -> str:
-    """The name of the vehicle that is taken where none is given."""
+    """Return the name of the default vehicle."""
     return "hexarotor" if paper else DEFAULT_VEHICLE
 
 
 def write_record(record: RunRecord, folder: Path) -> None:
-    """Write a run's record to its folder, with the versions of all that may change its numbers."""
+    """Write a run's record to its folder, with the versions of libraries that may change its numbers."""
     facts = {"format": record.format, "versions": versions_now()}
     write_document(folder / RECORD, to_table(record) | facts)
 
 
 def read_record(folder: Path) -> RunRecord:
-    """Return the record in a run's folder. Raises SpecError, one sentence, where none there is whole."""
+    """Return the record in a run's folder. Raises SpecError, one sentence, where there is no whole record."""
     if not os.path.isdir(folder):
         raise SpecError(f"{folder} is no folder; give the folder of a run")
     if not (folder / RECORD).exists():
@@ -185,5 +185,5 @@ def read_record(folder: Path) -> RunRecord:
 
 
 def versions_now() -> dict[str, str]:
-    """The versions of Python, Aerobat and the libraries that its numbers come from."""
+    """Return the versions of Python, Aerobat and the libraries that its numbers depend on."""
     return {"python": python_version()} | installed_versions(LIBRARIES)

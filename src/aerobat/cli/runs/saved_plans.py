@@ -1,4 +1,4 @@
-"""Plans that are read, not made: of a .plan file or a run's folder, or of somebody's path in a CSV file."""
+"""Plans that are read: from a .plan file, a run's folder, or another program's path in a CSV file."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from aerobat.problem import EndState, Heading, Problem, problem_names
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
 
-MADE_BY = "file"  # in the place of a planner's name
+MADE_BY = "file"  # instead of a planner's name
 
 
 def plan_source(name: str) -> Path | None:
-    """The file or folder that holds a plan, where a command names one, and no problem."""
+    """Return the file or folder of a plan that a command names; None for the name of a problem."""
     path = Path(name)
     is_folder = name not in problem_names() and path.suffix != ".toml" and os.path.isdir(path)
     return path if path.suffix in (".plan", ".csv", ".npz") or is_folder else None
 
 
 def read_saved_plan(path: Path, options: PlanningOptions) -> Plan:
-    """A saved plan for its own vehicle or another, or a bare path as a plan, certified and flown.
+    """Return a saved plan for its own vehicle or another, or a bare path as a plan.
 
-    Raises SpecError for options that plan anew.
+    Raises SpecError for options of planning.
     """
     for flag in ("--planner", "--paper", "--angle", *offered_options()):
         if is_given(getattr(options, option_name(flag), None)):
@@ -51,7 +51,7 @@ def read_saved_plan(path: Path, options: PlanningOptions) -> Plan:
 
 
 def whole_plan(path: Path, remedy: str) -> Plan:
-    """Return the plan in a file or folder. Raises SpecError, with the remedy, where it holds only a path."""
+    """Return the plan in a file or folder. Raises SpecError, with the remedy, for a bare path."""
     found = read_plan(path)
     if not isinstance(found, Plan):
         raise SpecError(f"{path} holds a path alone; {remedy}")
@@ -85,7 +85,7 @@ def assumed_of_path(options: VehicleOptions, vehicle: Vehicle, environment: Envi
 
 
 def named_vehicle(name: str) -> Vehicle:
-    """The vehicle of that name or file, a robot's among them; what it hardly can be is told, and no more."""
+    """Return the vehicle of a name, a file or a robot's file; warn of implausible properties."""
     if name.endswith(SUFFIXES):
         from aerobat.interchange.robots import import_vehicle
 
@@ -98,7 +98,7 @@ def named_vehicle(name: str) -> Vehicle:
 
 
 def _plan_of_path(path: Path, trajectory: Trajectory, facts: list[str], options: PlanningOptions) -> Plan:
-    """A bare path as the plan of a line from its first point to its last; what is assumed is told."""
+    """Return a bare path as the plan of a line from its first point to its last; print the assumptions."""
     vehicle = named_vehicle(options.vehicle or default_vehicle())
     if options.heading is not None:
         trajectory = replace(trajectory, heading=radians(options.heading))

@@ -1,4 +1,4 @@
-"""The folder of an unfinished study, beside the one that it is for: what is finished is kept there."""
+"""The folder that keeps the finished parts of an unfinished study, beside the folder of its results."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from aerobat.studies.workers import WorkerEnded
 
 @dataclass(frozen=True)
 class Unfinished:
-    """A study's folder until it is written as a whole."""
+    """The folder of a study until its results are written."""
 
     folder: Path
 
     @classmethod
     def beside(cls, folder: Path) -> Unfinished:
-        """Return the unfinished study beside the folder that it is to be written to."""
+        """Return the unfinished study whose results will be written to a folder."""
         return cls(folder.with_name(f"{folder.name}-unfinished"))
 
     @property
@@ -30,12 +30,12 @@ class Unfinished:
 
     @contextmanager
     def kept(self, what: str, count: int, finished: Callable[[Path], int]) -> Iterator[None]:
-        """Say what is kept of a study that is ended in the block; remove the folder where that is nothing.
+        """Report the kept parts of a study that ends early in the block; without any, remove the folder.
 
         Args:
-            what: The parts are called.
-            count: Of all parts.
-            finished: Counts those in a folder.
+            what: The name of the parts.
+            count: The number of all parts.
+            finished: Returns the number of parts in a folder.
         """
         try:
             yield
@@ -48,5 +48,5 @@ class Unfinished:
             raise
 
     def remove(self) -> None:
-        """Remove what the study needs no longer."""
+        """Remove the folder."""
         shutil.rmtree(self.folder, ignore_errors=True)
