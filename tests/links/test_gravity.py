@@ -17,7 +17,6 @@ from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.commander import Commander, Doing
 from aerobat.links.goals import Observed, PathPiece
 from aerobat.links.mission import Mission, MissionSettings, Phase
-from aerobat.links.path_follower import PathForwarder
 from aerobat.links.ros.crazyswarm import SERVICES
 from aerobat.links.ros.crazyswarm_server import CrazyswarmServer
 from aerobat.links.routes import rest_to_rest
@@ -35,7 +34,7 @@ def test_a_hold_in_a_maneuver_brakes_by_the_gravity_of_that_maneuver() -> None:
     problem = ab.Problem(name="climb", start=ab.at_rest(low), goal=ab.at_rest(high), environment=MOON)
     plan = ab.Plan(problem=problem, trajectory=path, planner="by hand", status="").for_vehicle(vehicle)
     stream = SetpointStream(path, vehicle, MOON, np.zeros(3))
-    mission = Mission(plan, MissionSettings(), PathForwarder(stream))
+    mission = Mission(plan, MissionSettings(), stream, lambda time, _: stream.goal(time))
     now, period = 0.0, 0.05  # [s]
     commander = Commander(vehicle, ab.Environment().gravity, period)
     commander.observe(Observed(now, Body((0.0, 0.0, 3.0), (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), (0.0,) * 3)))

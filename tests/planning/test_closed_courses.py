@@ -15,7 +15,6 @@ from aerobat.declaration import from_table, to_table
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.links.mission import Mission, MissionSettings
-from aerobat.links.path_follower import PathForwarder
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import least_duration
 from aerobat.planning.passages import gaps_at_ends
@@ -169,7 +168,7 @@ def test_a_plan_that_begins_in_flight_is_not_begun_from_rest() -> None:
     plan = planned()
     stream = SetpointStream(plan.trajectory, plan.vehicle, plan.problem.environment, np.zeros(3))
     with pytest.raises(SpecError, match=r"begins at .* m/s, a mission at rest"):
-        Mission(plan, MissionSettings(), PathForwarder(stream))
+        Mission(plan, MissionSettings(), stream, lambda time, _: stream.goal(time))
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@ from .clock import Clock, WallClock
 from .commander import Commander, Doing
 from .goals import AttitudeGoal, Mode, Observed, PathGoal, PathPiece, PositionGoal
 from .mission import Mission, MissionSettings, Phase, require_flyable
-from .path_follower import PathFollower, PathForwarder
+from .path_follower import PathFollower
 from .report import LinkReport, link_report
 from .stream import SetpointStream
 
@@ -18,7 +18,6 @@ __all__ = [
     "Mode",
     "Observed",
     "PathFollower",
-    "PathForwarder",
     "PathGoal",
     "PathPiece",
     "Phase",

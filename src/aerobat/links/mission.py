@@ -5,10 +5,11 @@ Missions are the same for every link: they use times, states and goals, but no m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
 from itertools import pairwise
 from math import hypot, pi
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -56,31 +57,27 @@ class MissionSettings:
     max_lateness: Positive = 0.1  # [s] largest delay of a set-point while the plan is flown
 
 
-GoalT_co = TypeVar("GoalT_co", covariant=True)
+GoalT = TypeVar("GoalT")
 
 
-class Follower(Protocol[GoalT_co]):
-    """Goals along a path, from observed states of the vehicle; times are since the path's start [s]."""
-
-    stream: SetpointStream  # of the path, in the vehicle's own frame
-
-    def observe(self, observed: Observed) -> None:
-        """Process an observed state."""
-
-    def command(self, time: float) -> GoalT_co:
-        """Return the goal at a time. A state must have been observed before."""
-
-
-class Mission(Generic[GoalT_co]):
+class Mission(Generic[GoalT]):
     """The sequence of a flight: returns the goal of each tick from observed states of the vehicle."""
 
-    def __init__(self, plan: Plan, settings: MissionSettings, follower: Follower[GoalT_co]) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        settings: MissionSettings,
+        stream: SetpointStream,
+        command: Callable[[float, Observed], GoalT],
+    ) -> None:
         """Prepare to fly a plan.
 
         Args:
             plan: the plan, certified for its vehicle; see `require_flyable`.
             settings: of the mission.
-            follower: computes the goals along its set-points.
+            stream: the set-points of the plan, in the vehicle's own frame.
+            command: returns the goal at a time along the plan, from the last state of the vehicle; both
+                times are since the plan's start [s].
         """
         assert plan.vehicle is not None, "a plan that is flyable has a vehicle"
         self.settings = settings
@@ -88,8 +85,8 @@ class Mission(Generic[GoalT_co]):
         self.reason = ""  # the reason of an abort
         self.max_lateness = 0.0  # [s] largest delay of the plan's set-points so far
         self.gravity = plan.problem.environment.gravity  # [m/s²]
-        self.stream = follower.stream
-        self._follower = follower
+        self.stream = stream
+        self._command = command
         first, last = self.stream.flat(0.0), self.stream.flat(self.stream.duration)
         for end, state in (("begins", first), ("ends", last)):
             speed = float(np.linalg.norm(state.velocity))
@@ -121,7 +118,7 @@ class Mission(Generic[GoalT_co]):
 
     def step(
         self, now: float, observed: Observed, delay: float, late: float = 0.0
-    ) -> PositionGoal | GoalT_co | None:
+    ) -> PositionGoal | GoalT | None:
         """Return the goal at this time; None where the vehicle holds or lands by itself.
 
         Args:
@@ -214,13 +211,12 @@ class Mission(Generic[GoalT_co]):
         elif now - self.began > self.settings.patience:
             self.abort(now, f"the vehicle does not come to rest at the plan's start, it is {length(off)} off")
 
-    def _maneuver(self, now: float, observed: Observed, delay: float) -> PositionGoal | GoalT_co:
+    def _maneuver(self, now: float, observed: Observed, delay: float) -> PositionGoal | GoalT:
         since = now - self.maneuver_began + delay
         if since >= self.stream.duration:
             self._enter(Phase.HOLD, now)
             return goal_on(self._after, 0.0, self._final_yaw)
-        self._follower.observe(observed._replace(time=observed.time - self.maneuver_began))
-        return self._follower.command(since)
+        return self._command(since, observed._replace(time=observed.time - self.maneuver_began))
 
     def _hovering(self, now: float) -> PositionGoal | None:
         """Return the goal of the hover at the plan's start or end; None in other phases."""

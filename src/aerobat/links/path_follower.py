@@ -25,24 +25,10 @@ from aerobat.kernels.ops import Vector
 from aerobat.kernels.quaternions import axes, to_body
 from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import add_scaled, norm, subtract
-from aerobat.links.goals import AttitudeGoal, Observed, PathGoal
+from aerobat.links.goals import AttitudeGoal, Observed
 from aerobat.links.stream import SetpointStream
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
-
-
-class PathForwarder:
-    """The points of a stream, unchanged, for vehicles whose own controller tracks them."""
-
-    def __init__(self, stream: SetpointStream) -> None:
-        self.stream = stream
-
-    def observe(self, observed: Observed) -> None:
-        """Ignore the state: the vehicle's own controller handles errors."""
-
-    def command(self, time: float) -> PathGoal:
-        """Return the goal at a time [s] since the plan's start."""
-        return self.stream.goal(time)
 
 
 class PathFollower:
@@ -58,20 +44,14 @@ class PathFollower:
         """
         model = controller_parameters(vehicle.controller, Fleet.of([vehicle]), environment)
         self._model: ControllerModel = first_numbers(model)
-        self.stream = stream
+        self._stream = stream
         self._outer: PositionLoopState | None = None
-        self._observed: Observed | None = None
         self._commanded: deque[tuple[float, Vector]] = deque()  # [s] start time, [m/s²] feedback
 
-    def observe(self, observed: Observed) -> None:
-        """Process a state; its time is since the plan's start [s]. States older than the last are ignored."""
-        if self._observed is None or observed.time > self._observed.time:
-            self._observed = observed
-
-    def command(self, time: float) -> AttitudeGoal:
-        """Return the goal at a time [s] since the plan's start. A state must have been observed before."""
-        reference = self.stream.at(time)
-        model, body = self._model, self._predicted(time, reference)
+    def command(self, time: float, observed: Observed) -> AttitudeGoal:
+        """Return the goal at a time, from the last state of the vehicle; times are since the start [s]."""
+        reference = self._stream.at(time)
+        model, body = self._model, self._predicted(time, observed, reference)
         if self._outer is None:
             self._outer = init_position_loop(FloatOps, model.gains, body, reference)
         elif (elapsed := time - self._commanded[-1][0]) > 0.0:
@@ -85,11 +65,10 @@ class PathFollower:
             model.airframe.mass_properties.mass * norm(FloatOps, attitude.specific_thrust),
         )
 
-    def _predicted(self, time: float, reference: ReferencePoint) -> Body:
-        """Return the body at a time, predicted from the last observed error and the feedback since then."""
-        assert self._observed is not None, "a vehicle is observed before it is commanded"
-        observed_at, body = self._observed.time, self._observed.body
-        then = self.stream.at(observed_at)
+    def _predicted(self, time: float, observed: Observed, reference: ReferencePoint) -> Body:
+        """Return the body at a time, predicted from the observed error and the feedback since then."""
+        observed_at, body = observed
+        then = self._stream.at(observed_at)
         position = subtract(then.position, body.position)
         velocity = subtract(then.velocity, body.velocity)
         while len(self._commanded) > 1 and self._commanded[1][0] <= observed_at:

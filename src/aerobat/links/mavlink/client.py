@@ -87,7 +87,8 @@ class Client:
         environment = plan.problem.environment
         rehearse(plan.vehicle, environment.gravity)
         stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
-        self.mission = Mission(plan, mission, PathFollower(stream, plan.vehicle, environment))
+        follower = PathFollower(stream, plan.vehicle, environment)
+        self.mission = Mission(plan, mission, stream, follower.command)
         self._plan, self._offset = plan, offset
         self.link = AutopilotLink(connection, settings.system, say)
         self.stage = ClientStage.CONNECTING

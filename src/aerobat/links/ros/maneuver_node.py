@@ -16,7 +16,6 @@ from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, RosMess
 from aerobat.links.commander import Commander, Doing
 from aerobat.links.goals import Observed, PathGoal, PathPiece, yaw_of
 from aerobat.links.mission import Mission, MissionSettings, Phase
-from aerobat.links.path_follower import PathForwarder
 from aerobat.links.rehearsal import rehearse
 from aerobat.links.report import LinkReport, link_report
 from aerobat.links.ros import topics
@@ -221,7 +220,8 @@ class ManeuverNode:
         if isinstance(planned, str):
             answer(False, planned)
             return
-        mission = Mission(planned.plan, self.settings.mission, PathForwarder(planned.stream))
+        stream = planned.stream  # the vehicle's own controller handles errors
+        mission = Mission(planned.plan, self.settings.mission, stream, lambda time, _: stream.goal(time))
         try:
             self.commander.begin(self._now, mission)
         except SpecError as error:
