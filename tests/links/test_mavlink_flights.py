@@ -119,7 +119,7 @@ def test_states_that_come_twice_late_or_from_the_future_change_nothing() -> None
 
     sky.cable.change = change
     sky.run(lambda: sky.client.mission.phase is Phase.HOLD)
-    assert (np.diff([seen.time for seen in sky.client.log]) > 0.0).all()
+    assert (np.diff([seen.time for seen in sky.client.mission.log]) > 0.0).all()
     report = sky.client.report()
     assert not report.failures, str(report)
     assert report.max_position_error_m == pytest.approx(max(sky.errors), abs=0.02)

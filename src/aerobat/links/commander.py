@@ -64,7 +64,6 @@ class Commander:
         self.observed: Observed | None = None  # the last state
         self.route: Route | None = None  # the route that is followed, or at whose end the vehicle hovers
         self.ground = 0.0  # [m] the height of take-off
-        self.log: list[Observed] = []  # of the last plan that was flown, times since its start
         self.mission: Mission[PathGoal] | None = None  # the last one
         self._vehicle, self._gravity, self._period, self._say = vehicle, gravity, period, say
         self._deadline = 0.0  # [s] time limit for reaching the top of a climb, or the ground
@@ -78,8 +77,8 @@ class Commander:
             moved = dist(observed.body.position, self.observed.body.position)
             self._jumped |= moved > _MAX_GOAL_DISTANCE and observed.time - self.observed.time < _MAX_STATE_AGE
         self.observed = observed
-        if self.mission is not None and self.mission.phase is Phase.MANEUVER:
-            self.log.append(observed._replace(time=observed.time - self.mission.maneuver_began))
+        if self.mission is not None:
+            self.mission.observe(observed)
 
     def take_off(self, now: float, height: float) -> None:
         """Climb by `height` [m] from the ground. Raises SpecError for a vehicle that is not on the ground."""
@@ -126,7 +125,7 @@ class Commander:
     def begin(self, now: float, mission: Mission[PathGoal]) -> None:
         """Fly a mission from a hover. Raises SpecError where the vehicle does not hover."""
         mission.join(now, self.require_hover(now))
-        self.mission, self.log, self.route = mission, [], None
+        self.mission, self.route = mission, None
         self._gravity = mission.gravity
         self.doing = Doing.MANEUVERING
 

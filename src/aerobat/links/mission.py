@@ -84,6 +84,7 @@ class Mission(Generic[GoalT]):
         self.phase = Phase.READY
         self.reason = ""  # the reason of an abort
         self.max_lateness = 0.0  # [s] largest delay of the plan's set-points so far
+        self.log: list[Observed] = []  # states while the plan was flown, with times since its start [s]
         self.gravity = plan.problem.environment.gravity  # [m/s²]
         self.stream = stream
         self._command = command
@@ -115,6 +116,11 @@ class Mission(Generic[GoalT]):
     def join(self, now: float, observed: Observed) -> None:
         """Fly to the plan's start from the hover that `observed` is."""
         self._set_out(now, observed, Phase.APPROACH, np.array(observed.body.position))
+
+    def observe(self, observed: Observed) -> None:
+        """Log a state of the vehicle while the plan is flown."""
+        if self.phase is Phase.MANEUVER:
+            self.log.append(self._since_start(observed))
 
     def step(
         self, now: float, observed: Observed, delay: float, late: float = 0.0
@@ -154,7 +160,7 @@ class Mission(Generic[GoalT]):
 
     def error(self, observed: Observed) -> float:
         """Return the distance of the vehicle from the plan at the time of the observation [m]."""
-        expected = self.stream.flat(observed.time - self.maneuver_began).position
+        expected = self.stream.flat(self._since_start(observed).time).position
         return float(np.linalg.norm(np.array(observed.body.position) - expected))
 
     def _set_out(self, now: float, observed: Observed, phase: Phase, *places: Array) -> None:
@@ -165,6 +171,10 @@ class Mission(Generic[GoalT]):
         yaw = yaw_of(observed.body.q_world_body)
         self._turn = yaw, (self._heading - yaw + pi) % (2 * pi) - pi
         self._enter(phase, now)
+
+    def _since_start(self, observed: Observed) -> Observed:
+        """Return a state with the time since the plan's start."""
+        return observed._replace(time=observed.time - self.maneuver_began)
 
     def _enter(self, phase: Phase, now: float) -> None:
         self.phase, self.began = phase, now
@@ -216,7 +226,7 @@ class Mission(Generic[GoalT]):
         if since >= self.stream.duration:
             self._enter(Phase.HOLD, now)
             return goal_on(self._after, 0.0, self._final_yaw)
-        return self._command(since, observed._replace(time=observed.time - self.maneuver_began))
+        return self._command(since, self._since_start(observed))
 
     def _hovering(self, now: float) -> PositionGoal | None:
         """Return the goal of the hover at the plan's start or end; None in other phases."""

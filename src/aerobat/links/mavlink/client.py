@@ -92,7 +92,6 @@ class Client:
         self._plan, self._offset = plan, offset
         self.link = AutopilotLink(connection, settings.system, say)
         self.stage = ClientStage.CONNECTING
-        self.log: list[Observed] = []  # states observed while the plan was flown
         self.settings = settings
         self._say = say
         self._announcement = announcement
@@ -119,9 +118,8 @@ class Client:
         self._now = round(now, 3)  # goals are computed for their time stamps, which are whole milliseconds
         if isnan(self._began):
             self._began = self._now
-        states = self.link.receive(self._now)
-        if self.mission.phase is Phase.MANEUVER:
-            self.log += states
+        for state in self.link.receive(self._now):
+            self.mission.observe(state)
         getattr(self, f"_while_{self.stage.name.lower()}")()
 
     def abort(self, now: float, reason: str) -> None:
@@ -135,11 +133,10 @@ class Client:
 
     def report(self) -> LinkReport:
         """Return the report of the flight."""
-        began = self.mission.maneuver_began
         return link_report(
             self._plan,
             self.mission.stream,
-            [state._replace(time=state.time - began) for state in self.log],
+            self.mission.log,
             offset=self._offset,
             aborted=self.mission.reason or self._lost,
             ended=str(self.stage),

@@ -143,18 +143,18 @@ class ManeuverNode:
     def _publish_report(self) -> None:
         """Have a maneuver judged once it has ended, and publish the report."""
         if self._flown is not None and self.commander.doing is not Doing.MANEUVERING:
-            commander = self.commander
-            assert commander.mission is not None, "maneuvers are missions"
+            mission = self.commander.mission
+            assert mission is not None, "maneuvers are missions"
             self._judging = self._executor.submit(
                 link_report,
                 self._flown.plan,
                 self._flown.stream,
-                commander.log,
+                mission.log,
                 offset=self._flown.offset,
-                aborted=commander.mission.reason,
-                ended=str(commander.doing),
+                aborted=mission.reason,
+                ended=str(self.commander.doing),
                 delay=0.0,
-                late=commander.mission.max_lateness,
+                late=mission.max_lateness,
             )
             self._flown = None
         if self._judging is not None and self._judging.done():
