@@ -30,9 +30,9 @@ FIGURES: Mapping[int, Callable[[Callable[[str], None]], PaperFigure]] = {
 }
 INTRODUCTION = """# The paper's figures
 
-Lusk and Tordesillas, *Trajectory Optimization for Multirotors*: its figures, each from plans and flights
-made for it by `python examples/paper_figures.py`. Under each stand what the paper's shows and how ours
-compares. Figs. 1, 4 and 7 are photographs and a block diagram.
+This page reproduces the figures of Lusk and Tordesillas, *Trajectory Optimization for Multirotors*. The command
+`python examples/paper_figures.py` plans and simulates the flights, and draws the figures. The text under each figure
+describes the paper's figure and compares it with ours. Figs. 1, 4 and 7 of the paper are photographs and a block diagram.
 
 """
 

@@ -80,14 +80,14 @@ def _caption(measured: Mapping[int, ErrorCauses]) -> Caption:
     return Caption(
         6,
         "Half-flips through gates of four tilts and three openings",
-        "hardware flights through gates of various tilts and openings, at about 8 m/s at most, “generally "
-        "tracked well, but there is more error than in simulation”; four causes are guessed, motor "
+        "hardware flights through gates of various tilts and openings, at about 8 m/s at most: “generally "
+        "tracked well, but there is more error than in simulation”. The authors suspect four causes, motor "
         "saturation first. The text gives no errors.",
-        f"{len(first)} simulated flights a row in the paper's flight space (conditions lab), {speed:.1f} "
-        f"m/s in the gate, its four causes switched on. The largest position error is {max(none):.1f} cm at "
-        f"the median without them, {min(together):.1f} to {max(together):.1f} cm with all four; of each "
-        f"alone the costliest is {_costliest(measured)}. Outlines: the first flights' bodies as they cross, "
-        "red where they touch the frame. Bands hold 90 %.",
+        f"{len(first)} simulated flights per row in the paper's flight space (conditions lab), at "
+        f"{speed:.1f} m/s in the gate, with the four causes switched on. The median of the largest position "
+        f"error is {max(none):.1f} cm without the causes, and {min(together):.1f} to {max(together):.1f} cm "
+        f"with all four. The most costly single cause is {_costliest(measured)}. Outlines show the bodies of "
+        "the first flights in the gate, red if they touch the frame. Bands contain 90 % of the flights.",
     )
 
 

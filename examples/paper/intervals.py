@@ -55,12 +55,12 @@ def _caption(plan: Plan) -> Caption:
     return Caption(
         2,
         "A trajectory of N intervals",
-        "each interval n is a polynomial of third degree, dt long; τ in [0, dt] is the time within it. A "
-        "sketch, without numbers.",
-        f"the flip in roll, planned by the printed program: N = {plan.intervals}, dt = {plan.dt:.3f} s, "
-        f"{plan.duration:.2f} s in all. Jerk is constant on each interval, |j| ≤ 200 m/s³ on each axis as "
-        f"in the authors' reference code; its cost Σ‖j‖² = {plan.cost:.1f} is proven least. Interval "
-        f"{SHOWN} in full.",
+        "each interval n is a polynomial of third degree with the duration dt. τ in [0, dt] is the time "
+        "within the interval. The figure is a sketch without numbers.",
+        f"the flip in roll, planned by the printed program, with N = {plan.intervals}, dt = {plan.dt:.3f} s "
+        f"and a duration of {plan.duration:.2f} s. Jerk is constant on each interval, with |j| ≤ 200 m/s³ "
+        f"on each axis as in the authors' reference code. The cost Σ‖j‖² = {plan.cost:.1f} is proven "
+        f"optimal. Interval {SHOWN} is drawn in full.",
     )
 
 

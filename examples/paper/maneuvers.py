@@ -55,18 +55,18 @@ def _caption(flown: Sequence[ManeuverFlights]) -> Caption:
     return Caption(
         5,
         "The four maneuvers, flown in simulation",
-        "paths and errors of the four; the vehicle “always passes through the gate”, with a “reasonably "
-        "low tracking error in position” and, in the two translating ones, a higher one in attitude. The "
-        "text gives no numbers.",
-        "planned within the hexarotor's rotors and flown by the full controller (blue), beside the "
-        "printed program flown by the printed control law (grey). Here at most "
-        f"{length(max(s.max_position_error_m for s in here))} and "
-        f"{max(s.max_attitude_error_deg for s in here):.2f}° off, all four through their gates; as "
-        f"printed {_range([100 * s.max_position_error_m for s in printed], 'cm')} and "
-        f"{_range([s.max_attitude_error_deg for s in printed], '°')}, "
-        f"{sum(s.outcome.is_success for s in printed)} of 4 through their gates ({_failures(flown)}): its "
-        "jerk jumps as no rotor's thrust can. Blue dot: start; dark: end; diamonds: stages; discs are "
-        "blue from above, white from below.",
+        "paths and errors of the four maneuvers. The vehicle “always passes through the gate”, with a "
+        "“reasonably low tracking error in position”. The attitude error is higher in the two translating "
+        "maneuvers. The text gives no numbers.",
+        "plans within the limits of the hexarotor's rotors, flown with the full controller (blue), and "
+        "plans of the printed program, flown with the printed control law (grey). The errors of the blue "
+        f"flights are at most {length(max(s.max_position_error_m for s in here))} and "
+        f"{max(s.max_attitude_error_deg for s in here):.2f}°, and all four pass their gates. The errors of "
+        f"the grey flights are {_range([100 * s.max_position_error_m for s in printed], 'cm')} and "
+        f"{_range([s.max_attitude_error_deg for s in printed], '°')}, and "
+        f"{sum(s.outcome.is_success for s in printed)} of 4 pass their gates ({_failures(flown)}). The jerk "
+        "of the printed program jumps, which the thrust of a rotor cannot follow. Blue dot: start; dark "
+        "dot: end; diamonds: stages. Discs are blue from above and white from below.",
     )
 
 

@@ -35,9 +35,9 @@ def _caption(here: Plan, printed: Plan) -> Caption:
         3,
         "Orientations imposed to perform a flip in roll",
         "five stages at 45°, 90°, upside down, 270° and 315° of roll, with the accelerations a_z + g and "
-        "a_y that each asks. A sketch, without numbers.",
-        "the same five, when and where a solver places them: within the hexarotor's rotors "
-        f"({here.duration:.2f} s), and in the printed program's proven optimum ({printed.duration:.2f} "
-        "s). As printed, a stage takes either sign of the thrust and any order: "
+        "a_y that each stage requires. The figure is a sketch without numbers.",
+        "the same five stages, at the times and places that a solver finds: within the limits of the "
+        f"hexarotor's rotors ({here.duration:.2f} s), and in the proven optimum of the printed program "
+        f"({printed.duration:.2f} s). As printed, a stage permits either sign of the thrust, and the order is free: "
         f"{', '.join(stage.name for stage in order)}, where “315°” is met at 135°.",
     )

@@ -91,12 +91,13 @@ def figure_9(begin: Callable[[str], None]) -> PaperFigure:
     caption = Caption(
         9,
         f"Tracking after {count} iterations",
-        f"the path optimized in {PAPER_ITERATIONS} iterations, with "
-        f"{_times_text(PAPER_TIMES[PAPER_ITERATIONS])}; forces and moments stay within the dashed "
+        f"the path after {PAPER_ITERATIONS} iterations, with "
+        f"{_times_text(PAPER_TIMES[PAPER_ITERATIONS])}. Forces and moments stay within the dashed "
         "actuator constraints.",
-        f"{count} iterations, {_times_text(times)}; rotors {flown.plan.margin}, proven over continuous "
-        f"time. Flown, {length(flown.score.max_position_error_m)} and "
-        f"{flown.score.max_attitude_error_deg:.2f}° off at most, saturated "
+        f"{count} iterations, {_times_text(times)}. Rotor thrusts: {flown.plan.margin}, proven over "
+        "continuous time. The largest errors of the simulated flight are "
+        f"{length(flown.score.max_position_error_m)} and "
+        f"{flown.score.max_attitude_error_deg:.2f}°; rotors are saturated "
         f"{100 * flown.score.saturated_fraction:.1f} % of the time.",
     )
     return _tracking_figure(caption, flown)
@@ -109,11 +110,11 @@ def figure_10(begin: Callable[[str], None]) -> PaperFigure:
     caption = Caption(
         10,
         f"Tracking when stopped after {STOPPED_AFTER} iterations",
-        f"the search stopped early, with {_times_text(PAPER_TIMES[STOPPED_AFTER])}: the constraints are "
-        "violated, yet the path is tracked, for its simulation gives whatever is asked; “on a real "
-        "system, the tracking would not be as good since the actuators would saturate”.",
-        f"{_times_text(_times(search, STOPPED_AFTER))}; rotors asked for {flown.plan.margin}. Here they "
-        f"do saturate, {100 * flown.score.saturated_fraction:.0f} % of the time, and the flight "
+        f"the search stopped early, with {_times_text(PAPER_TIMES[STOPPED_AFTER])}. The constraints are "
+        "violated, yet the path is tracked, because the paper's simulation has no actuator limits: “on a "
+        "real system, the tracking would not be as good since the actuators would saturate”.",
+        f"{_times_text(_times(search, STOPPED_AFTER))}. Required rotor thrusts: {flown.plan.margin}. In "
+        f"this simulation the rotors saturate, {100 * flown.score.saturated_fraction:.0f} % of the time. The flight "
         f"{flown.score.sentence}.",
     )
     return _tracking_figure(caption, flown)
@@ -144,10 +145,10 @@ def _path_caption(search: TimeSearch) -> Caption:
     return Caption(
         8,
         "A path of the alternative method",
-        "from (0, 0, 0) through a height of −2 m, x and y free, to (6, 0, 0); a search shifts its times "
-        "from 0.5 and 2 s until the actuator constraints hold, which takes 12 iterations.",
-        f"polynomials of degree 9, {len(search.iterations)} iterations, of which only the last asks no "
-        "rotor for more than −0.2 to 18 N (the paper draws limits without giving them). The path crosses "
+        "a path from (0, 0, 0) through a height of −2 m, with free x and y, to (6, 0, 0). A search delays both "
+        "times, from 0.5 and 2 s, until the actuator constraints hold. The search takes 12 iterations.",
+        f"polynomials of degree 9, and {len(search.iterations)} iterations. Only the last iteration keeps every "
+        "rotor within −0.2 to 18 N (the paper draws limits without numbers). The path crosses "
         f"−2 m at x = {waypoint[0]:.2f} m, {100 * waypoint[0] / 6.0:.0f} % of the way.",
     )
 
