@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.evaluation.subject import Subject
 from aerobat.reporting.page import AXIS, blank_page, heading, house_style, panel
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import actual_poses, plan_reference, reference_poses
@@ -95,8 +96,8 @@ def _draw_block(
     here, printed = flights.here, flights.printed
     path = panel(figure, left, bottom + 0.2, *PATH)
     reference = reference_poses(plan_reference(here.plan, here.vehicle))
-    gates, stages = here.plan.problem.gates, here.plan.stages
-    note = draw_path(path, reference, actual_poses(here.flight), here.vehicle, gates, stages, size=VEHICLE)
+    subject = Subject(here.flight, here.plan, here.vehicle)
+    note = draw_path(path, subject, reference, actual_poses(here.flight), size=VEHICLE)
     drawn = path.get_legend()
     assert drawn is not None, "a path has its start and its end"
     drawn.remove()  # the caption says it once for all
@@ -109,7 +110,7 @@ def _draw_block(
         _draw_error(attitude, times, np.rad2deg(each.flight.attitude_error), colour, name)
     for axes, name, unit in ((position, "Position error", " cm"), (attitude, "Attitude error", "°")):
         _tell_largest(axes, name, unit)
-        for stage in stages:
+        for stage in subject.stages:
             if stage.gate is not None:
                 axes.axvline(stage.time, color=YELLOW, linewidth=1.6, zorder=1.4)
     position.tick_params(labelbottom=False)

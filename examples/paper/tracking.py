@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from aerobat.declaration import validated
 from aerobat.errors import SpecError
 from aerobat.evaluation.score import score
+from aerobat.evaluation.subject import Subject
 from aerobat.flatness import Reference, reference
 from aerobat.planning import Plan
 from aerobat.reporting.captions import plan_caption, score_caption
@@ -129,13 +130,12 @@ def tracking_page(plan: Plan, vehicle: Vehicle, flight: Flight, title: str, fact
         title: The page's.
         facts: A line each, under the title.
     """
-    asked = reference(plan.trajectory, vehicle, rate=TRACKING_RATE, environment=plan.problem.environment)
+    asked = reference(plan, vehicle, rate=TRACKING_RATE)
     with house_style():
         figure = blank_page(HEIGHT, title, facts)
         path = panel(figure, *PATH)
-        problem, poses = plan.problem, (reference_poses(asked), actual_poses(flight))
-        pieces = problem.surroundings.pieces.pieces
-        note = draw_path(path, *poses, vehicle, problem.gates, plan.stages, pieces=pieces)
+        subject = Subject(flight, plan, vehicle)
+        note = draw_path(path, subject, reference_poses(asked), actual_poses(flight))
         heading(path, "Path and attitude", note)
         page = TrackingPage(figure, plan, asked, flight)
         positions, velocities = motion_signals(asked, flight)

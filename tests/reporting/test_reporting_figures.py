@@ -17,6 +17,7 @@ from matplotlib.quiver import Quiver, QuiverKey
 
 import aerobat as ab
 from aerobat import so3
+from aerobat.evaluation.subject import Subject
 from aerobat.planning import PlacedStage
 from aerobat.reporting.figures import draw, report_figure
 from aerobat.reporting.page import DPI, png
@@ -253,8 +254,10 @@ def test_vehicles_in_gates_do_not_cover_each_other(monkeypatch):
     monkeypatch.setattr(
         path_panel, "vehicle_shapes", lambda vehicle, position, q, scale, face: scales.append(scale) or []
     )
-    gates = [ab.tilted_gate((x, 0.0, 0.0), name=f"{x:g}") for x in np.arange(1.0, 9.0, 0.8)]
-    path_panel.draw_path(Figure().add_subplot(), reference_poses(plan_reference(plan, quad)), [], quad, gates)
+    gates = tuple(ab.tilted_gate((x, 0.0, 0.0), name=f"{x:g}") for x in np.arange(1.0, 9.0, 0.8))
+    course = replace(plan, problem=replace(plan.problem, gates=gates), stages=())
+    poses = reference_poses(plan_reference(plan, quad))
+    path_panel.draw_path(Figure().add_subplot(), Subject(course, course, quad), poses, [])
     assert max(scales) * span(quad) < 0.8
 
 

@@ -15,7 +15,8 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
-from aerobat.reporting.motion.picture import MovingPicture, subject_of
+from aerobat.evaluation.subject import subject_of
+from aerobat.reporting.motion.picture import MovingPicture
 from aerobat.reporting.motion.video import FPS, HOLD, frame_times
 from reporting_cases import simulated
 from shared_plans import shared_plan

@@ -7,8 +7,9 @@ import pytest
 
 import aerobat as ab
 from aerobat.environment.obstacles.surface import surface_of
+from aerobat.evaluation.subject import subject_of
 from aerobat.reporting.figures import report_figure
-from aerobat.reporting.motion.picture import MovingPicture, subject_of
+from aerobat.reporting.motion.picture import MovingPicture
 from aerobat.reporting.panels.timelines import clearances
 from aerobat.reporting.scene import axes_box
 from aerobat.reporting.scene.camera import Camera

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from aerobat.declaration import validated
 from aerobat.evaluation.score import Score
-from aerobat.flatness import vehicle_of
+from aerobat.evaluation.subject import Subject, subject_of
 from aerobat.planning import Plan
 from aerobat.reporting.captions import error_caption, plan_captions, score_caption
 from aerobat.reporting.page import AXIS, COLUMNS, TITLES, blank_page, heading, house_style, panel
@@ -16,7 +16,7 @@ from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, is_flat, plan_reference, reference_poses
 from aerobat.reporting.panels.stages import draw_stages
 from aerobat.simulation import Flight
-from aerobat.vehicle import Vehicle, as_vehicle
+from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,29 +39,29 @@ def draw(flight: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str
         plan: What was flown.
         vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
     """
+    subject = subject_of(flight, plan, vehicle)
     if isinstance(flight, Plan):
-        return report_figure(flight, vehicle_of(flight, vehicle))
-    flown_by = as_vehicle(vehicle or (plan and plan.vehicle) or flight.vehicles[0])
+        return report_figure(flight, subject.vehicle)
     if plan is not None:
-        return report_figure(plan, flown_by, flight)
+        return report_figure(plan, subject.vehicle, flight)
     with house_style():
-        return _bare_page(flight, flown_by)
+        return _bare_page(subject, flight)
 
 
-def _bare_page(flight: Flight, vehicle: Vehicle) -> Figure:
+def _bare_page(subject: Subject, flight: Flight) -> Figure:
     """A page on a flight whose plan is not known: path and attitude, errors, rotor thrusts."""
     foot = AXIS + PITCH + ROW + TITLES
     many = f"{len(flight.vehicles)} flights" if flight.is_batch else "flight"
-    path_height = 5.2  # [in]
-    figure = blank_page(foot + path_height + TITLES, f"{many} of {vehicle.name}", [error_caption(flight)])
-    path, pieces = panel(figure, 0.3, foot, 11.0, path_height), flight.environment.pieces.pieces
+    title, path_height = f"{many} of {subject.vehicle.name}", 5.2  # [in]
+    figure = blank_page(foot + path_height + TITLES, title, [error_caption(flight)])
+    path = panel(figure, 0.3, foot, 11.0, path_height)
     reference = reference_poses(flight)
-    note = draw_path(path, reference, actual_poses(flight), vehicle, (), pieces=pieces)
+    note = draw_path(path, subject, reference, actual_poses(flight))
     heading(path, "Path and attitude", note)
     errors = [panel(figure, COLUMNS[0], y, WIDTH, ROW) for y in (AXIS + PITCH, AXIS)]
     timelines.draw_errors(errors, flight)
     thrusts = panel(figure, COLUMNS[1], AXIS + PITCH, WIDTH, ROW)
-    timelines.draw_rotor_thrusts(thrusts, flight.times, flight.thrusts, vehicle)
+    timelines.draw_rotor_thrusts(thrusts, flight.times, flight.thrusts, subject.vehicle)
     for column, title in ((errors, "Tracking error"), ([thrusts], "Thrust of each rotor")):
         timelines.finish_column(column, title, (), float(reference.times[-1]))
     return figure
@@ -134,17 +134,17 @@ def _pictures(
 
     Where there are obstacles it has a row more.
     """
-    problem, pieces = plan.problem, plan.problem.surroundings.pieces.pieces
-    rows += bool(pieces)
+    subject = Subject(plan, plan, vehicle)
+    rows += bool(subject.pieces)
     # [in] the places of path and stages above the timelines, and the height of both with their titles
     places, height = ((0.3, 0.05, 6.1, 6.1), (7.0, 0.5, 4.3, 5.65)), 6.7
     if is_flat(reference.position):  # one above the other
         places, height = ((0.3, 3.5, 11.0, 4.0), (0.74, 0.5, 10.53, 2.2)), 8.05
     foot = AXIS + PITCH * (rows - 1) + ROW + TITLES
     warnings = () if plan.assessment is None else plan.assessment.warnings
-    figure = blank_page(foot + height, f"{plan.problem.name} · {vehicle.name}", facts, warnings)
+    figure = blank_page(foot + height, f"{subject.name} · {vehicle.name}", facts, warnings)
     path, stages = (panel(figure, left, foot + bottom, *size) for left, bottom, *size in places)
-    note = draw_path(path, reference, actual, vehicle, problem.gates, plan.stages, pieces=pieces)
+    note = draw_path(path, subject, reference, actual)
     heading(path, "Path and attitude", note)
     heading(stages, "Stages" if plan.stages else "Attitudes", draw_stages(stages, plan, vehicle))
     return figure, [AXIS + PITCH * k for k in reversed(range(rows))]

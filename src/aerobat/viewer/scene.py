@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.environment import Environment
 from aerobat.environment.obstacles.surface import Surface
 from aerobat.environment.obstacles.visible_surfaces import surfaces_around
 from aerobat.errors import SpecError
 from aerobat.evaluation.score import score
-from aerobat.flatness import reference, vehicle_of
+from aerobat.evaluation.subject import Subject, subject_of
+from aerobat.flatness import Reference, reference
 from aerobat.planning import PlacedStage, Plan
 from aerobat.problem.gate import Gate
 from aerobat.simulation import Flight
 from aerobat.simulation.outcome import length
-from aerobat.vehicle import Vehicle, as_vehicle
+from aerobat.vehicle import Vehicle
 
 Rows = NDArray[np.intp]
 
@@ -98,19 +98,21 @@ def scene_of(
         vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
         poses: How many are shown at most, of all flights together.
     """
+    if isinstance(shown, Flight):
+        if not shown.vehicles:
+            raise SpecError(
+                "the batch holds no flights, so that there is nothing to show; fly one vehicle or more"
+            )
+        if len(shown.times) < 2:
+            raise SpecError("the flight has one row, so that nothing moves; show one of two rows or more")
+    subject = subject_of(shown, plan, vehicle)
     if isinstance(shown, Plan):
-        return _plan_scene(shown, vehicle_of(shown, vehicle))
-    if not shown.vehicles:
-        raise SpecError(
-            "the batch holds no flights, so that there is nothing to show; fly one vehicle or more"
-        )
-    if len(shown.times) < 2:
-        raise SpecError("the flight has one row, so that nothing moves; show one of two rows or more")
-    own = as_vehicle(vehicle or (plan and plan.vehicle) or shown.vehicles[0])
+        return _plan_scene(subject, shown)
+    own = subject.vehicle
     if shown.thrusts.shape[-1] != len(own.rotors):
         rotors = f"{shown.thrusts.shape[-1]} rotors, {own.name} has {len(own.rotors)}"
         raise SpecError(f"vehicle: the flight is one of {rotors}; name the vehicle that flew")
-    return _flight_scene(shown, plan, own, poses)
+    return _flight_scene(subject, shown, poses)
 
 
 def plan_fits(plan: Plan, flight: Flight) -> bool:
@@ -122,12 +124,12 @@ def plan_fits(plan: Plan, flight: Flight) -> bool:
     return bool(np.abs(off).max() <= SAME_PATH)
 
 
-def _plan_scene(plan: Plan, vehicle: Vehicle) -> Scene:
+def _plan_scene(subject: Subject, plan: Plan) -> Scene:
     rate = min(PLAN_RATE, MAX_ROWS / plan.duration)
-    asked = reference(plan.trajectory, vehicle, rate=rate, environment=plan.problem.environment)
+    asked = reference(plan, subject.vehicle, rate=rate)
     setpoint = asked.setpoint
     track = Track(
-        name=vehicle.name,
+        name=subject.vehicle.name,
         position=setpoint.flat.position,
         q_world_body=setpoint.q_world_body,
         thrusts=asked.rotor_thrusts,
@@ -137,60 +139,55 @@ def _plan_scene(plan: Plan, vehicle: Vehicle) -> Scene:
     )
     speed = np.linalg.norm(setpoint.flat.velocity, axis=-1)
     rates = np.rad2deg(np.linalg.norm(setpoint.omega_body, axis=-1))
+    curves = (Curve("speed", "m/s", speed[None]), Curve("body rate", "°/s", rates[None]))
     proof = "not certified" if plan.certificate is None else plan.certificate.why
-    return Scene(
-        title=f"{plan.problem.name} · {vehicle.name}",
-        facts=(f"planned by {plan.planner}: {plan.duration:.3f} s", proof),
-        is_well=plan.certified,
-        vehicle=vehicle,
-        gravity=plan.problem.environment.gravity,
-        ground=plan.problem.environment.ground,
-        gates=plan.problem.gates,
-        surfaces=_surfaces(plan.problem.surroundings, plan.problem.gates, track.position),
-        stages=plan.stages,
-        ghosts=_ghosts(plan.stages, asked.times, track.position, track.q_world_body),
-        times=asked.times,
-        planned=track.position,
-        tracks=(track,),
-        curves=(Curve("speed", "m/s", speed[None]), Curve("body rate", "°/s", rates[None])),
-    )
+    facts = (f"planned by {plan.planner}: {plan.duration:.3f} s", proof)
+    return _scene(subject, asked, np.arange(len(asked.times)), facts, (track,), curves)
 
 
-def _flight_scene(flight: Flight, plan: Plan | None, vehicle: Vehicle, poses: int) -> Scene:
+def _flight_scene(subject: Subject, flight: Flight, poses: int) -> Scene:
     flights = (
         [flight[k] for k in range(min(len(flight.vehicles), MAX_FLIGHTS))] if flight.is_batch else [flight]
     )
     rows = shown_rows(len(flight.times), len(flights), poses)
+    plan = subject.plan
     tracks = tuple(
-        _track(each, plan, vehicle, rows, k if flight.is_batch else None) for k, each in enumerate(flights)
+        _track(each, plan, subject.vehicle, rows, k if flight.is_batch else None)
+        for k, each in enumerate(flights)
     )
-    setpoint = flight.setpoint
-    stages, gates = ((), ()) if plan is None else (plan.stages, plan.problem.gates)
-    surroundings = flight.environment if plan is None else plan.problem.surroundings
-    name = "flight" if plan is None else plan.problem.name
-    batch = f"{len(flights)} flights of " if flight.is_batch else ""
-    return Scene(
-        title=f"{name} · {batch}{vehicle.name}",
-        facts=(*_facts(tracks, flight, plan), *_left_out(flight, rows, len(flights))),
-        is_well=not any(track.failed for track in tracks),
-        vehicle=vehicle,
-        gravity=flight.environment.gravity,
-        ground=flight.environment.ground,
-        gates=gates,
-        surfaces=_surfaces(surroundings, gates, setpoint.flat.position),
-        stages=stages,
-        ghosts=_ghosts(stages, flight.times, setpoint.flat.position, setpoint.q_world_body),
-        times=flight.times[rows],
-        planned=setpoint.flat.position[rows],
-        tracks=tracks,
-        curves=_errors(flight, len(flights), rows),
-    )
+    facts = (*_facts(tracks, flight, plan), *_left_out(flight, rows, len(flights)))
+    return _scene(subject, flight, rows, facts, tracks, _errors(flight, len(flights), rows))
 
 
-def _surfaces(environment: Environment, gates: Sequence[Gate], path: Array) -> tuple[Surface, ...]:
-    """The surfaces of obstacles around a path (T, 3) and gates."""
+def _scene(
+    subject: Subject,
+    followed: Reference | Flight,
+    rows: Rows,
+    facts: tuple[str, ...],
+    tracks: tuple[Track, ...],
+    curves: tuple[Curve, ...],
+) -> Scene:
+    """The scene of vehicles that follow set-points, shown at some of their rows."""
+    gates, setpoint = subject.gates, followed.setpoint
+    path = setpoint.flat.position
+    batch = f"{len(tracks)} flights of " if isinstance(followed, Flight) and followed.is_batch else ""
     points = np.concatenate([path, *(gate.outline for gate in gates)])
-    return surfaces_around(environment.pieces.pieces, points)
+    return Scene(
+        title=f"{subject.name} · {batch}{subject.vehicle.name}",
+        facts=facts,
+        is_well=not any(track.failed for track in tracks),
+        vehicle=subject.vehicle,
+        gravity=subject.environment.gravity,
+        ground=subject.environment.ground,
+        gates=gates,
+        surfaces=surfaces_around(subject.pieces, points),
+        stages=subject.stages,
+        ghosts=_ghosts(subject.stages, followed.times, path, setpoint.q_world_body),
+        times=followed.times[rows],
+        planned=path[rows],
+        tracks=tracks,
+        curves=curves,
+    )
 
 
 def shown_rows(rows: int, flights: int, poses: int = MAX_POSES) -> Rows:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 from typing import TYPE_CHECKING, Any, cast
@@ -12,15 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.environment.obstacles import ConvexPiece
-from aerobat.errors import SpecError
-from aerobat.flatness import vehicle_of
-from aerobat.planning import PlacedStage, Plan
-from aerobat.problem.gate import Gate
+from aerobat.evaluation.subject import Subject
+from aerobat.planning import Plan
 from aerobat.reporting.page import AXIS, Place, house_style, panel, write
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.path import BELOW
-from aerobat.reporting.panels.poses import PoseHistory, actual_poses, plan_reference, reference_poses
+from aerobat.reporting.panels.poses import actual_poses, plan_reference, reference_poses
 from aerobat.reporting.scene.axes_box import draw_box_around
 from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.glyphs import (
@@ -37,7 +33,6 @@ from aerobat.reporting.scene.obstacles import obstacle_shapes, surfaces_beside
 from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted, polyline
 from aerobat.reporting.style import BAND, BLUE, FAINT, HAIR, INK, MUTED, NORMAL, TITLE
 from aerobat.simulation import Flight
-from aerobat.vehicle import Vehicle, as_vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,64 +40,6 @@ if TYPE_CHECKING:
 SIZE = (7.2, 4.8)  # [in] of a picture
 SCENE: Place = (0.0, 0.0, 4.0, 4.5)
 LINES: tuple[Place, ...] = tuple((4.78, AXIS + 1.38 * k, 2.28, 1.0) for k in (2, 1, 0))
-
-
-@dataclass(frozen=True, eq=False)
-class Subject:
-    """The subject of a picture: a plan, one flight or many flights."""
-
-    title: str
-    vehicle: Vehicle
-    gates: tuple[Gate, ...]
-    pieces: tuple[ConvexPiece, ...]  # of obstacles
-    stages: tuple[PlacedStage, ...]
-    reference: PoseHistory
-    actual: Sequence[PoseHistory]
-    thrusts: Array  # [N], (..., T, n)
-    flight: Flight | None
-
-    @property
-    def shown(self) -> Sequence[PoseHistory]:
-        """The vehicles that move."""
-        return self.actual or [self.reference]
-
-    @property
-    def duration(self) -> float:
-        """From start to end [s]."""
-        return float(self.reference.times[-1])
-
-
-def subject_of(shown: Flight | Plan, plan: Plan | None, vehicle: Vehicle | str | None) -> Subject:
-    """The subject of a flight with its plan, or of a plan alone.
-
-    Raises SpecError where the vehicle is not known, and where nothing moves.
-    """
-    given = plan if isinstance(shown, Flight) else shown
-    if isinstance(shown, Plan):
-        own = vehicle_of(shown, vehicle)
-        asked = plan_reference(shown, own)
-        poses, thrusts, actual = reference_poses(asked), asked.rotor_thrusts, []
-    else:
-        if not shown.vehicles or len(shown.times) < 2:
-            raise SpecError(
-                "the flight holds nothing that moves; show one vehicle or more, of two rows or more"
-            )
-        own = as_vehicle(vehicle or (plan and plan.vehicle) or shown.vehicles[0])
-        poses, thrusts, actual = reference_poses(shown), shown.thrusts, actual_poses(shown)
-    surroundings = None if given is None else given.problem.surroundings
-    if isinstance(shown, Flight) and surroundings is None:
-        surroundings = shown.environment
-    return Subject(
-        title=f"{'flight' if given is None else given.problem.name} · {own.name}",
-        vehicle=own,
-        gates=() if given is None else given.problem.gates,
-        pieces=() if surroundings is None else surroundings.pieces.pieces,
-        stages=() if given is None else given.stages,
-        reference=poses,
-        actual=actual,
-        thrusts=thrusts,
-        flight=shown if isinstance(shown, Flight) else None,
-    )
 
 
 class MovingPicture:
@@ -117,11 +54,21 @@ class MovingPicture:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        self.subject = subject
+        shown, vehicle = subject.shown, subject.vehicle
+        self._subject = subject
+        if isinstance(shown, Plan):
+            asked = plan_reference(shown, vehicle)
+            self._reference, self._thrusts = reference_poses(asked), asked.rotor_thrusts
+            self._moved = [self._reference]
+        else:
+            self._reference, self._thrusts = reference_poses(shown), shown.thrusts
+            self._moved = actual_poses(shown)
+        self._scale = enlargement(vehicle, 0.18 * self._reference.extent)
+        title = f"{subject.name} · {vehicle.name}"
         with house_style():
             self._figure = Figure(figsize=SIZE, dpi=dpi)
             self._canvas = cast(Any, FigureCanvasAgg(self._figure))  # parts of it have no types
-            write(self._figure, 0.2, SIZE[1] - 0.3, subject.title, size=TITLE + 2, weight="bold", va="center")
+            write(self._figure, 0.2, SIZE[1] - 0.3, title, size=TITLE + 2, weight="bold", va="center")
             self._scene = panel(self._figure, *SCENE)
             self._camera = self._draw_scene()
             self._timelines = self._draw_timelines()
@@ -132,6 +79,11 @@ class MovingPicture:
                 artist.set_animated(True)
             self._canvas.draw()
             self._still = self._canvas.copy_from_bbox(self._figure.bbox)
+
+    @property
+    def duration(self) -> float:
+        """From start to end [s]."""
+        return float(self._reference.times[-1])
 
     @property
     def size(self) -> tuple[int, int]:
@@ -155,61 +107,54 @@ class MovingPicture:
 
     def _draw_scene(self) -> Camera:
         """The box around the scene, and from where it is seen."""
-        subject = self.subject
-        points = [poses.path for poses in (subject.reference, *subject.actual)]
-        reach = self._scale * span(subject.vehicle)
-        self._surfaces, points_held = surfaces_beside(subject.pieces, [*points, gate_corners(subject.gates)])
-        box, camera = draw_box_around(
-            self._scene, points_held, 0.6 * reach, subject.reference.path, subject.gates
-        )
+        subject, path = self._subject, self._reference.path
+        points = [path, *(poses.path for poses in self._moved), gate_corners(subject.gates)]
+        self._surfaces, held = surfaces_beside(subject.pieces, points)
+        pad = 0.6 * self._scale * span(subject.vehicle)
+        box, camera = draw_box_around(self._scene, held, pad, path, subject.gates)
         self._floor = float(box.lower[2])
         return camera
 
     def _draw_timelines(self) -> list[Axes]:
         """Errors and rotor thrusts over time; of a plan its rotor thrusts."""
-        subject = self.subject
-        places = LINES if subject.flight is not None else LINES[-1:]
-        column = [panel(self._figure, *place) for place in places]
-        if subject.flight is not None:
-            timelines.draw_errors(column, subject.flight)
-        times = subject.reference.times
-        timelines.draw_rotor_thrusts(column[-1], times, subject.thrusts, subject.vehicle)
+        subject = self._subject
+        column = [panel(self._figure, *LINES[-1])]
+        if isinstance(subject.shown, Flight):
+            column = [*(panel(self._figure, *place) for place in LINES[:-1]), *column]
+            timelines.draw_errors(column, subject.shown)
+        timelines.draw_rotor_thrusts(column[-1], self._reference.times, self._thrusts, subject.vehicle)
         stages = subject.stages if len(subject.stages) <= 6 else ()  # whose names have room
-        timelines.finish_column(column, "", stages, subject.duration)
+        timelines.finish_column(column, "", stages, self.duration)
         for axes in column:
             if (legend := axes.get_legend()) is not None:
                 legend.remove()
         return column
 
     @cached_property
-    def _scale(self) -> float:
-        return enlargement(self.subject.vehicle, 0.18 * self.subject.reference.extent)
-
-    @cached_property
     def _standing(self) -> list[Shape]:
         """The shapes that stand still: gates, obstacles, and the path that is to be flown."""
-        path = self.subject.reference.path
+        path = self._reference.path
         shapes = [Shape(shadow(path, self._floor), edge=HAIR, width=2.5, depth_bias=-1e3)]
-        shapes += polyline(path, BAND, 3.2, depth_bias=-BELOW * self.subject.reference.extent)
+        shapes += polyline(path, BAND, 3.2, depth_bias=-BELOW * self._reference.extent)
         shapes += obstacle_shapes([each for each in self._surfaces if each.motion is None], self._camera)
-        still = [gate for gate in self.subject.gates if gate.motion is None]
+        still = [gate for gate in self._subject.gates if gate.motion is None]
         return shapes + [shape for gate in still for shape in gate_shapes(gate)]
 
     def _moving(self, time: float) -> list[Shape]:
         """Vehicles at an instant, the paths that they have flown by then, and the stages that are behind."""
         moved = [each.at(time) for each in self._surfaces if each.motion is not None]
         shapes = [*obstacle_shapes(moved, self._camera), *self._passed(time)]
-        gates = [gate.at(time) for gate in self.subject.gates if gate.motion is not None]
+        gates = [gate.at(time) for gate in self._subject.gates if gate.motion is not None]
         shapes += [shape for gate in gates for shape in gate_shapes(gate)]
-        many = len(self.subject.shown) > 1
+        many = len(self._moved) > 1
         line: Any = (BLUE, 0.3) if many else BLUE
-        for poses in self.subject.shown:
+        for poses in self._moved:
             k = poses.rows([time])[0]
             position, q = poses.position[k], poses.q_world_body[k]
             flown = poses.position[: k + 1 : max(1, k // 80)]
             if len(flown) > 1:
                 shapes += polyline(np.concatenate([flown, position[None]]), line, 1.0 if many else 1.8)
-            shapes.append(thrust_axis_shape(self.subject.vehicle, position, q, self._scale))
+            shapes.append(thrust_axis_shape(self._subject.vehicle, position, q, self._scale))
             shapes += self._vehicle(position, q)
             foot = shadow(position, self._floor)
             shapes.append(Shape(np.array([position, foot]), edge=FAINT, width=0.6, depth_bias=-1e3))
@@ -217,8 +162,8 @@ class MovingPicture:
 
     def _passed(self, time: float) -> list[Shape]:
         """The first vehicle at the stages until an instant, nearly transparent."""
-        poses = self.subject.shown[0]
-        rows = poses.rows([stage.time for stage in self.subject.stages if stage.time <= time])
+        poses = self._moved[0]
+        rows = poses.rows([stage.time for stage in self._subject.stages if stage.time <= time])
         each = (self._vehicle(poses.position[k], poses.q_world_body[k], opacity=0.35) for k in rows)
         return list(chain.from_iterable(each))
 
@@ -227,7 +172,7 @@ class MovingPicture:
         face = side_face(q_world_body, self._camera)
         if not isinstance(face, str):
             face = face[0], opacity * face[1]
-        shapes = vehicle_shapes(self.subject.vehicle, position, q_world_body, self._scale, face)
+        shapes = vehicle_shapes(self._subject.vehicle, position, q_world_body, self._scale, face)
         if opacity == 1.0:
             return shapes
         return [replace(shape, edge=(INK, opacity), width=0.7 * shape.width) for shape in shapes]

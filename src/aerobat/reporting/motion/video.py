@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from aerobat.declaration import PathName, Positive, validated
 from aerobat.errors import SpecError, import_extra
+from aerobat.evaluation.subject import subject_of
 from aerobat.planning import Plan
-from aerobat.reporting.motion.picture import MovingPicture, subject_of
+from aerobat.reporting.motion.picture import MovingPicture
 from aerobat.simulation import Flight
 from aerobat.storage import whole_file
 from aerobat.vehicle import Vehicle
@@ -57,9 +58,10 @@ def write_video(
     if suffix not in ENCODING:
         raise SpecError(f"video: {path} is neither .mp4 nor .gif; name a file of one of them")
     extra = import_extra("imageio_ffmpeg", "a video needs imageio-ffmpeg", "aerobat[viewer]")
-    subject = subject_of(shown, plan, vehicle)
-    times = frame_times(subject.duration, speed)
-    picture = MovingPicture(subject, DPI[suffix])
+    if isinstance(shown, Flight) and (not shown.vehicles or len(shown.times) < 2):
+        raise SpecError("the flight holds nothing that moves; show one vehicle or more, of two rows or more")
+    picture = MovingPicture(subject_of(shown, plan, vehicle), DPI[suffix])
+    times = frame_times(picture.duration, speed)
     with whole_file(path) as temporary:
         _encode(extra.get_ffmpeg_exe(), picture.size, temporary, suffix, _frames(picture, times, progress))
 

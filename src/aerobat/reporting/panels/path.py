@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.environment.obstacles import ConvexPiece
+from aerobat.evaluation.subject import Subject
 from aerobat.planning import PlacedStage
 from aerobat.planning.passages import as_passed
 from aerobat.problem.gate import Gate
@@ -32,7 +32,6 @@ from aerobat.reporting.scene.glyphs import (
 from aerobat.reporting.scene.obstacles import obstacle_shapes, surfaces_beside
 from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted, polyline
 from aerobat.reporting.style import BAND, BLUE, HAIR, INK
-from aerobat.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,35 +49,35 @@ ALONE_WIDTH = 1.6  # [pt] of a reference path that nobody flew
 
 def draw_path(
     axes: Axes,
+    subject: Subject,
     reference: PoseHistory,
     actual: Sequence[PoseHistory],
-    vehicle: Vehicle,
-    gates: Sequence[Gate],
-    stages: Sequence[PlacedStage] = (),
-    pieces: Sequence[ConvexPiece] = (),
     size: float = SIZE,
 ) -> str:
     """Draw paths, the first vehicle along its path, the gates, obstacles, other stages, start and end.
 
+    Obstacles are drawn where they are near, and those that move where they are beside some vehicles. Stages
+    without a gate are marked by diamonds.
+
     Args:
         axes: Where to draw.
+        subject: What is drawn; the picture holds each of its gates.
         reference: The poses that were planned.
         actual: Those of each flight; empty where nothing was flown.
-        vehicle: Whose glyph is drawn.
-        gates: All gates of the problem; the picture holds each of them.
-        stages: Of which those without a gate are marked by diamonds.
-        pieces: Of obstacles, drawn where they are near; those that move where they are beside some vehicles.
         size: Of the vehicle as drawn, relative to the path's extent.
 
     Returns:
         A note on how the vehicle is drawn.
     """
-    gates, poses = as_passed(gates, stages), actual[0] if actual else reference
+    vehicle, stages = subject.vehicle, subject.stages
+    gates, poses = as_passed(subject.gates, stages), actual[0] if actual else reference
     scale = enlargement(vehicle, min(size * reference.extent, CLEAR * _least_distance(gates)))
     reach = scale * span(vehicle)
     rows, step = pose_samples(poses, reach, gates)
     paths = [each.path for each in (reference, *actual)]
-    surfaces, points = surfaces_beside(pieces, [*paths, gate_corners(gates)], poses.times[rows[::GHOSTS]])
+    surfaces, points = surfaces_beside(
+        subject.pieces, [*paths, gate_corners(gates)], poses.times[rows[::GHOSTS]]
+    )
     box, camera = draw_box_around(axes, points, 0.6 * reach, reference.path, gates)
     floor = float(box.lower[2])
     shapes = _path_shapes(reference, actual, floor) + obstacle_shapes(surfaces, camera)

@@ -62,7 +62,7 @@ def is_flat(positions: Array) -> bool:
 
 def plan_reference(plan: Plan, vehicle: Vehicle) -> Reference:
     """Reference of a plan for a vehicle from start to goal, sampled for drawing."""
-    return reference(plan.trajectory, vehicle, rate=250.0, environment=plan.problem.environment)
+    return reference(plan, vehicle, rate=250.0)
 
 
 def reference_poses(reference: Reference | Flight) -> PoseHistory:
