@@ -38,6 +38,13 @@ from aerobat.vehicle import Vehicle, as_vehicle
 # [m] median distance from the set-points that shows another path; clock differences make less
 MAX_MEDIAN_DISTANCE = 0.5
 COASTING = 0.1  # [s] without a pose from which a filter coasts: several periods of any motion capture
+METRICS = (  # fields of a Score that are one number for each flight
+    "max_position_error_m",
+    "rms_position_error_m",
+    "max_attitude_error_deg",
+    "rms_attitude_error_deg",
+    "saturated_fraction",
+)
 _CONTACT_OUTCOMES = {  # outcomes of contacts detected by the plant
     Contact.GROUND: Outcome.TOUCHED_GROUND,
     Contact.GATE: Outcome.TOUCHED_GATE,

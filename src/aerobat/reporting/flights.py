@@ -11,26 +11,19 @@ import numpy as np
 from aerobat.arrays import AXES, Array
 from aerobat.estimation import Estimates
 from aerobat.evaluation.criteria import GOAL
-from aerobat.evaluation.score import ObserverScore, Score
+from aerobat.evaluation.score import METRICS, ObserverScore, Score
 from aerobat.flatness import Reference
 from aerobat.reporting.facts import NONE, REPORT, Columns, Fact, facts, fields_of, kept, picture, said
 from aerobat.reporting.plans import rough_length
 from aerobat.simulation import Flight
 from aerobat.simulation.flight import setpoint_series
 from aerobat.simulation.outcome import digits, length
-from aerobat.simulation.passages import NearestObstacle, Passage, WaypointPassage
+from aerobat.simulation.passages import NearestObstacle, Passage, WaypointPassage, passage_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COMPONENTS = {3: AXES, 4: "wxyz"}  # of vectors and quaternions
-METRICS = (
-    "max_position_error_m",
-    "rms_position_error_m",
-    "max_attitude_error_deg",
-    "rms_attitude_error_deg",
-    "saturated_fraction",
-)
 # numbers of a score that its sentence is made of
 EVENTS = ("stop", "is_finite", "ground_time", "off_path_time", "contact", "contact_time", "path_radius_m")
 
@@ -236,8 +229,6 @@ def _components(series: Mapping[str, Array], is_in_space: bool = True) -> dict[s
 
 def _flights_of(scores: Score) -> dict[str, Any]:
     """The columns of many flights' scores."""
-    from aerobat.studies.sweep.flights import passage_names  # which takes long to import
-
     columns: dict[str, Any] = {name: getattr(scores, name) for name in METRICS}
     columns["outcome"] = [outcome.name.lower() for outcome in scores.outcomes]
     for begin, passage in zip(passage_names(scores.passages), scores.passages, strict=True):

@@ -7,7 +7,7 @@ from aerobat.simulation.passages.obstacles import (
     nearest_in_log,
     nearest_obstacles,
 )
-from aerobat.simulation.passages.passage import Passage, passages
+from aerobat.simulation.passages.passage import Passage, passage_names, passages
 from aerobat.simulation.passages.stage_attitude import StageAttitude, stage_attitudes
 from aerobat.simulation.passages.waypoint import WaypointPassage, waypoint_passages
 
@@ -20,6 +20,7 @@ __all__ = [
     "log_rows",
     "nearest_in_log",
     "nearest_obstacles",
+    "passage_names",
     "passages",
     "passages_in_log",
     "stage_attitudes",

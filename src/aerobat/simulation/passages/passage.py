@@ -11,7 +11,8 @@ that the ellipsoid sweeps of the gate's plane during the crossing must lie withi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from math import degrees
@@ -34,6 +35,7 @@ from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.vehicle import Ellipsoid
 
+REPEAT_SEPARATOR = "#"  # separates a gate's name and the number of its passage, from the second on
 PASSAGE_WINDOW = 0.25  # [s] around the planned instant in which the crossing is searched
 
 
@@ -159,6 +161,14 @@ def passages(planned: PlannedPassage, progress: GateProgress, stop: Array) -> Pa
         "min_distance": known(progress.min_distance, ~ended_before),
     }
     return Passage(gate.name, planned.lap, **fields)
+
+
+def passage_names(passages: Sequence[Passage]) -> Iterator[str]:
+    """Yield the gates' names in the order of passage, with the number of the passage from the second on."""
+    turns: Counter[str] = Counter()
+    for passage in passages:
+        turns[passage.gate] += 1
+        yield passage.gate + (f"{REPEAT_SEPARATOR}{turns[passage.gate]}" if turns[passage.gate] > 1 else "")
 
 
 def _least_clearance(gate: Gate, swath: Swath, crossed: NDArray[np.bool_]) -> dict[str, Any]:

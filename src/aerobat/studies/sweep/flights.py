@@ -2,32 +2,29 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerobat.arrays import Array
-from aerobat.evaluation.score import Score
+from aerobat.evaluation.score import METRICS, Score
 from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
 from aerobat.simulation.conditions.draw import Draws
-from aerobat.simulation.passages import Passage
+from aerobat.simulation.passages import Passage, passage_names
 from aerobat.studies.flights import CHUNK, FlightTask, cut
 
 SAMPLED = 4 * CHUNK  # number of flights, from the first, whose errors over time are kept
 STRIDE = 10  # ticks between the instants of errors over time
 PASSED, NOT_REACHED = "passed", "not_reached"  # outcomes of a passage beside failures
 NEAREST, CLEARANCE = "nearest", "clearance_m"  # columns where there are obstacles
-REPEAT_SEPARATOR = "#"  # separates a gate's name and the number of its passage, from the second on
 
 Columns = dict[str, NDArray[Any]]
 
 _OVER_TIME = ("times", "position_error", "attitude_error")  # names of a chunk's arrays over time
 
-_ERRORS = tuple(field.name for field in fields(Score)[:5])
 _PASSAGE = (  # fields of a passage, each with the suffix of its column
     ("time", "time_s"),
     ("lateral", "lateral_m"),
@@ -121,7 +118,7 @@ def _scored(scores: Score) -> Columns:
     """Return columns with the results of flights: outcome, errors, nearest obstacle and passages."""
     flights = list(scores)
     columns: Columns = {"outcome": np.array([flight.outcome.name.lower() for flight in flights])}
-    columns |= {name: np.array(getattr(scores, name)) for name in _ERRORS}
+    columns |= {name: np.array(getattr(scores, name)) for name in METRICS}
     if scores.nearest is not None:
         columns |= {NEAREST: np.array(scores.nearest.obstacle), CLEARANCE: np.array(scores.nearest.clearance)}
     for number, name in enumerate(passage_names(scores.passages)):
@@ -137,11 +134,3 @@ def _passage_outcome(passage: Passage) -> str:
     if passage.failure is not None:
         return passage.failure.outcome.name.lower()
     return NOT_REACHED if np.isnan(passage.time) else PASSED
-
-
-def passage_names(passages: Sequence[Passage]) -> Iterator[str]:
-    """Yield the gates' names in the order of passage, with the number of the passage from the second on."""
-    turns: Counter[str] = Counter()
-    for passage in passages:
-        turns[passage.gate] += 1
-        yield passage.gate + (f"{REPEAT_SEPARATOR}{turns[passage.gate]}" if turns[passage.gate] > 1 else "")

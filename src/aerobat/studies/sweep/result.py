@@ -20,8 +20,9 @@ from aerobat.planning import Plan
 from aerobat.problem import Gate
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
+from aerobat.simulation.passages.passage import REPEAT_SEPARATOR
 from aerobat.studies.share import Share
-from aerobat.studies.sweep.flights import PASSED, REPEAT_SEPARATOR
+from aerobat.studies.sweep.flights import PASSED
 from aerobat.vehicle import Vehicle
 
 Level = Annotated[float, Field(ge=0, le=1, description="number from 0 to 1")]
