@@ -68,20 +68,18 @@ def _(comparison: Comparison) -> Iterator[Fact]:
 
 def _row(comparison: Comparison, entry: Entry) -> Facts:
     """A planner's result; None where there is no plan, and for ratios where none is time-optimal."""
-    plan, ratio, margin = entry.plan, comparison.ratio(entry), _margin(entry.plan)
+    plan = entry.plan
     error = None if entry.score is None else entry.score.max_position_error_m
-    took = entry.planning_time
-    duration = None if plan is None else f"{plan.duration:.3f} s"
     return Facts(
         (
             Fact("planner", entry.planner, "planner"),
             Fact("segments", plan and plan.intervals, "segments"),
-            Fact("duration_s", plan and plan.duration, "duration", duration),
-            Fact("ratio", ratio, "ratio", None if ratio is None else f"{ratio:.2f}"),
-            Fact("certified", None if plan is None else entry.certified, "certified"),
-            Fact("min_margin_n", margin, "margin", None if margin is None else f"{margin:.2g} N"),
+            Fact("duration_s", plan and plan.duration, "duration", unit="s", form=".3f"),
+            Fact("ratio", comparison.ratio(entry), "ratio", form=".2f"),
+            Fact("certified", plan and entry.certified, "certified"),
+            Fact("min_margin_n", _margin(plan), "margin", unit="N", form=".2g"),
             Fact("max_position_error_m", error, "error", None if error is None else length(error)),
-            Fact("planning_s", took, "took", f"{took:.2f} s"),
+            Fact("planning_s", entry.planning_time, "took", unit="s", form=".2f"),
             Fact("note", entry.note),
         )
     )

@@ -42,7 +42,7 @@ def _row(measured: ErrorCauses, result: TrialResult) -> Iterator[Fact]:
     saturated = float(np.mean(result.scores.saturated_fraction))
     success = float(result.scores.succeeded.mean())
     yield Fact("cause", result.cause, "cause")
-    yield Fact("duration_s", result.plan.duration, "plan", f"{result.plan.duration:.3f} s")
+    yield Fact("duration_s", result.plan.duration, "plan", unit="s", form=".3f")
     yield Fact("error_median_m", median, "error", length(median))
     yield Fact("error_95_m", most, "at 95 %", length(most))
     yield Fact("cost_median_m", cost.median, "costs", "" if is_none else f"{middle} cm")

@@ -52,8 +52,9 @@ class Fact:
     key: str  # in JSON and data frames, ending in its unit: "duration_s"
     value: Any = None
     label: str = ""  # in tables
-    text: str | None = None  # in tables; left out, value and unit
+    text: str | None = None  # in tables; left out, the value in its form, and its unit
     unit: str = ""
+    form: str = ".4g"  # of a number that is no integer
     level: int = EXPLAIN
     style: str = ""  # red: something is wrong
 
@@ -66,7 +67,7 @@ class Fact:
             return NONE
         if isinstance(self.value, bool):
             return "yes" if self.value else "no"
-        number = f"{self.value:.4g}" if isinstance(self.value, float) else str(self.value)
+        number = f"{self.value:{self.form}}" if isinstance(self.value, float) else str(self.value)
         return f"{number} {self.unit}".rstrip()
 
 

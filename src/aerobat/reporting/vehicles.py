@@ -67,14 +67,9 @@ def vehicle_row(vehicle: Vehicle) -> Facts:
     return Facts(
         (
             Fact("vehicle", vehicle.name, "vehicle"),
-            Fact("mass_kg", vehicle.mass, "mass", f"{vehicle.mass:.3g} kg"),
+            Fact("mass_kg", vehicle.mass, "mass", unit="kg", form=".3g"),
             Fact("rotors", len(vehicle.rotors), "rotors"),
-            Fact(
-                "thrust_to_weight",
-                vehicle.thrust_to_weight,
-                "thrust/weight",
-                f"{vehicle.thrust_to_weight:.2f}",
-            ),
+            Fact("thrust_to_weight", vehicle.thrust_to_weight, "thrust/weight", form=".2f"),
             Fact("description", vehicle.description, "what it is"),
         )
     )

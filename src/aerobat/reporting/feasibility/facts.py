@@ -84,7 +84,6 @@ def _cell(found: FeasibilityMap, cell: Cell) -> Facts:
     limits = ", ".join(cell.limits)
     said = limits if cell.is_planned else f"{limits}: {cell.sentence}".removeprefix(": ")
     reserve = NONE if cell.reserve is None else f"{100 * cell.reserve:.2g} %"
-    duration = None if cell.duration is None else f"{cell.duration:.3f} s"
     values = (
         Fact(axis.name, value, axis.label, f"{value:g}")
         for axis, value in zip(found.axes, cell.values, strict=True)
@@ -93,7 +92,7 @@ def _cell(found: FeasibilityMap, cell: Cell) -> Facts:
         (
             *values,
             Fact("feasibility", cell.feasibility.value, "feasibility", style=_style(cell)),
-            Fact("duration_s", cell.duration, "duration", duration),
+            Fact("duration_s", cell.duration, "duration", unit="s", form=".3f"),
             Fact("limits", cell.limits),
             Fact("reserve", cell.reserve, "reserve", reserve),
             Fact("sentence", cell.sentence, "limits", said),
