@@ -44,7 +44,7 @@ def digits(value: float, nothing: float = 0.0) -> str:
 
 def counted(outcomes: Iterable[Outcome]) -> str:
     """Return counts of the outcomes of flights as text, the most frequent first."""
-    counts = Counter(outcome.name.lower().replace("_", " ") for outcome in outcomes)
+    counts = Counter(outcome.words for outcome in outcomes)
     return ", ".join(f"{count} {name}" for name, count in counts.most_common())
 
 
@@ -84,6 +84,11 @@ class Outcome(Enum):
     def is_success(self) -> bool:
         """True where nothing went wrong."""
         return self in (Outcome.COMPLETE, Outcome.THROUGH_GATES)
+
+    @property
+    def words(self) -> str:
+        """The outcome in two or three words."""
+        return self.name.lower().replace("_", " ")
 
     def sentence(self, **numbers: object) -> str:
         """Return the sentence with its numbers."""

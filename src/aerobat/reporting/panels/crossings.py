@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerobat.arrays import Array, Mask
+from aerobat.evaluation import Opening
 from aerobat.problem.gate import Gate
 from aerobat.reporting.page import set_scale, size_of, write_by
 from aerobat.reporting.style import BLUE, FAINT, INK, MUTED, PAPER, RED, SMALL, YELLOW
@@ -26,8 +27,7 @@ class Crossings:
     right: Array  # [m] of the opening's centre, NaN where a flight did not cross, (flights,)
     up: Array  # [m] likewise, (flights,)
     wrong: Mask  # true for those that did not pass as they should, (flights,)
-    # [m] width and height of the opening of this kind that 99 % pass, if known
-    smallest: tuple[float, float] | None
+    smallest: Opening | None  # the opening of this kind that 99 % pass, if known
 
     @property
     def crossed(self) -> Mask:
@@ -59,7 +59,7 @@ def draw_opening(axes: Axes, crossings: Crossings) -> None:
     axes.add_patch(Polygon(outline, facecolor=PAPER, edgecolor="none", zorder=0.2))
     axes.add_patch(Polygon(outline, fill=False, edgecolor=YELLOW, linewidth=3.0, zorder=1.5))
     if crossings.smallest is not None:
-        needed = outline * crossings.smallest / opening.size
+        needed = outline * [crossings.smallest.width, crossings.smallest.height] / opening.size
         axes.add_patch(Polygon(needed, fill=False, edgecolor=INK, linewidth=0.9, linestyle=(0, (4, 2))))
     half = np.abs(outline).max(axis=0) * 1.3
     off = np.nanmax(np.abs([crossings.right, crossings.up]), axis=1) if crossings.crossed.any() else half

@@ -69,7 +69,7 @@ def draw_box_around(
         gates: All of which are to be seen open.
     """
     box = box_around(points, pad)
-    camera = best_view(path, gates, box.corners, room_for_box(size_of(axes)))
+    camera = best_view(path, gates, box.corners, _room(axes))
     draw_axes_box(axes, box, camera)
     return box, camera
 
@@ -96,16 +96,16 @@ def draw_axes_box(axes: Axes, box: AxesBox, camera: Camera) -> None:
         _scale(axes, box, camera, axis, per_metre)
 
 
-def room_for_box(size: Array) -> Array:
-    """Return the room [in] that scales leave to a box in a picture of a size (2,), (2,)."""
-    return np.asarray(size - BOX_MARGINS.sum(axis=0))
+def _room(axes: Axes) -> Array:
+    """The width and height [in] that scales leave to a box in axes, (2,)."""
+    return np.asarray(size_of(axes) - BOX_MARGINS.sum(axis=0))
 
 
 def _fit(axes: Axes, box: AxesBox, camera: Camera) -> float:
     """Centre the box in the room that its scales leave, and return the scale [in/m]."""
     picture = camera.project(box.corners)
     low, high = picture.min(axis=0), picture.max(axis=0)
-    per_metre = float((room_for_box(size_of(axes)) / (high - low)).min())
+    per_metre = float((_room(axes) / (high - low)).min())
     centre = (low + high) / 2 + (BOX_MARGINS[1] - BOX_MARGINS[0]) / 2 / per_metre
     set_scale(axes, centre, 1.0 / per_metre)
     axes.set_axis_off()

@@ -12,7 +12,7 @@ import numpy as np
 from aerobat.evaluation.criteria import criterion
 from aerobat.planning import planned_passages
 from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture, said
-from aerobat.reporting.sweeps.figure import known_opening, outcome_name, sweep_figure
+from aerobat.reporting.sweeps.figure import known_opening, sweep_figure
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
 from aerobat.studies.sweep import Share, Sweep
@@ -57,7 +57,7 @@ picture.register(Sweep, sweep_figure)
 def _outcome(outcome: Outcome, share: Share) -> Fact:
     style = "" if outcome.is_success else "red"
     text = f"{share.count}, {share}"
-    return Fact(outcome.name.lower(), share, outcome_name(outcome), text, style=style)
+    return Fact(outcome.name.lower(), share, outcome.words, text, style=style)
 
 
 def _passage(sweep: Sweep, name: str) -> Iterator[Fact]:

@@ -24,7 +24,6 @@ from aerobat.reporting.page import (
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.crossings import Crossings, draw_opening, draw_scatter
 from aerobat.reporting.style import BAND, BLUE, INK, MUTED, RED, SKY, SMALL
-from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
 from aerobat.studies.share import percent
 from aerobat.studies.sweep.flights import PASSED
@@ -79,9 +78,7 @@ def crossings(sweep: Sweep) -> dict[str, Crossings]:
     for name, gate in sweep.passages.items():
         left, up = (np.asarray(sweep.table[f"{name}_{axis}_m"]) for axis in ("lateral", "up"))
         wrong = sweep.table[f"{name}_outcome"] != PASSED
-        smallest = known_opening(sweep, name)
-        sides = None if smallest is None else (smallest.width, smallest.height)
-        found[name] = Crossings(gate, -left, up, wrong, sides)
+        found[name] = Crossings(gate, -left, up, wrong, known_opening(sweep, name))
     return found
 
 
@@ -130,7 +127,7 @@ def _draw_outcomes(figure: Figure, sweep: Sweep, left: float, bottom: float) -> 
     for row, (outcome, share) in enumerate(shares.items()):
         axes.barh(row, 100 * share.fraction, 0.5, color=BLUE if outcome.is_success else RED, linewidth=0.0)
         axes.plot(100 * np.array(share.interval), [row, row], color=INK, linewidth=1.2)
-        name = f"{outcome_name(outcome)}\n{share.count}, {percent(share.fraction)} %"
+        name = f"{outcome.words}\n{share.count}, {percent(share.fraction)} %"
         axes.text(-3.0, row, name, size=SMALL, ha="right", va="center", linespacing=1.15)
     axes.set(xlim=(0.0, 100.0), ylim=(len(shares) - 0.5, -0.5), xlabel="share of flights [%]", yticks=[])
     axes.grid(axis="y", visible=False)
@@ -164,8 +161,3 @@ def known_opening(sweep: Sweep, passage: str) -> Opening | None:
     except SpecError:
         return None
     return found if isfinite(found.scale) else None
-
-
-def outcome_name(outcome: Outcome) -> str:
-    """An outcome in two or three words."""
-    return outcome.name.lower().replace("_", " ")

@@ -9,7 +9,6 @@ import time
 import traceback
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from math import inf, isfinite
@@ -144,20 +143,20 @@ class _Handler(BaseHTTPRequestHandler):
             # a page of another place cannot send this type without asking, which is not answered
             if self.headers.get_content_type() != JSON:
                 raise ValueError("not JSON")
-            question = _question(json.loads(content))
+            page, number, values = _question(json.loads(content))
         except (ValueError, OverflowError, RecursionError):
             self._send(HTTPStatus.BAD_REQUEST, JSON)
             return
-        answer = self._answer(question)
+        answer = self._answer(page, number, values)
         record = {"verdict": None} if answer is None else answer.record()
         self._send(HTTPStatus.OK, JSON, json.dumps(record, allow_nan=False).encode())
 
     def log_message(self, format: str, *args: object) -> None:
         """Say nothing of each request."""
 
-    def _answer(self, question: _Question) -> Answer | None:
+    def _answer(self, page: str, number: int, values: Mapping[str, float]) -> Answer | None:
         try:
-            return self.server.desk.ask(question.page, question.number, question.values, self._has_hung_up)
+            return self.server.desk.ask(page, number, values, self._has_hung_up)
         except Exception:
             traceback.print_exc()
             return BROKEN
@@ -198,22 +197,13 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(content)
 
 
-@dataclass(frozen=True)
-class _Question:
-    """Where the sliders of a page stand."""
-
-    page: str
-    number: int
-    values: Mapping[str, float]
-
-
-def _question(content: Any) -> _Question:
-    """The question that a page sends. Raises ValueError for anything else."""
+def _question(content: Any) -> tuple[str, int, Mapping[str, float]]:
+    """A page, the number of its question, and its sliders' values. Raises ValueError for anything else."""
     match content:
         case {"page": str(page), "number": int(number), "values": dict(values)} if len(page) <= MAX_NAME:
             numbers = {str(key): float(value) for key, value in values.items() if _is_number(value)}
             if len(numbers) == len(values):
-                return _Question(page, number, numbers)
+                return page, number, numbers
     raise ValueError("no question")
 
 
