@@ -150,18 +150,18 @@ class Desk:
             values: Where its sliders stand, by their keys.
             has_hung_up: Whether nobody waits for the answer any more.
         """
-        with self._lock:
-            self._last[page] = max(number, self._last.pop(page, number))
-            if len(self._last) > MAX_PAGES:
-                del self._last[next(iter(self._last))]
 
         def is_superseded() -> bool:
             return self._is_closed or self._last.get(page, number) > number or has_hung_up()
 
-        try:
-            answer = self._worker.submit(self._answer, values, is_superseded)
-        except RuntimeError:  # closed
-            return None
+        with self._lock:  # so that questions are answered in the order in which they are noted
+            self._last[page] = max(number, self._last.pop(page, number))
+            if len(self._last) > MAX_PAGES:
+                del self._last[next(iter(self._last))]
+            try:
+                answer = self._worker.submit(self._answer, values, is_superseded)
+            except RuntimeError:  # closed
+                return None
         return answer.result()
 
     def close(self) -> None:
