@@ -33,28 +33,21 @@ DIGITS = 32767.0  # of 16-bit integers: attitudes to 0.004°
 class Blob:
     """Arrays of a page one after the other, each beginning at a multiple of four bytes."""
 
-    parts: list[bytes] = field(default_factory=list)
-    size: int = 0
+    content: bytearray = field(default_factory=bytearray)
 
     def add(self, values: NDArray[Any], kind: str, scale: float = 1.0) -> dict[str, Any]:
         """Append values / scale as little-endian numbers of a NumPy kind, and return where they are."""
         numbers = values / scale
         packed = (np.rint(numbers) if kind != "f4" else numbers).astype(f"<{kind}").tobytes()
-        place = {"kind": kind, "offset": self.size, "length": values.size, "scale": scale}
-        packed += bytes(-len(packed) % 4)
-        self.parts.append(packed)
-        self.size += len(packed)
+        place = {"kind": kind, "offset": len(self.content), "length": values.size, "scale": scale}
+        self.content += packed + bytes(-len(packed) % 4)
         return place
-
-    def __str__(self) -> str:
-        """All of it as Base64."""
-        return b64encode(b"".join(self.parts)).decode()
 
 
 def packed(scene: Scene) -> dict[str, Any]:
     """Return the scene as its page reads it: its arrays in Base64, and a header with all else."""
     blob = Blob()
-    return {"header": _header(scene, blob), "arrays": str(blob)}
+    return {"header": _header(scene, blob), "arrays": b64encode(blob.content).decode()}
 
 
 def document(scene: Scene, controls: Any = None) -> str:

@@ -24,9 +24,8 @@ class Cameras {
     this.frame();
   }
 
-  // Take a view; the gate's again, that of the next gate.
+  // Take a view; through the gate once more, through the next gate.
   take(view) {
-    if (view === "gate" && !HEADER.gates.length) return;
     if (view === "gate" && this.view === "gate") this.gate = (this.gate + 1) % HEADER.gates.length;
     this.view = view;
     this.touched = false;
@@ -72,7 +71,7 @@ class Cameras {
   // From behind the gate, a little to the side, toward the vehicle that comes through.
   through() {
     const gate = HEADER.gates[this.gate];
-    const [normal, across] = [vector(gate.normal), vector(crossOf(gate))];
+    const [normal, across] = [vector(gate.normal), crossOf(gate)];
     const distance = 2.5 * Math.max(gate.width, gate.height, 1.5 * SPAN) / Math.min(this.camera.aspect, 1);
     const offset = normal.multiplyScalar(distance).addScaledVector(across, 0.28 * distance);
     offset.z += 0.22 * distance;

@@ -10,7 +10,6 @@ class World {
     this.scene = new THREE.Scene();
     this.bounds = bounds();
     this.colourBy = colourBy;
-    this.focus = 0;
     this.labels = [];
     this.scene.add(new THREE.HemisphereLight("#ffffff", "#b9c6d3", 2.1));
     const sun = new THREE.DirectionalLight("#ffffff", 1.9);
@@ -23,7 +22,7 @@ class World {
     for (const { model } of this.moving) this.scene.add(model);
     this.addPlan();
     this.addTracks();
-    this.choose(TRACKS.findIndex((track) => track.failed) > -1 && TRACKS.length > 1 ? TRACKS.findIndex((t) => t.failed) : 0);
+    this.choose(Math.max(TRACKS.findIndex((track) => track.failed), 0));
   }
 
   label(text, position, kind = "") {
@@ -51,7 +50,6 @@ class World {
       grid.position.z = floor + (every - 1) * 1e-5;
       this.scene.add(grid);
     }
-    this.gridStep = step;
   }
 
   // Draw gates, in place of those that are drawn.
@@ -133,8 +131,8 @@ class World {
 
   // Follow another flight.
   choose(index) {
-    this.focus = (index + TRACKS.length) % TRACKS.length;
-    this.track = TRACKS[this.focus];
+    this.focus = index;
+    this.track = TRACKS[index];
     this.paint();
   }
 
@@ -142,7 +140,7 @@ class World {
   paint() {
     for (const line of [this.ahead, this.flown]) if (line) this.remove(line);
     const { position, speeds } = this.track;
-    this.top = Math.max(...TRACKS.map((track) => track.speeds.reduce((a, b) => Math.max(a, b), 0)), 1e-9);
+    this.top = Math.max(...TRACKS.map((track) => greatest(track.speeds)), 1e-9);
     const colours = [];
     for (const k of DRAWN_ROWS) {
       const colour = mixed(RAMP, this.colourBy === "speed" ? speeds[k] / this.top : TIMES[k] / DURATION);
@@ -181,8 +179,7 @@ class World {
     this.drop.position.set(x, y, 0);
     this.drop.scale.z = z - this.bounds.floor;
     this.drop.position.z = z;
-    const row = place(until)[0] + place(until)[1];
-    this.flown.geometry.instanceCount = Math.max(DRAWN_ROWS.findLastIndex((k) => k <= row + 0.5), 0);
+    this.flown.geometry.instanceCount = Math.max(DRAWN_ROWS.findLastIndex((k) => k <= before + part + 0.5), 0);
     this.flown.visible = this.flown.geometry.instanceCount > 0;
     this.others?.forEach((model, k) => {
       model.visible = k !== this.focus;
@@ -208,12 +205,12 @@ class World {
 }
 
 function crossOf(gate) {
-  return vector(gate.up).cross(vector(gate.normal)).toArray();
+  return vector(gate.up).cross(vector(gate.normal));
 }
 
 // Points around a gate's opening, so many times as large as it is.
 function outlineOf(gate, scale = 1) {
-  const [up, across] = [vector(gate.up), vector(crossOf(gate))];
+  const [up, across] = [vector(gate.up), crossOf(gate)];
   const point = ([left, above]) => vector(gate.position).addScaledVector(across, scale * left).addScaledVector(up, scale * above);
   return gate.outline.map(point);
 }
