@@ -51,7 +51,7 @@ def packed(scene: Scene) -> dict[str, Any]:
 
 
 def document(scene: Scene, controls: Any = None) -> str:
-    """The page that replays a scene; with controls, a live page, whose server answers when they change."""
+    """Return the page that replays a scene; with controls a live page, which asks its server for plans."""
     content, is_live = packed(scene), controls is not None
     parts = {
         "title": escape(scene.title),
@@ -67,7 +67,7 @@ def document(scene: Scene, controls: Any = None) -> str:
 
 
 def _embedded(value: Any) -> str:
-    """The value as JSON that ends no script in which it stands."""
+    """Return the value as JSON that cannot end the script element around it."""
     return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
 
 
@@ -76,7 +76,7 @@ def _text(name: str) -> str:
 
 
 def _header(scene: Scene, blob: Blob) -> dict[str, Any]:
-    """All of a scene but its arrays, which go to the blob."""
+    """Return the scene as plain data; its arrays are appended to the blob."""
     vehicle = scene.vehicle
     body = vehicle.bounding_ellipsoid
     top = float(max(np.abs([track.thrusts for track in scene.tracks]).max(), 1e-9))
@@ -134,7 +134,7 @@ def _gate(gate: Gate, blob: Blob, times: Array) -> dict[str, Any]:
 
 
 def _obstacles(surfaces: Sequence[Surface], blob: Blob) -> dict[str, Any]:
-    """All obstacles as triangles, and the lines at which their faces meet."""
+    """Return the triangles of obstacles, and the edges between their faces."""
     triangles = [surface.triangles for surface in surfaces]
     edges = [surface.edges for surface in surfaces]
     return {
@@ -144,7 +144,7 @@ def _obstacles(surfaces: Sequence[Surface], blob: Blob) -> dict[str, Any]:
 
 
 def _track(track: Track, blob: Blob, top: float) -> dict[str, Any]:
-    """A track; its thrusts [N] are at most `top` in size."""
+    """Return a track as plain data; the magnitudes of its thrusts are at most `top` [N]."""
     return {
         "name": track.name,
         "end": track.end,

@@ -1,4 +1,4 @@
-"""Replays: pages that show plans and flights, each one file that asks nothing of any other place."""
+"""Replays: pages that show plans and flights, each one file that loads nothing from elsewhere."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HEAD = 1000  # characters of a page in which it says what it is
 
 @dataclass(frozen=True, repr=False)
 class Replay:
-    """A page that replays a scene; a notebook shows it where it stands."""
+    """A page that replays a scene; notebooks show it inline."""
 
     scene: Scene = field(compare=False)  # all of it is in the page
     html: str
@@ -31,12 +31,12 @@ class Replay:
         return f"Replay({self.scene.title}, {len(self.html) / 1e6:.2f} MB)"
 
     def _repr_html_(self) -> str:
-        """The page in a frame of its own, in which it disturbs nothing."""
+        """The page in a frame, so that its styles and scripts do not affect the notebook."""
         return inline_frame(f'srcdoc="{escape(self.html, quote=True)}"')
 
 
 def inline_frame(content: str) -> str:
-    """A frame in a notebook around a page, which is given as the frame's attribute."""
+    """Return the HTML of a frame for a notebook; `content` is the attribute that holds or names the page."""
     style = "width:100%;border:1px solid #dfe6ec;border-radius:8px"
     return f'<iframe style="{style}" height="{INLINE_HEIGHT}" {content}></iframe>'
 
@@ -85,7 +85,7 @@ def save_replay(replay: Replay, path: PathName) -> None:
 
 
 def require_replaceable(path: PathName) -> None:
-    """Raise SpecError where something is that is no replay."""
+    """Raise SpecError if a file exists at the path and is no replay."""
     try:
         with Path(path).open(encoding="utf-8") as file:
             found = MARK in file.read(HEAD)

@@ -1,4 +1,4 @@
-"""Scenes: what there is to see of a plan or of flights, whichever way it is shown."""
+"""Scenes: the content of a replay page of a plan or of flights."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SAME_PATH = 1e-6  # [m] by which set-points may miss the path that they are of
 
 @dataclass(frozen=True, eq=False)
 class Ghost:
-    """The vehicle as it is planned at one instant."""
+    """The planned pose at one instant."""
 
     name: str  # of the stage, empty where there is none
     position: Array  # [m], (3,)
@@ -57,7 +57,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A quantity over time, of each track."""
+    """A quantity of each track over time."""
 
     name: str
     unit: str
@@ -90,13 +90,13 @@ def scene_of(
     vehicle: Vehicle | str | None = None,
     poses: int = MAX_POSES,
 ) -> Scene:
-    """The scene of a plan, of a flight, or of a batch. Raises SpecError where there is nothing to see.
+    """Return the scene of a plan, a flight or a batch. Raise SpecError where there is nothing to show.
 
     Args:
-        shown: What is looked at.
+        shown: What is shown.
         plan: What was flown, for its gates and stages.
         vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
-        poses: How many are shown at most, of all flights together.
+        poses: The largest number of rows, of all flights together.
     """
     if isinstance(shown, Flight):
         if not shown.vehicles:
@@ -116,7 +116,7 @@ def scene_of(
 
 
 def plan_fits(plan: Plan, flight: Flight) -> bool:
-    """True if a flight is one along a plan's path."""
+    """Return True if the set-points of a flight lie on a plan's path."""
     times = flight.times
     if times[-1] > plan.duration + SAME_PATH:
         return False
@@ -167,7 +167,7 @@ def _scene(
     tracks: tuple[Track, ...],
     curves: tuple[Curve, ...],
 ) -> Scene:
-    """The scene of vehicles that follow set-points, shown at some of their rows."""
+    """Return the scene of vehicles that follow set-points, at some of their rows."""
     gates, setpoint = subject.gates, followed.setpoint
     path = setpoint.flat.position
     batch = f"{len(tracks)} flights of " if isinstance(followed, Flight) and followed.is_batch else ""
@@ -191,13 +191,13 @@ def _scene(
 
 
 def shown_rows(rows: int, flights: int, poses: int = MAX_POSES) -> Rows:
-    """Return the rows that are shown, of so many rows of each flight: every k-th and the last."""
+    """Return the indices of the rows that are shown of flights of `rows` rows: every k-th and the last."""
     stride = ceil(rows / min(MAX_ROWS, poses // flights))
     return np.unique(np.append(np.arange(0, rows, stride), rows - 1))
 
 
 def _track(flight: Flight, plan: Plan | None, vehicle: Vehicle, rows: Rows, number: int | None) -> Track:
-    """A flight as it was judged; of a batch, by its number."""
+    """Return the track of a flight with its score's sentence; `number` is its place in a batch."""
     outcome, sentence = flight.outcome, flight.sentences[0]
     if plan is not None:
         judged = score(flight, plan, vehicle)
@@ -228,7 +228,7 @@ def _facts(tracks: Sequence[Track], flight: Flight, plan: Plan | None) -> tuple[
 
 
 def _left_out(flight: Flight, rows: Rows, flights: int) -> Iterator[str]:
-    """What a scene does not show of its flights, a line each."""
+    """Yield a line for each part of the flights that the scene leaves out."""
     stride = int(rows[1] - rows[0])
     rate = 1.0 / float(np.median(np.diff(flight.times)))
     if stride > 1:
@@ -238,7 +238,7 @@ def _left_out(flight: Flight, rows: Rows, flights: int) -> Iterator[str]:
 
 
 def _errors(flight: Flight, flights: int, rows: Rows) -> tuple[Curve, ...]:
-    """Tracking errors; where rows are left out, the largest until the next that is shown."""
+    """Return the tracking errors; each row shows the largest error up to the next row shown."""
     position, attitude = (
         np.maximum.reduceat(np.atleast_2d(error)[:flights], rows, axis=-1)
         for error in (flight.position_error, flight.attitude_error)
@@ -249,7 +249,7 @@ def _errors(flight: Flight, flights: int, rows: Rows) -> tuple[Curve, ...]:
 def _ghosts(
     stages: Sequence[PlacedStage], times: Array, position: Array, q_world_body: Array
 ) -> tuple[Ghost, ...]:
-    """The planned vehicle at its stages, and where those are few, at equal steps of time."""
+    """Return the planned vehicle at its stages; if they are few, at equal steps of time between them too."""
     instants = [(stage.name, stage.time) for stage in stages if stage.time <= times[-1]]
     if len(instants) < FEW_STAGES:
         steps = np.linspace(times[0], times[-1], GHOSTS + 1).tolist()[1:-1]

@@ -1,1 +1,1 @@
-"""A maneuver that is planned and flown anew whenever somebody moves a slider of its page."""
+"""Live pages: moving a slider plans and flies the maneuver again."""

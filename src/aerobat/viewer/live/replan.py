@@ -1,4 +1,4 @@
-"""Planning and flying anew for sliders that were moved, one question at a time, and the verdict in words."""
+"""Plans and flights for the positions of a live page's sliders, and verdicts on them in words."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from aerobat.viewer.scene import Scene, scene_of
 
 MAX_PAGES = 1000  # whose last questions are known: a browser has fewer open
 
-PATIENCE = 30.0  # [s] of planning: whoever moves a slider waits no longer
+PATIENCE = 30.0  # [s] of planning: users who move a slider wait no longer
 FLIGHTS = 20  # under conditions: enough to see how they spread, few enough to be drawn quickly
-POSES = 6000  # that are shown of all flights together, each some 7 ms of a flip: many would be drawn late
-KEPT = 32  # plans: sliders are moved to and fro
+POSES = 6000  # rows shown of all flights together; more would delay the drawing
+KEPT = 32  # cached plans: sliders are moved to and fro
 
 
 class Superseded(Exception):
-    """The sliders were moved again meanwhile."""
+    """The sliders were moved again before the plan was found."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The verdict on a setting in words, and its scene; None where there is no plan."""
+    """The verdict on a setting in words, and its scene, None where there is no plan."""
 
     word: str
     sentence: str
@@ -40,24 +40,24 @@ class Answer:
 
     @property
     def verdict(self) -> dict[str, Any]:
-        """The words as plain data for the page."""
+        """The verdict as plain data for the page."""
         return {"word": self.word, "sentence": self.sentence, "is_well": self.is_well}
 
     def record(self) -> dict[str, Any]:
-        """All of it as plain data for the page."""
+        """Return verdict and scene as plain data for the page."""
         return {"verdict": self.verdict, "scene": None if self.scene is None else packed(self.scene)}
 
 
 @dataclass
 class Replanner:
-    """Plans and flies a maneuver for wherever its sliders stand; plans are kept while they may come back."""
+    """Plans and flies a maneuver for the positions of its sliders, and caches the plans."""
 
     setting: Setting
     sliders: Sequence[Slider]
     plans: dict[tuple[Any, ...], Plan] = field(default_factory=dict)
 
     def answer(self, values: Mapping[str, float], is_superseded: Callable[[], bool]) -> Answer:
-        """Answer sliders that were moved, by their keys. Raises Superseded once they are moved again."""
+        """Return the answer to slider positions, by keys. Raise Superseded once sliders are moved again."""
         try:
             setting = moved(self.setting, self.sliders, values)
             planned = self.plan(setting, is_superseded)
@@ -68,26 +68,26 @@ class Replanner:
             return Answer("Refused", _capitalized(str(error)), False)
 
     def plan(self, setting: Setting, is_superseded: Callable[[], bool] = lambda: False) -> Plan:
-        """The setting's plan, however it is flown."""
+        """Return the plan of a setting, from the cache if it is there."""
         key = _key(setting)
         if key not in self.plans:
             self.keep(setting, _planned(setting, is_superseded))
         return self.plans[key]
 
     def keep(self, setting: Setting, plan: Plan) -> None:
-        """Keep a plan for when its setting comes back, in place of the oldest."""
+        """Add a plan to the cache, in place of the oldest if the cache is full."""
         if len(self.plans) >= KEPT:
             del self.plans[next(iter(self.plans))]
         self.plans[_key(setting)] = plan
 
 
 def _key(setting: Setting) -> tuple[Any, ...]:
-    """All of a setting that its plan depends on."""
+    """Return the parts of a setting on which its plan depends."""
     return setting.problem, setting.planner, setting.vehicle
 
 
 def flown(plan: Plan, setting: Setting) -> Flight:
-    """The flight of a plan as planned, or under conditions, several of them."""
+    """Return the undisturbed flight of a plan, or several flights under the setting's conditions."""
     if setting.dispersion == 0.0:
         return nominal_flight(plan.trajectory, vehicle_of(plan, None), plan.problem.surroundings)
     conditions = setting.conditions.scaled(setting.dispersion)
@@ -95,7 +95,7 @@ def flown(plan: Plan, setting: Setting) -> Flight:
 
 
 def judged(plan: Plan, flight: Flight) -> Answer:
-    """The answer where there is a plan: certified and well flown, or why not."""
+    """Return the answer for a plan and its flights: feasible, or what is wrong."""
     scene = scene_of(flight, plan, poses=POSES)
     proof = "" if plan.certificate is None else plan.certificate.why
     failed = [track.sentence for track in scene.tracks if track.failed]
@@ -126,10 +126,10 @@ Answering = Callable[[Mapping[str, float], Callable[[], bool]], Answer]
 
 
 class Desk:
-    """Takes questions from many threads and answers them in one thread, one after another.
+    """Answers the questions of many threads in one worker thread, one after another.
 
-    A question is given up, before or while it is answered, once the same page has asked another, or nobody
-    waits for the answer any more.
+    A question is cancelled, before or during its answer, once the same page has sent another one, or the
+    page has closed the connection.
     """
 
     def __init__(self, answering: Answering) -> None:
@@ -142,13 +142,13 @@ class Desk:
     def ask(
         self, page: str, number: int, values: Mapping[str, float], has_hung_up: Callable[[], bool]
     ) -> Answer | None:
-        """The answer to what a page asks; None where it wants none any more, or all is over.
+        """Return the answer to a page's question; None if the question is cancelled, or the desk is closed.
 
         Args:
-            page: Who asks.
-            number: Of its questions, rising: they may come in another order.
-            values: Where its sliders stand, by their keys.
-            has_hung_up: Whether nobody waits for the answer any more.
+            page: The name of the page.
+            number: The number of the question, which rises on a page; questions may arrive in another order.
+            values: The positions of the sliders, by their keys.
+            has_hung_up: Returns True once the page has closed the connection.
         """
 
         def is_superseded() -> bool:
@@ -165,7 +165,7 @@ class Desk:
         return answer.result()
 
     def close(self) -> None:
-        """Give up what is being answered, and answer nothing more."""
+        """Cancel the current question, and answer no further ones."""
         self._is_closed = True
         self._worker.shutdown(wait=False)
 

@@ -1,4 +1,4 @@
-"""The server of a live page: to this machine alone, the page and the answers to its sliders."""
+"""The server of a live page: it serves the page, and answers its questions, to this machine alone."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ BROKEN = Answer("Broken", "Aerobat failed at this, which is its fault; the termi
 
 
 class LiveServer(ThreadingHTTPServer):
-    """Serves one page, and hands its questions to a desk.
+    """Serves one page, and passes its questions to a desk.
 
-    A connection is for one question. Those that send none are closed after a while, and at once where others
-    want their place.
+    A connection serves one request. Idle connections are closed after PATIENCE, and after GRACE where other
+    connections wait.
     """
 
     daemon_threads = True
@@ -53,11 +53,11 @@ class LiveServer(ThreadingHTTPServer):
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """The names by which a browser on this machine may call it."""
+        """The values of the Host header that requests from this machine may have."""
         return tuple(f"{name}:{self.server_port}" for name in (HOST, "localhost"))
 
     def get_request(self) -> tuple[socket.socket, Any]:
-        """Accept a connection; where the process has too many open files, not at once again."""
+        """Accept a connection. Wait a moment after a failure, as when the process has too many open files."""
         try:
             return super().get_request()
         except OSError:
@@ -65,7 +65,7 @@ class LiveServer(ThreadingHTTPServer):
             raise
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Give a connection a thread of its own once there is room for it."""
+        """Handle a connection in its own thread, once fewer than MAX_CONNECTIONS are open."""
         with self._changed:
             while len(self._kept_until) >= MAX_CONNECTIONS:
                 self._close_silent(0.0)
@@ -74,27 +74,27 @@ class LiveServer(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def shutdown_request(self, request: Any) -> None:
-        """Close a connection, and let the next one come."""
+        """Close a connection, and admit the next one."""
         super().shutdown_request(request)
         with self._changed:
             self._kept_until.pop(request, None)
             self._changed.notify()
 
     def service_actions(self) -> None:
-        """Close connections that have been silent for too long, now and then."""
+        """Close connections that have been idle for too long; the server's loop calls this regularly."""
         with self._changed:
             self._close_silent(PATIENCE)
 
     def keep(self, request: socket.socket, duration: float) -> None:
-        """Keep a connection open for this duration [s], even where others wait for its place."""
+        """Keep a connection open for this duration [s], even if other connections wait."""
         with self._changed:
             self._kept_until[request] = time.monotonic() + duration
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing of a page that was closed, or went on to another question, before its answer came."""
+        """Print nothing about a page that closed the connection before its answer came."""
 
     def _close_silent(self, patience: float) -> None:
-        """Shut down the connections whose time ended more than `patience` [s] ago; their threads then end."""
+        """Shut down connections whose time ended more than `patience` [s] ago, which ends their threads."""
         now = time.monotonic()
         for request, until in list(self._kept_until.items()):
             if now > until + patience:
@@ -127,7 +127,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(HTTPStatus.NO_CONTENT, HTML)
 
     def do_POST(self) -> None:
-        """Answer where sliders stand, with what comes of it."""
+        """Answer the positions of the sliders with a verdict and a scene."""
         if not self._is_own_host():
             return
         size = self.headers.get("Content-Length", "")
@@ -152,7 +152,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(HTTPStatus.OK, JSON, json.dumps(record, allow_nan=False).encode())
 
     def log_message(self, format: str, *args: object) -> None:
-        """Say nothing of each request."""
+        """Print nothing about requests."""
 
     def _answer(self, page: str, number: int, values: Mapping[str, float]) -> Answer | None:
         try:
@@ -162,7 +162,7 @@ class _Handler(BaseHTTPRequestHandler):
             return BROKEN
 
     def _has_hung_up(self) -> bool:
-        """True once nobody waits for the answer any more."""
+        """Return True once the page has closed the connection."""
         try:
             self.connection.setblocking(False)
             return not self.connection.recv(1, socket.MSG_PEEK)
@@ -175,14 +175,14 @@ class _Handler(BaseHTTPRequestHandler):
                 self.connection.settimeout(PATIENCE)
 
     def _is_own_host(self) -> bool:
-        """True if the request names this machine as its host; refuse it otherwise."""
+        """Return True if the request names this machine as its host; otherwise refuse the request."""
         if self.headers.get("Host") in self.server.hosts:
             return True
         self._refuse(HTTPStatus.FORBIDDEN)
         return False
 
     def _refuse(self, status: HTTPStatus) -> None:
-        """Answer a question that is not read. The rest of it is thrown away, or it would cut the answer."""
+        """Refuse a request, and discard its body: unread data would cut off the answer."""
         self._send(status, JSON)
         self.connection.shutdown(socket.SHUT_WR)
         while self.rfile.read1(MAX_QUESTION):

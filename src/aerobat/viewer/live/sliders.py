@@ -1,4 +1,4 @@
-"""The sliders of a live page: what of a problem, its planner and its vehicle they change, and how far."""
+"""The sliders of a live page: the numbers of problem, planner and vehicle that they change."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MAX_DISPERSION = 3.0  # times the conditions: most maneuvers fail well before
 
 @dataclass(frozen=True)
 class Setting:
-    """All that sliders change: what is planned, how, for which vehicle, and how it is flown."""
+    """The values that sliders change: problem, planner, vehicle and the conditions of flights."""
 
     problem: Problem
     planner: Planner
@@ -58,16 +58,16 @@ class Slider:
     turn: Callable[[Setting, float], Setting] | None = None  # instead of the field that the key names
 
     def moved(self, setting: Setting, value: float) -> Setting:
-        """The setting with the slider elsewhere. Raises SpecError for a value that makes no sense."""
+        """Return the setting with the slider at `value`. Raise SpecError for a value that makes no sense."""
         return lens(self.key, setting).set(setting, value) if self.turn is None else self.turn(setting, value)
 
     def record(self) -> dict[str, Any]:
-        """Plain data for the page."""
+        """Return the slider as plain data for the page."""
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "turn"}
 
 
 def sliders_of(setting: Setting, plan: Plan) -> tuple[Slider, ...]:
-    """The sliders of a setting, as they stand for its plan."""
+    """Return the sliders of a setting, at the values of its plan."""
     gates = range(len(setting.problem.gates))
     obstacles = range(min(len(setting.problem.environment.obstacles), MAX_OBSTACLES))
     return (
@@ -81,9 +81,9 @@ def sliders_of(setting: Setting, plan: Plan) -> tuple[Slider, ...]:
 
 
 def moved(setting: Setting, sliders: Sequence[Slider], values: Mapping[str, float]) -> Setting:
-    """The setting with some of its sliders elsewhere, by their keys.
+    """Return the setting with some sliders at new values, by their keys.
 
-    Raises SpecError for one that is not there or goes not as far, and for what makes no sense together.
+    Raise SpecError for an unknown key, a value out of range, and values that contradict each other.
     """
     known = {slider.key: slider for slider in sliders}
     for key, value in values.items():
@@ -95,7 +95,7 @@ def moved(setting: Setting, sliders: Sequence[Slider], values: Mapping[str, floa
 
 
 def _gate_sliders(problem: Problem, k: int) -> Iterator[Slider]:
-    """Position and tilt of a gate."""
+    """Yield the sliders of a gate's position and tilt."""
     gate, (lower, upper) = problem.gates[k], problem.path_limits.of(0)
     reach, step = _range(problem)
     for i, axis in enumerate("xyz"):
@@ -106,7 +106,7 @@ def _gate_sliders(problem: Problem, k: int) -> Iterator[Slider]:
 
 
 def _tilt_slider(problem: Problem, k: int) -> Slider:
-    """The turn of a gate about its passage; about the axis of the maneuver's turn, whose part the gate is."""
+    """Return the slider of a gate's tilt about the axis of the maneuver's turn, else about its normal."""
     gate, turn_axis = problem.gates[k], problem.maneuver.turn_axis
     tilt = degrees(gate.angles[2])
     axis = gate.normal
@@ -120,14 +120,14 @@ def _tilt_slider(problem: Problem, k: int) -> Slider:
 
 
 def _with_turned(k: int, axis: Array, stands: float, setting: Setting, tilt: float) -> Setting:
-    """The setting with gate k turned about an axis through its centre.
+    """Return the setting with gate k turned about an axis through its centre.
 
     Args:
-        k: Which gate.
-        axis: Of the turn.
-        stands: The tilt that the gate has [deg].
-        setting: As it was.
-        tilt: That the gate shall have [deg].
+        k: The index of the gate.
+        axis: The axis of the turn.
+        stands: The present tilt [deg].
+        setting: The setting before the turn.
+        tilt: The new tilt [deg].
     """
     turn = so3.about_axis(axis, np.asarray(radians(tilt - stands)))
     gates = list(setting.problem.gates)
@@ -137,7 +137,7 @@ def _with_turned(k: int, axis: Array, stands: float, setting: Setting, tilt: flo
 
 
 def _obstacle_sliders(problem: Problem, k: int) -> Iterator[Slider]:
-    """The place of an obstacle, by its first field that says one; none of one that has no such field."""
+    """Yield the sliders of an obstacle's place, its first field of PLACES; none without such a field."""
     obstacles = problem.environment.obstacles
     fields_of_place = [name for name in PLACES if hasattr(obstacles[k], name)]
     if not fields_of_place:
@@ -154,14 +154,14 @@ def _obstacle_sliders(problem: Problem, k: int) -> Iterator[Slider]:
 
 
 def _with_shifted(k: int, axis: int, stands: float, setting: Setting, place: float) -> Setting:
-    """The setting with obstacle k shifted along an axis.
+    """Return the setting with obstacle k shifted along an axis.
 
     Args:
-        k: Which obstacle.
+        k: The index of the obstacle.
         axis: 0, 1 or 2.
-        stands: The coordinate that it has [m].
-        setting: As it was.
-        place: The coordinate that it shall have [m].
+        stands: The present coordinate [m].
+        setting: The setting before the shift.
+        place: The new coordinate [m].
     """
     environment = setting.problem.environment
     obstacles = list(environment.obstacles)
@@ -174,7 +174,7 @@ def _with_shifted(k: int, axis: int, stands: float, setting: Setting, place: flo
 
 
 def _range(problem: Problem) -> tuple[float, float]:
-    """How far something can be moved to either side [m], and by which steps [m]."""
+    """Return how far gates and obstacles can be moved to either side, and the step of their sliders [m]."""
     places = [end.position for end in problem.ends.values()] + [gate.position for gate in problem.gates]
     size = float(np.ptp(places, axis=0).max()) if places else 0.0  # [m] of what is flown through
     reach = max(0.5 * size, LEAST_REACH)
@@ -183,13 +183,13 @@ def _range(problem: Problem) -> tuple[float, float]:
 
 
 def _round_step(length: float) -> float:
-    """The largest of 1, 2 or 5 times a power of ten that is no longer."""
+    """Return the largest of 1, 2 or 5 times a power of ten that is at most `length`."""
     decade = 10.0 ** floor(log10(length))
     return max(factor * decade for factor in (1.0, 2.0, 5.0) if factor * decade <= length * (1 + 1e-9))
 
 
 def _thrust_sliders(setting: Setting) -> Iterator[Slider]:
-    """The paper's ε: the maneuver's least specific thrusts, whichever it has."""
+    """Yield the sliders of the maneuver's minimum specific thrusts, the paper's ε."""
     maneuver, top = setting.problem.maneuver, setting.vehicle.max_specific_thrust
     for name in get_type_hints(type(maneuver)):
         if name.startswith("min_") and name.endswith("_thrust"):
@@ -202,7 +202,7 @@ def _thrust_sliders(setting: Setting) -> Iterator[Slider]:
 
 
 def _order_slider(setting: Setting, plan: Plan) -> Iterator[Slider]:
-    """The derivative that is the input, of planners that have one."""
+    """Yield the slider of the order, the derivative that is the input, for planners that have one."""
     if plan.order is not None and hasattr(setting.planner, "order"):
         low, high = min(ORDERS[0], plan.order), max(ORDERS[-1], plan.order)
         yield Slider("planner.order", "maneuver", "order", "", low, high, 1, plan.order)

@@ -1,4 +1,4 @@
-"""view_live(): a page with sliders, at which a maneuver is planned and flown anew."""
+"""view_live(): a page with sliders that plan and fly a maneuver again."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Port = Annotated[int, Field(ge=0, le=65535, description="whole number from 0 to 
 
 
 class LiveView:
-    """A live page that is served until it is closed; a notebook shows it where it stands."""
+    """A live page that is served until it is closed; notebooks show it inline."""
 
     def __init__(self, server: LiveServer) -> None:
         self._server = server
@@ -40,12 +40,12 @@ class LiveView:
         return f"http://{HOST}:{self._server.server_port}/"
 
     def wait(self) -> None:
-        """Return when it is closed; Ctrl-C ends the waiting as it ends anything."""
+        """Wait until the page is closed, or for Ctrl-C."""
         while self._thread.is_alive():
             self._thread.join(TICK)
 
     def close(self) -> None:
-        """Serve it no longer, and give up what is being planned."""
+        """Stop serving the page, and cancel its planning."""
         self._server.desk.close()
         self._server.shutdown()
         self._server.server_close()
@@ -106,7 +106,7 @@ def _begun(
     vehicle: Vehicle | str | None,
     conditions: Dispersion,
 ) -> tuple[Setting, Plan]:
-    """The setting at first, and its plan."""
+    """Return the first setting and its plan."""
     if not isinstance(shown, Plan):
         problem, flyer = as_problem(shown), as_vehicle(vehicle or VEHICLE)
         method = planner_for(problem, flyer) if planner is None else as_planner(planner)
@@ -119,7 +119,7 @@ def _begun(
 
 
 def _planner_of(plan: Plan, vehicle: Vehicle) -> Planner:
-    """The planner of a plan's name and order; of a path from elsewhere, the one that suits its problem."""
+    """Return the planner by a plan's name and order; of an imported path, the one that suits its problem."""
     is_known = plan.planner in registered_planners()
     planner = as_planner(plan.planner) if is_known else planner_for(plan.problem, vehicle)
     changes: dict[str, Any] = {"order": plan.order} if hasattr(planner, "order") else {}
