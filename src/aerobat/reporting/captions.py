@@ -11,7 +11,7 @@ from aerobat.simulation.outcome import length
 
 
 def plan_caption(plan: Plan) -> str:
-    """Origin of a plan in a few words."""
+    """Return a line on how a plan was found."""
     dt = "" if plan.dt is None else f" of {plan.dt:.4f} s"
     order = "" if plan.order is None else f", order {plan.order}"
     cost = "" if plan.cost in (None, plan.duration) else f", cost {plan.cost:.6g}"
@@ -20,13 +20,13 @@ def plan_caption(plan: Plan) -> str:
 
 
 def plan_captions(plan: Plan) -> list[str]:
-    """Origin of a plan, its proof, and what its own flights leave to the controller, a line each."""
+    """Return lines on how a plan was found, its proof, and its flyability."""
     found = (plan.certificate, plan.flyability)
     return [plan_caption(plan), *(str(each) for each in found if each is not None)]
 
 
 def score_caption(score: Score) -> str:
-    """Course of a flight in a few words."""
+    """Return a line on a flight's outcome and errors."""
     error = (
         "" if score.outcome.is_success else f"position error at most {length(score.max_position_error_m)}, "
     )
@@ -39,7 +39,7 @@ def score_caption(score: Score) -> str:
 
 
 def error_caption(flight: Flight) -> str:
-    """The largest errors of a flight, or of a batch."""
+    """Return a line on the largest errors of a flight, or of a batch."""
     many = f"{len(flight.vehicles)} flights: " if flight.is_batch else ""
     return (
         f"{many}position error at most {length(float(flight.position_error.max()))}, "

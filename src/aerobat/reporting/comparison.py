@@ -113,7 +113,7 @@ picture.register(Comparison, comparison_figure)
 
 
 def _margin(plan: Plan | None) -> float | None:
-    """By how much [N] the rotors stay within their limits, proven where there is a proof."""
+    """Return the margin of the rotors to their limits [N], the certificate's if there is one."""
     if plan is None:
         return None
     if plan.certificate is not None:
@@ -122,7 +122,7 @@ def _margin(plan: Plan | None) -> float | None:
 
 
 def _name(entry: Entry) -> str:
-    """Label that tells a planner from others of its kind."""
+    """Return the name of a planner with its number of segments."""
     if entry.plan is None:
         return entry.planner
     return f"{entry.planner}, {entry.plan.intervals} segments"
@@ -198,7 +198,7 @@ def _write_reason(figure: Figure, entry: Entry, bottom: float) -> None:
 
 @dataclass(frozen=True, eq=False)
 class NamedPath:
-    """A path with what tells it from others."""
+    """A path with its name and colour."""
 
     name: str
     colour: str
@@ -211,10 +211,10 @@ def draw_overlay(
     """Draw paths from one start to one goal: in the vertical plane that holds them, or in space.
 
     Args:
-        axes: Where to draw.
-        paths: In their colours.
-        gates: All gates of the problem, one that moves where each path passes it.
-        pieces: Of obstacles, which are drawn where they are near.
+        axes: The axes.
+        paths: The paths.
+        gates: The gates of the problem; a moving gate is drawn where each path passes it.
+        pieces: The convex pieces of obstacles, which are drawn where they are near.
     """
     surfaces, points = surfaces_beside(pieces, [*(path.position for path in paths), gate_corners(gates)])
     plane = plane_of(points)

@@ -55,5 +55,5 @@ def _row(measured: ErrorCauses, result: TrialResult) -> Iterator[Fact]:
 
 
 def _quantile(errors: Any, level: float) -> float:
-    """One of the errors, so that none between a finite one and an infinite one is made up."""
+    """Return a quantile that is one of the errors: interpolation to infinite errors is meaningless."""
     return float(np.quantile(errors, level, method="higher"))

@@ -89,7 +89,7 @@ class Rows(tuple[Any, ...]):
 
 @singledispatch
 def facts(result: object) -> Iterator[Fact]:
-    """Yield the facts of a result. Raises SpecError for what is none.
+    """Yield the facts of a result. Raise SpecError for other values.
 
     The facts of a dataclass without a registered function are its fields, for files alone.
     """
@@ -109,7 +109,7 @@ def _(result: Facts) -> Iterator[Fact]:
 
 @singledispatch
 def picture(result: object) -> Figure | None:
-    """The figure of a result; None of one that has none."""
+    """Return the figure of a result, or None."""
     drawn = _registered(picture, result)
     return None if drawn is None else drawn(result)
 
@@ -120,7 +120,7 @@ def fields_of(result: Any) -> Iterator[Fact]:
 
 
 def said(label: str, text: str, level: int = EXPLAIN, style: str = "") -> Fact:
-    """A fact for people alone."""
+    """Return a fact for people alone."""
     return Fact("", None, label, text, level=level, style=style)
 
 
@@ -130,7 +130,7 @@ def kept(**values: Any) -> Iterator[Fact]:
 
 
 def _registered(generic: Any, result: object) -> Any:
-    """Import the module of `TOLD_IN` for a result, and return the function registered; None without one."""
+    """Import the module of `TOLD_IN` for a result, and return its registered function, or None."""
     own = generic.dispatch(object)
     for cls in type(result).__mro__:
         rooms = [room for room in TOLD_IN if f"{cls.__module__}.".startswith(f"{room}.")]

@@ -105,7 +105,7 @@ def _(found: Estimates) -> Iterator[Fact]:
 
 
 def _report(score: Score) -> Iterator[Fact]:
-    """Yield what came of a flight in the lines of a report."""
+    """Yield the lines of a report on a flight."""
     if not score.outcome.is_success:
         yield said("flight", score.sentence, level=REPORT, style="red")
         return
@@ -133,7 +133,7 @@ def _span(values: Sequence[float], unit: str) -> str:
 
 
 def _within_tolerance(score: Score) -> str:
-    """How far at most a flight is off the goal and the stages that are kept to the problem's tolerance."""
+    """Return the largest distances of a flight from goal and stages, beside the problem's tolerance."""
     parts = []
     if score.places:
         miss, allowed = max((place.miss, place.radius) for place in score.places)
@@ -146,13 +146,13 @@ def _within_tolerance(score: Score) -> str:
 
 
 def _names(places: Sequence[WaypointPassage]) -> str:
-    """What is to be come to beside gates and waypoints, in words."""
+    """Name the places to reach besides gates and waypoints: stages, the goal, or both."""
     stages = len(places) - sum(place.waypoint == GOAL for place in places)
     return GOAL if not stages else f"{stages} stages" + (f" and {GOAL}" if len(places) > stages else "")
 
 
 def _observer(found: ObserverScore) -> str:
-    """The filter's errors, and where it had to do without poses."""
+    """Return the errors of the filter, and the time in which it had no poses."""
     errors = (
         f"{length(found.rms_position_error_m)} and {digits(found.rms_attitude_error_deg)}° RMS off the truth"
     )

@@ -16,11 +16,11 @@ from aerobat.reporting.tables import table
 
 COLUMNS = 120  # letters to a line of a table
 PRE = '<pre style="line-height: 1.3; overflow-x: auto">{code}</pre>'
-KEPT = 8  # pictures: a notebook asks for one twice
+KEPT = 8  # cached pictures: notebooks request each one twice
 
 
 def html(value: Any) -> str:
-    """HTML of a result: its facts, under its picture where it has one."""
+    """Return the HTML of a result: its facts, under its picture if it has one."""
     console = Console(record=True, file=StringIO(), width=COLUMNS, force_jupyter=False)
     console.print(table(value))
     text = console.export_html(inline_styles=True, code_format=PRE)
@@ -32,7 +32,7 @@ def html(value: Any) -> str:
 
 
 def png(value: Any) -> bytes | None:
-    """The picture of a result as PNG; None where it has none, or what is to be drawn is not known."""
+    """Return the picture of a result as PNG; None if it has none, or its vehicle is not known."""
     try:
         hash(value)
     except TypeError:

@@ -1,4 +1,4 @@
-"""Pages and what stands where on them; matplotlib's drawing library without pyplot, its window manager."""
+"""The layout of pages, drawn by matplotlib without pyplot, its window manager."""
 
 from __future__ import annotations
 
@@ -32,9 +32,10 @@ DPI = 140  # 1610 pixels across a page
 
 
 def spread_out(wanted: Array, pitch: float, low: float, high: float) -> Array:
-    """Places (k,) at least `pitch` apart, as near to the wanted ones as can be (least squares), in order.
+    """Return places (k,) at least `pitch` apart and nearest to the wanted ones (least squares), in order.
 
-    They stay between `low` and `high` where there is room. Isotonic regression by pooling neighbours.
+    The places lie between `low` and `high` if there is room. The method is isotonic regression by pooling
+    neighbours.
     """
     order = np.argsort(wanted, kind="stable")
     steps = pitch * np.arange(len(wanted))
@@ -51,9 +52,9 @@ def spread_out(wanted: Array, pitch: float, low: float, high: float) -> Array:
 
 
 def import_undocumented() -> None:
-    """Import what draws figures without the docstrings of its setters, a third of the time that it takes.
+    """Import matplotlib without the docstrings of its setters, a third of the import's time.
 
-    It is for a process in which nobody reads them.
+    The function is for processes in which nobody reads these docstrings.
     """
     if "matplotlib.figure" in sys.modules:
         return
@@ -70,7 +71,7 @@ def import_undocumented() -> None:
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Whatever is drawn inside looks as `style` says, whatever the user's own matplotlib settings."""
+    """Draw with the settings of `style` in place of the user's own matplotlib settings."""
     import matplotlib
 
     with matplotlib.rc_context(cast(Any, RC)):  # its stub lists every key
@@ -78,13 +79,13 @@ def house_style() -> Iterator[None]:
 
 
 def blank_page(height: float, title: str, facts: Sequence[str], warnings: Sequence[str] = ()) -> Figure:
-    """A page with its title and lines under it.
+    """Return a page with its title and lines under it.
 
     Args:
-        height: What remains below them [in].
-        title: The page's.
-        facts: A line each.
-        warnings: A line each, in red.
+        height: The height that remains below them [in].
+        title: The title.
+        facts: The lines under the title.
+        warnings: More lines, in red.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -106,17 +107,17 @@ def write(figure: Figure, x: float, y: float, text: str, **options: Any) -> None
 
 
 def panel(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    """Axes at a place given in inches from the page's lower left corner."""
+    """Return axes at a place given in inches from the page's lower left corner."""
     across, up = figure.get_size_inches()
     return figure.add_axes((left / across, bottom / up, width / across, height / up))
 
 
 def column(figure: Figure, height: float, rows: Sequence[float]) -> list[Axes]:
-    """Axes one above the other; as it draws them, matplotlib finds their size and makes room for their texts.
+    """Return axes one above the other, whose sizes matplotlib finds so that their texts have room.
 
     Args:
-        figure: Of `blank_page`.
-        height: What remains below the page's lines [in].
+        figure: A figure of `blank_page`.
+        height: The height that remains below the page's lines [in].
         rows: The heights of the axes, relative to each other.
     """
     part = height / float(figure.get_size_inches()[1])
@@ -125,12 +126,12 @@ def column(figure: Figure, height: float, rows: Sequence[float]) -> list[Axes]:
 
 
 def size_of(axes: Axes) -> Array:
-    """Width and height of axes [in], (2,)."""
+    """Return the width and height of axes [in], (2,)."""
     return np.asarray(cast("Figure", axes.figure).get_size_inches() * axes.get_position().size)
 
 
 def set_scale(axes: Axes, centre: Array, per_inch: float) -> None:
-    """Show so many units of data an inch along both axes, about a centre (2,)."""
+    """Show `per_inch` units of data an inch along both axes, about a centre (2,)."""
     half = size_of(axes) * per_inch / 2
     (left, bottom), (right, top) = centre - half, centre + half
     axes.set(xlim=(left, right), ylim=(bottom, top))
@@ -145,13 +146,13 @@ def write_by(
 
 
 def heading(axes: Axes, title: str, note: str = "", left: float = 0.0) -> None:
-    """A title above axes, and a note under it; both so far [in] left of the axes' edge."""
+    """Write a title above axes, and a note under it, both `left` [in] to the left of the axes' edge."""
     write_by(axes, title, (0.0, 1.0), (-left, HEADING), size=TITLE, weight="bold", va="bottom")
     write_by(axes, note, (0.0, 1.0), (-left, 0.1), size=SMALL, color=MUTED, va="bottom")
 
 
 def legend(axes: Axes, above: float) -> None:
-    """The names of what is drawn in a row above axes, at the right [in]; nothing when nothing has a name."""
+    """Write the labels of axes in a row `above` [in] them, at the right; nothing where there are none."""
     handles, names = axes.get_legend_handles_labels()
     if handles:
         place = (1.0, 1.0 + above / float(size_of(axes)[1]))
@@ -162,7 +163,7 @@ def legend(axes: Axes, above: float) -> None:
 
 
 def png(figure: Figure) -> bytes:
-    """The bytes of a figure's PNG file: the same for the same data, deflated fast."""
+    """Return a figure as PNG, the same bytes for the same data, compressed for speed."""
     file = BytesIO()
     with house_style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)  # a box stands for it

@@ -31,7 +31,7 @@ def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
     Raises BackendMissing without pandas, SpecError for what is no result, or has no such table.
 
     Args:
-        result: What it is of.
+        result: The result.
         table: The key of another of its tables, as "stages" of a plan.
     """
     pandas = import_extra("pandas", "to_dataframe needs pandas", "aerobat[pandas]")

@@ -93,7 +93,7 @@ def _(plan: Plan) -> Iterator[Fact]:
 
 
 def evidence(plan: Plan | None) -> Iterator[Fact]:
-    """Yield what is known of a plan beside its proof; None of no plan."""
+    """Yield the facts of a plan beside its proof; their values are None without a plan."""
     yield Fact("recoveries", plan and plan.recoveries)
     found = None if plan is None else plan.assessment
     another = "" if plan is None or plan.planner == "free-knots" else ", --planner free-knots plans anew"
@@ -231,7 +231,7 @@ def _within(found: Finding, limit: float) -> str:
 
 
 def _beside_least(found: Assessment) -> str:
-    """How near a duration is to the proven lower bound."""
+    """Return in words how near a duration is to the proven lower bound."""
     if found.ratio == inf:
         return ""
     if found.ratio < 1.0:
@@ -243,7 +243,7 @@ def _beside_least(found: Assessment) -> str:
 
 
 def _margin(found: Flyability) -> str:
-    """How much thrust a plan leaves to the controller."""
+    """Return in words how much thrust a plan leaves to the controller."""
     kept_fraction = found.disturbed_fraction
     if not found.disturbance:
         return f"no thrust is left to the controller: too little for a real flight; try {MORE_MARGIN}"
@@ -280,7 +280,7 @@ def _tube(tube: Tube, duration: float) -> Iterator[Fact]:
 
 
 def _reached(found: Assessment) -> str:
-    """The room that a path takes, its greatest speed, its tilt and its rate."""
+    """Return the extent of a path, its largest speed, tilt and body rate, in words."""
     angles = ((found.max_tilt, "° of tilt"), (found.max_body_rate, "°/s"))
     turned = [f"{degrees(angle):.0f}{unit}" for angle, unit in angles if angle is not None]
     return ", ".join([str(found.room), f"{found.max_speed:.0f} m/s", *turned])

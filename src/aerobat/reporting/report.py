@@ -46,14 +46,10 @@ class Report:
     trials: Trials | None = None  # flights under random conditions, where they were flown
 
     @property
-    def is_reliable(self) -> bool:
-        """False unless it is proven that enough flights under random conditions succeed, if any are flown."""
-        return self.trials is None or self.trials.proven
-
-    @property
     def is_well(self) -> bool:
-        """True if the plan is certified and flies, and where it was flown, it and enough others succeed."""
-        flew_well = self.score is None or (self.score.outcome.is_success and self.is_reliable)
+        """True if the plan is certified and flies, and its flight and enough trials, if any, succeed."""
+        is_reliable = self.trials is None or self.trials.proven
+        flew_well = self.score is None or (self.score.outcome.is_success and is_reliable)
         return self.plan.certified and self.plan.flies and flew_well
 
 
@@ -76,7 +72,7 @@ def _(report: Report) -> Iterator[Fact]:
 
 
 def _of_trials(trials: Trials) -> Fact:
-    """The flights under random conditions, and what is to be done where too few succeed."""
+    """Return the fact of the flights under random conditions, with the remedy if too few succeed."""
     name, share = trials.conditions.name, trials.share
     low, high = share.interval
     values = kept(
@@ -104,7 +100,7 @@ def _verdict(report: Report) -> str:
         return "certified, but not flyable"
     if report.score is not None and not report.score.outcome.is_success:
         return "certified, but this flight fails"
-    if report.trials is not None and not report.is_reliable:
+    if report.trials is not None and not report.trials.proven:
         conditions = f"under '{report.trials.conditions.name}' conditions"
         if report.trials.refuted:
             return f"certified, but too few flights succeed {conditions}"

@@ -18,13 +18,13 @@ HeadedFact = tuple[str, Fact]  # the heading that a fact stands under, and the f
 
 
 def table(result: Any, least: int = REPORT, most: int = EXPLAIN, title: str = "") -> Group:
-    """A result for people: lines, a fact a row, and rows under their headings.
+    """Return the tables of a result: lines, a fact a row, and rows under their headings.
 
     Args:
-        result: What is told.
-        least: The first level that is told.
-        most: The last one; of a report's lines alone no headings are needed.
-        title: In place of the result's own first line.
+        result: The result.
+        least: The lowest level of the facts that are shown.
+        most: The highest level; the lines of a report, level 0, have no headings.
+        title: A first line in place of the result's own.
     """
     headed = [
         (heading if most else "", fact)
@@ -43,7 +43,7 @@ def print_table(table: Table | Group) -> None:
 
 
 def _headed_facts(result: Any, heading: str = "", inner: bool = False) -> Iterator[HeadedFact]:
-    """Yield the facts that a table shows, with their headings; a result within another has no lines."""
+    """Yield the facts that a table shows, with their headings; results within a result have no lines."""
     for fact in facts(result):
         if fact.text is not None or _is_plain(fact.value):
             shown = fact.value if fact.text is None else fact.text
@@ -80,7 +80,7 @@ def _kind(fact: Fact) -> str:
 
 
 def _facts_table(headed: Iterable[HeadedFact]) -> Table:
-    """Facts, one a row, under their headings."""
+    """Return a table of facts, one a row, under their headings."""
     made = Table(show_header=False, box=None)
     made.add_column(style="bold", no_wrap=True)
     made.add_column(no_wrap=True)
@@ -93,7 +93,7 @@ def _facts_table(headed: Iterable[HeadedFact]) -> Table:
 
 
 def _rows(rows: list[tuple[Fact, ...]]) -> Table:
-    """Results of a kind, one a row; numbers at the right of their columns."""
+    """Return a table of results of one kind, one a row, with numbers aligned right."""
     made = Table(box=None, pad_edge=False)
     shown = [[fact for fact in row if fact.label] for row in rows]
     for k, column in enumerate(zip(*shown, strict=True)):

@@ -76,7 +76,7 @@ def vehicle_row(vehicle: Vehicle) -> Facts:
 
 
 def _weaknesses(vehicle: Vehicle) -> Iterator[str]:
-    """What leaves a vehicle little or nothing to maneuver by."""
+    """Yield a sentence for each property that leaves a vehicle little thrust or bandwidth to maneuver."""
     if vehicle.dead_rotors:
         return
     grounded = _why_grounded(vehicle)

@@ -43,11 +43,11 @@ LINES: tuple[Place, ...] = tuple((4.78, AXIS + 1.38 * k, 2.28, 1.0) for k in (2,
 
 
 class MovingPicture:
-    """The picture of a subject; what does not move is drawn once.
+    """The picture of a subject at any instant; the parts that do not move are drawn once.
 
     Args:
-        subject: What it is of.
-        dpi: Pixels to the inch.
+        subject: The subject.
+        dpi: The resolution [pixels/in].
     """
 
     def __init__(self, subject: Subject, dpi: int) -> None:
@@ -82,7 +82,7 @@ class MovingPicture:
 
     @property
     def duration(self) -> float:
-        """From start to end [s]."""
+        """The duration of the plan, or of the flight [s]."""
         return float(self._reference.times[-1])
 
     @property
@@ -106,7 +106,7 @@ class MovingPicture:
         return np.array(self._canvas.buffer_rgba())[..., :3]
 
     def _draw_scene(self) -> Camera:
-        """The box around the scene, and from where it is seen."""
+        """Draw the box around the scene, and return the camera."""
         subject, path = self._subject, self._reference.path
         points = [path, *(poses.path for poses in self._moved), gate_corners(subject.gates)]
         self._surfaces, held = surfaces_beside(subject.pieces, points)
@@ -116,7 +116,7 @@ class MovingPicture:
         return camera
 
     def _draw_timelines(self) -> list[Axes]:
-        """Errors and rotor thrusts over time; of a plan its rotor thrusts."""
+        """Draw rotor thrusts over time, and a flight's errors above them; return the axes."""
         subject = self._subject
         column = [panel(self._figure, *LINES[-1])]
         if isinstance(subject.shown, Flight):
@@ -132,7 +132,7 @@ class MovingPicture:
 
     @cached_property
     def _standing(self) -> list[Shape]:
-        """The shapes that stand still: gates, obstacles, and the path that is to be flown."""
+        """The shapes that stand still: gates, obstacles and the reference path."""
         path = self._reference.path
         shapes = [Shape(shadow(path, self._floor), edge=HAIR, width=2.5, depth_bias=-1e3)]
         shapes += polyline(path, BAND, 3.2, depth_bias=-BELOW * self._reference.extent)
@@ -141,7 +141,7 @@ class MovingPicture:
         return shapes + [shape for gate in still for shape in gate_shapes(gate)]
 
     def _moving(self, time: float) -> list[Shape]:
-        """Vehicles at an instant, the paths that they have flown by then, and the stages that are behind."""
+        """Return the shapes of vehicles at an instant, their paths until then, and the stages passed."""
         moved = [each.at(time) for each in self._surfaces if each.motion is not None]
         shapes = [*obstacle_shapes(moved, self._camera), *self._passed(time)]
         gates = [gate.at(time) for gate in self._subject.gates if gate.motion is not None]
@@ -161,14 +161,14 @@ class MovingPicture:
         return shapes
 
     def _passed(self, time: float) -> list[Shape]:
-        """The first vehicle at the stages until an instant, nearly transparent."""
+        """Return the first vehicle at the stages until an instant, nearly transparent."""
         poses = self._moved[0]
         rows = poses.rows([stage.time for stage in self._subject.stages if stage.time <= time])
         each = (self._vehicle(poses.position[k], poses.q_world_body[k], opacity=0.35) for k in rows)
         return list(chain.from_iterable(each))
 
     def _vehicle(self, position: Array, q_world_body: Array, opacity: float = 1.0) -> list[Shape]:
-        """The vehicle's glyph."""
+        """Return the vehicle's glyph."""
         face = side_face(q_world_body, self._camera)
         if not isinstance(face, str):
             face = face[0], opacity * face[1]

@@ -47,12 +47,12 @@ def write_video(
     file cannot be written; BackendMissing without imageio-ffmpeg.
 
     Args:
-        shown: What is looked at.
-        path: Of the file.
+        shown: What is shown.
+        path: The file to write.
         plan: What was flown, for its gates and stages.
         vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
-        speed: Of time in the video, 1 as it was flown [-].
-        progress: Told after each frame how many are drawn, and of how many.
+        speed: The speed of time in the video, 1 as it was flown [-].
+        progress: Called after each frame with the number of frames drawn, and of all frames.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in ENCODING:
@@ -67,7 +67,7 @@ def write_video(
 
 
 def frame_times(duration: float, speed: float) -> NDArray[np.float64]:
-    """The instants [s] of a video's frames; the last one stays. Raises SpecError where they are too many."""
+    """Return the instants [s] of a video's frames; the last one is held. Raise SpecError for too many."""
     count = duration / speed * FPS
     if count > MAX_FRAMES:
         raise SpecError(
@@ -89,7 +89,7 @@ def _frames(
 def _encode(
     ffmpeg: str, size: tuple[int, int], file: Path, suffix: str, frames: Iterator[NDArray[np.uint8]]
 ) -> None:
-    """Have FFmpeg make a file of frames. Raises OSError, with what FFmpeg said, where it fails."""
+    """Write a file of frames by FFmpeg. Raise OSError with FFmpeg's own message where it fails."""
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(FPS), "-i", "-"]
     command = [ffmpeg, "-y", "-v", "error", *source, *ENCODING[suffix], str(file)]
     group = 0 if os.name == "posix" else None  # of its own: Ctrl-C is ours

@@ -1,4 +1,4 @@
-"""A gate's plane as who passes it upright sees it: its opening, and where flights crossed."""
+"""A gate's plane as seen by an upright vehicle that passes it: the opening, and where flights crossed."""
 
 from __future__ import annotations
 
@@ -85,13 +85,13 @@ def draw_scatter(axes: Axes, crossings: Crossings) -> None:
 
 
 def _draw_crossings(axes: Axes, crossings: Crossings, half: Array, scale: float) -> None:
-    """Dots, blue and red, to one scale along both axes; those beyond are counted in the picture's corner.
+    """Draw blue and red dots to one scale along both axes, and the number of those beyond the picture.
 
     Args:
-        axes: Where to draw.
-        crossings: What to draw.
-        half: Width and height of the picture at least, half of them, in its unit, (2,).
-        scale: Of its unit to the metre.
+        axes: The axes.
+        crossings: The crossings.
+        half: Half the least width and height of the picture, in its unit, (2,).
+        scale: The units of the picture per metre.
     """
     set_scale(axes, np.zeros(2), 2.0 * float((half / size_of(axes)).max()))
     half = np.array([axes.get_xlim()[1], axes.get_ylim()[1]])

@@ -65,7 +65,7 @@ class Keyframe:
 
 @dataclass(frozen=True, eq=False)
 class Keyframes:
-    """Instants of a plan with what the vehicle is asked there."""
+    """Instants of a plan with the planned poses and thrusts."""
 
     instants: tuple[Keyframe, ...]
     position: Array  # [m], (k, 3)
@@ -88,7 +88,7 @@ class Keyframes:
         return replace(self, instants=instants)
 
     def shortened(self, letters: int) -> Keyframes:
-        """The same, names of more letters cut off."""
+        """The keyframes with names of at most this many letters."""
         names = [k.name if len(k.name) <= letters else f"{k.name[: letters - 1]}…" for k in self.instants]
         instants = tuple(replace(k, name=name) for k, name in zip(self.instants, names, strict=True))
         return replace(self, instants=instants)
@@ -97,9 +97,9 @@ class Keyframes:
         """Lay the keyframes out in a row, each turned about the vertical until its thrust lies in the plane.
 
         Args:
-            plane: That is shown.
-            downward: True where they follow one another downward, false for to the right.
-            pitch: From one to the next [m].
+            plane: The plane of the picture.
+            downward: True for a column, false for a row to the right.
+            pitch: The distance from one to the next [m].
 
         Returns:
             The keyframes, each with the heading of its own plane, and their turns, (k, 4).

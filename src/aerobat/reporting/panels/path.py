@@ -60,11 +60,11 @@ def draw_path(
     without a gate are marked by diamonds.
 
     Args:
-        axes: Where to draw.
-        subject: What is drawn; the picture holds each of its gates.
-        reference: The poses that were planned.
-        actual: Those of each flight; empty where nothing was flown.
-        size: Of the vehicle as drawn, relative to the path's extent.
+        axes: The axes.
+        subject: The subject; the picture holds all of its gates.
+        reference: The planned poses.
+        actual: The poses of each flight; empty for a plan that is not flown.
+        size: The size of the vehicle as drawn, relative to the path's extent.
 
     Returns:
         A note on how the vehicle is drawn.
@@ -102,16 +102,16 @@ def draw_path(
 
 
 def _least_distance(gates: Sequence[Gate]) -> float:
-    """The least distance between the centres of two gates [m], of those that are not the same place."""
+    """Return the least distance between the centres of two gates at different places [m]."""
     centres = np.array([gate.position for gate in gates]).reshape(-1, 3)
     apart = np.linalg.norm(centres[:, None] - centres, axis=-1)
     return float(apart[apart > 0.0].min(initial=np.inf))
 
 
 def pose_samples(poses: PoseHistory, size: float, gates: Sequence[Gate]) -> tuple[list[int], float]:
-    """At which rows to draw the vehicle: one in each gate, and equal steps of time [s] from the first.
+    """Return the rows at which the vehicle is drawn, in gates and at equal steps of time, and the step [s].
 
-    Those at which it would cover one already drawn are left out.
+    Rows at which the vehicle would cover one already drawn are left out.
     """
     step = float(np.ptp(poses.times)) / POSES
     kept = poses.rows_at_gates(gates) or [0]
@@ -124,7 +124,7 @@ def pose_samples(poses: PoseHistory, size: float, gates: Sequence[Gate]) -> tupl
 
 
 def _path_shapes(reference: PoseHistory, actual: Sequence[PoseHistory], floor: float) -> list[Shape]:
-    """The reference path as a band with its shadow, the actual one as a line on it, many as thin lines."""
+    """Return the reference path as a band with its shadow, an actual path as a line, several as thin ones."""
     shapes = [Shape(shadow(reference.path, floor), edge=HAIR, width=3.0, depth_bias=-1e3)]
     width = REFERENCE_WIDTH if actual else ALONE_WIDTH
     shapes += polyline(reference.path, BAND, width, depth_bias=-BELOW * reference.extent)
@@ -137,7 +137,7 @@ def _path_shapes(reference: PoseHistory, actual: Sequence[PoseHistory], floor: f
 
 
 def _mark_stages(axes: Axes, camera: Camera, reference: PoseHistory, stages: Sequence[PlacedStage]) -> None:
-    """A diamond on the reference path at each stage; in the legend its name, or what many are."""
+    """Draw a diamond on the reference path at each stage, and name it in the legend; several are "stages"."""
     if stages:
         rows = reference.rows([stage.time for stage in stages])
         axes.plot(

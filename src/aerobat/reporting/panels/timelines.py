@@ -44,11 +44,11 @@ def clearances(position: Array, q_world_body: Array, vehicle: Vehicle, pieces: P
     """Return the distances [m] of the body from the nearest of pieces, negative where they overlap, (T,).
 
     Args:
-        position: Of the centre of mass [m], (T, 3).
+        position: The positions of the centre of mass [m], (T, 3).
         q_world_body: The attitudes, (T, 4).
-        vehicle: Whose body it is.
-        pieces: Of which there is one at least.
-        times: At which they are where they are then [s], (T,).
+        vehicle: The vehicle.
+        pieces: The convex pieces of obstacles, one or more.
+        times: The times, which place moving obstacles [s], (T,).
     """
     body = vehicle.bounding_ellipsoid
     offsets, shapes = body.turned(q_world_body)
@@ -119,7 +119,7 @@ def fit_to_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
 
 
 def note_cut_off(axes: Axes, what: str) -> None:
-    """Say in the upper right corner what an upright axis cuts off."""
+    """Write in the upper right corner which values lie beyond the vertical axis."""
     write_by(
         axes, f"cut off: {what}".replace("-", "−"), (1.0, 1.0), (-0.06, -0.06), size=SMALL, color=MUTED,
         ha="right", va="top", bbox={"fc": "white", "ec": "none", "pad": 1.5}, zorder=4.0,
@@ -127,7 +127,7 @@ def note_cut_off(axes: Axes, what: str) -> None:
 
 
 def rotor_colours(vehicle: Vehicle) -> list[str]:
-    """A colour a rotor: shades of blue for counter-clockwise ones, of grey for clockwise ones."""
+    """Return the colours of rotors: shades of blue for counter-clockwise ones, of grey for clockwise ones."""
     from matplotlib.colors import to_hex, to_rgb
 
     colours = [""] * len(vehicle.rotors)

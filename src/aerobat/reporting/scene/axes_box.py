@@ -62,11 +62,11 @@ def draw_box_around(
     """Draw the axes box around points, seen from where a path and gates are seen best; return both.
 
     Args:
-        axes: Where to draw.
-        points: All that the box holds [m], (n, 3).
-        pad: By which it is wider [m].
+        axes: The axes.
+        points: Points that the box holds [m], (n, 3).
+        pad: The distance from the points to the sides [m].
         path: Positions [m], (T, 3).
-        gates: All of which are to be seen open.
+        gates: The gates, of which the openings are to be seen.
     """
     box = box_around(points, pad)
     camera = best_view(path, gates, box.corners, _room(axes))

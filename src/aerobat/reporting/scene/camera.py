@@ -47,8 +47,8 @@ def best_view(path: Array, gates: Sequence[Gate], corners: Array, size: Array) -
 
     Args:
         path: Positions [m], (T, 3).
-        gates: All of which are to be seen open.
-        corners: Of the box that is fitted into the picture [m], (8, 3).
+        gates: The gates, of which the openings are to be seen.
+        corners: The corners of the box that is fitted into the picture [m], (8, 3).
         size: The picture's width and height, (2,).
     """
     azimuths, elevations = np.deg2rad(np.arange(-180.0, 180.0, 5.0)), np.deg2rad([20.0, 27.0])
@@ -82,7 +82,7 @@ def _depth(cameras: list[Camera]) -> Array:
 
 
 def _custom(path: Array, cameras: list[Camera]) -> Array:
-    """Small preferences among equals, (cameras,)."""
+    """Preferences between views that score the same otherwise, (cameras,)."""
     travel = path[-1] - path[0]
     travel = travel / max(float(np.linalg.norm(travel)), 1.0)
     onward = np.array([camera.screen[0] @ travel for camera in cameras])

@@ -49,12 +49,12 @@ def vehicle_shapes(
     """A vehicle at a position (3,) in an attitude (4,): arms and masts, then a disc for each rotor.
 
     Args:
-        vehicle: Whose rotors are drawn.
-        position: Of its centre of mass [m], world, (3,).
+        vehicle: The vehicle.
+        position: The position of its centre of mass [m], world, (3,).
         q_world_body: Its attitude, (4,).
-        scale: By which it is drawn larger than it is.
-        face: Of the discs.
-        weight: Of all lines, relative to the usual one.
+        scale: The factor by which it is drawn larger than it is.
+        face: The colour of the discs.
+        weight: The width of all lines, relative to the usual one.
     """
     shapes, discs = [], []
     for rotor in vehicle.rotors:
@@ -83,9 +83,9 @@ def direction_marks(path: Array, rows: Sequence[int], camera: Camera, size: floa
 
     Args:
         path: Positions [m], (T, 3).
-        rows: Where the arrowheads lie; none where the path runs toward the viewer, or stands still.
-        camera: That they face.
-        size: Of an arrowhead [m].
+        rows: The rows of the arrowheads; none where the path runs toward the viewer, or stands still.
+        camera: The camera that they face.
+        size: The length of an arrowhead [m].
     """
     shapes = []
     for k in rows:

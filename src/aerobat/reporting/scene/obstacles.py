@@ -22,12 +22,12 @@ CELLS = 12  # to which the longest side of what is shown is cut: each is before 
 def surfaces_beside(
     pieces: Sequence[ConvexPiece], points: Sequence[Array], times: Array | None = None
 ) -> tuple[tuple[Surface, ...], Array]:
-    """Return what is seen of obstacles around points, and all points that a picture must hold, (n, 3).
+    """Return the surfaces of obstacles around points, and all points that a picture must hold, (n, 3).
 
     Args:
-        pieces: Of the obstacles.
-        points: Of paths and gates [m], (n, 3) each.
-        times: At which those that move are seen [s]; without any as they are at first, with their motion.
+        pieces: The convex pieces of the obstacles.
+        points: Points of paths and gates [m], (n, 3) each.
+        times: The times at which moving obstacles are drawn [s]; by default they keep their motion.
     """
     surfaces = surfaces_around(pieces, np.concatenate(points)) if pieces else ()
     if times is not None:
