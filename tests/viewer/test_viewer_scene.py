@@ -125,6 +125,14 @@ def test_where_there_is_nothing_to_show_one_sentence_says_so(shown, sentence) ->
         scene_of(shown(), vehicle=vehicle)
 
 
+def test_a_batch_without_flights_has_no_figure_and_notebooks_show_its_line() -> None:
+    empty = first(dispersed(), 0)
+    with pytest.raises(ab.SpecError, match="the batch holds no flights"):
+        ab.draw(empty)
+    assert empty._repr_png_() is None
+    assert "0 flights" in empty._repr_html_()
+
+
 def test_a_plan_fits_its_own_flights_alone() -> None:
     assert plan_fits(shared_plan("half-flip"), simulated("half-flip"))
     assert not plan_fits(shared_plan("flip-roll"), simulated("half-flip"))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from aerobat.environment import Environment
 from aerobat.environment.obstacles import ConvexPiece
+from aerobat.errors import SpecError
 from aerobat.flatness import vehicle_of
 from aerobat.planning import PlacedStage, Plan
 from aerobat.problem import Gate
@@ -50,7 +51,9 @@ class Subject:
 
 
 def subject_of(shown: Plan | Flight, plan: Plan | None, vehicle: Vehicle | str | None) -> Subject:
-    """Return the subject of a plan, or of flights. Raise SpecError where the vehicle is not known.
+    """Return the subject of a plan, or of flights.
+
+    Raise SpecError for a batch without flights, and where the vehicle is not known.
 
     Args:
         shown: What is shown.
@@ -59,4 +62,8 @@ def subject_of(shown: Plan | Flight, plan: Plan | None, vehicle: Vehicle | str |
     """
     if isinstance(shown, Plan):
         return Subject(shown, shown, vehicle_of(shown, vehicle))
+    if not shown.vehicles:
+        raise SpecError(
+            "the batch holds no flights, so that there is nothing to show; fly one vehicle or more"
+        )
     return Subject(shown, plan, as_vehicle(vehicle or (plan and plan.vehicle) or shown.vehicles[0]))

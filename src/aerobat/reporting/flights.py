@@ -197,7 +197,9 @@ def _pair(largest: float, rms: float, unit: str) -> str:
 
 
 def _rows_of(flight: Flight) -> dict[str, Any]:
-    """The columns of a flight, or of a batch."""
+    """Return the columns of a flight, or of a batch; none for a batch without flights."""
+    if not flight.vehicles:
+        return {}
     if not flight.is_batch:
         return _columns(flight)
     each = [_columns(flight[k]) for k in range(len(flight))]

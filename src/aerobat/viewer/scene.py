@@ -98,16 +98,11 @@ def scene_of(
         vehicle: What flew, or its name; by default the plan's, or the preset of the flight's name.
         poses: The largest number of rows, of all flights together.
     """
-    if isinstance(shown, Flight):
-        if not shown.vehicles:
-            raise SpecError(
-                "the batch holds no flights, so that there is nothing to show; fly one vehicle or more"
-            )
-        if len(shown.times) < 2:
-            raise SpecError("the flight has one row, so that nothing moves; show one of two rows or more")
     subject = subject_of(shown, plan, vehicle)
     if isinstance(shown, Plan):
         return _plan_scene(subject, shown)
+    if len(shown.times) < 2:
+        raise SpecError("the flight has one row, so that nothing moves; show one of two rows or more")
     own = subject.vehicle
     if shown.thrusts.shape[-1] != len(own.rotors):
         rotors = f"{shown.thrusts.shape[-1]} rotors, {own.name} has {len(own.rotors)}"
