@@ -59,7 +59,7 @@ class Player {
       this.cameras.look(this.world);
       this.enlarge();
     }
-    this.choose(this.world?.focus ?? 0);
+    this.choose(this.world?.track.index ?? 0);
     this.mark();
   }
 

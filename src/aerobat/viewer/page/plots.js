@@ -57,7 +57,7 @@ class Plot {
       if (behind && k === focus) return;
       parts.push(this.path(line, behind ? 0.25 : 1, this.legend ? 1.4 : 1));
     });
-    if (behind || this.lines.length === 1) parts.push(this.path(this.lines[Math.min(focus, this.lines.length - 1)], 1, 1.7));
+    if (!this.legend) parts.push(this.path(this.lines[focus], 1, 1.7));
     this.svg.innerHTML = parts.join("");
     this.moving.innerHTML = `<path class="cursor" stroke="${COLOUR.ink}" stroke-width="1.2"/>`;
     this.cursor = this.moving.querySelector(".cursor");
@@ -80,7 +80,7 @@ class Plot {
 
   // The lines whose values are told: of one flight.
   shown(focus) {
-    return this.legend ? this.lines : [this.lines[Math.min(focus, this.lines.length - 1)]];
+    return this.legend ? this.lines : [this.lines[focus]];
   }
 
   // Move the cursor to a time.

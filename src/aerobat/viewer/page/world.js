@@ -131,7 +131,6 @@ class World {
 
   // Follow another flight.
   choose(index) {
-    this.focus = index;
     this.track = TRACKS[index];
     this.paint();
   }
@@ -182,7 +181,7 @@ class World {
     this.flown.geometry.instanceCount = Math.max(DRAWN_ROWS.findLastIndex((k) => k <= before + part + 0.5), 0);
     this.flown.visible = this.flown.geometry.instanceCount > 0;
     this.others?.forEach((model, k) => {
-      model.visible = k !== this.focus;
+      model.visible = k !== this.track.index;
       if (model.visible) TRACKS[k].pose(time, model);
     });
   }
