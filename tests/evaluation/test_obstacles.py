@@ -203,7 +203,7 @@ def test_a_plan_whose_own_flight_touches_is_not_flyable_and_the_report_names_the
 
 def _told(result: object) -> str:
     """What is said of the nearest obstacle."""
-    (found,) = {x.said for each in facts(result) for x in _inner(each) if x.label == "nearest"}
+    (found,) = {x.words for each in facts(result) for x in _inner(each) if x.label == "nearest"}
     return found
 
 

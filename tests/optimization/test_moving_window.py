@@ -163,7 +163,7 @@ def test_a_plan_placed_in_windows_states_its_gap() -> None:
     assert plan.cost is not None
     assert plan.bound <= plan.cost
     assert plan.gap == pytest.approx(1.0 - plan.bound / plan.cost, abs=1e-9)
-    said = {fact.label: fact.said for fact in facts(plan)}
+    said = {fact.label: fact.words for fact in facts(plan)}
     if plan.gap > 1e-6:
         assert any("% of the optimum" in str(each) for each in said.values())
 

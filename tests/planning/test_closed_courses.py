@@ -125,7 +125,7 @@ def test_a_flight_begins_in_the_laps_state_and_is_judged_and_timed_all_the_way_r
     (lap,) = score.laps
     assert lap.end == lap.duration == pytest.approx(plan.duration, abs=1e-3)
     assert plan.laps == (pytest.approx(plan.duration),)
-    (lap_1,) = (fact.said for fact in facts(score) if fact.label == "lap 1")
+    (lap_1,) = (fact.words for fact in facts(score) if fact.label == "lap 1")
     assert lap_1 == f"{lap.duration:.3f} s, until {lap.end:.3f} s"
     assert ab.score_flights(plan)[0].laps[0].duration == pytest.approx(lap.duration, abs=1e-6)
 

@@ -114,7 +114,7 @@ def test_what_a_limit_left_of_a_comparison_says_how_far_from_the_shortest_possib
     assert entry.note.startswith(told)
     if found.bound is None:  # else it is a program's own, whose cost is another
         (cost,) = (fact for fact in facts(found) if fact.key == "cost")
-        assert cost.said.endswith(told)
+        assert cost.words.endswith(told)
 
 
 @pytest.mark.slow

@@ -185,7 +185,7 @@ def _write_facts(figure: Figure, comparison: Comparison, entry: Entry, bottom: f
     """Numbers beside a timeline, and what became of the flight below them."""
     for x, fact in zip(PLACES, _drawn(comparison, entry), strict=True):
         wrong = fact.key == "certified" and not entry.certified
-        write(figure, x, bottom + 0.6, fact.said, size=TITLE, color=RED if wrong else INK)
+        write(figure, x, bottom + 0.6, fact.words, size=TITLE, color=RED if wrong else INK)
     notes = (f"planned in {entry.planning_time:.2f} s", entry.note, entry.outcome)
     note = fill("; ".join(filter(None, notes)), 72)
     write(figure, PLACES[0], bottom + 0.42, note, size=SMALL, color=MUTED, va="top")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.reporting.facts import Fact, Facts, facts, kept
+from aerobat.reporting.facts import Fact, Facts, facts, record
 from aerobat.simulation.outcome import length
 from aerobat.studies.error_causes import ErrorCauses, TrialResult
 
@@ -24,8 +24,8 @@ def _(measured: ErrorCauses) -> Iterator[Fact]:
     vehicle = None if plan.vehicle is None else plan.vehicle.name
     name = "" if vehicle is None else f" · {vehicle}"
     yield Fact("", text=f"{plan.problem.name}{name} · {conditions}, {len(measured)} flights a row")
-    yield from kept(problem=plan.problem.name, vehicle=vehicle, conditions=conditions)
-    yield from kept(flights=len(measured), seed=measured.seed)
+    yield from record(problem=plan.problem.name, vehicle=vehicle, conditions=conditions)
+    yield from record(flights=len(measured), seed=measured.seed)
     yield Fact("causes", [Facts(_row(measured, result)) for result in measured.results], "causes")
     yield Fact("", text=CAPTION)
 

@@ -21,7 +21,7 @@ REPORT, EXPLAIN = 0, 1  # levels: the lines of a run's report; all that there is
 WARNING = "warning"  # the label of facts that a table tells last
 NONE = "–"  # in place of a number that there is not
 
-# the rooms of results, each with the module that tells them, imported when there is one to tell
+# the packages of results, each with the module of their facts, imported with the first result
 TOLD_IN = {
     "aerobat.certification": "plans",
     "aerobat.planning": "plans",
@@ -44,9 +44,9 @@ TOLD_IN = {
 class Fact:
     """A fact of a result.
 
-    Without a key it is for people alone, without label and text for files alone. A text without a label is a
-    line of its own, above or below a table. A value may be a result, whose facts are told in its place, or a
-    sequence of results, rows of a table.
+    A fact without a key is in tables only, a fact without label and text in files only. A text without a
+    label is a line of its own, above or below a table. A value may be a result, whose facts stand in its
+    place, or a sequence of results, the rows of a table.
     """
 
     key: str  # in JSON and data frames, ending in its unit: "duration_s"
@@ -59,7 +59,7 @@ class Fact:
     style: str = ""  # red: something is wrong
 
     @property
-    def said(self) -> str:
+    def words(self) -> str:
         """The fact in words."""
         if self.text is not None:
             return self.text
@@ -72,17 +72,17 @@ class Fact:
 
 
 class Facts(tuple[Fact, ...]):
-    """Facts that are told together: a result without a class of its own."""
+    """Several facts as one result, without a class of its own."""
 
     __slots__ = ()
 
 
 class Columns(dict[str, Any]):
-    """A table by its columns, (rows,) each: for data frames, and too long for JSON."""
+    """A table by its columns, (rows,) each; it is in data frames only, as it is too long for JSON."""
 
 
 class Rows(tuple[Any, ...]):
-    """A table by its rows, each a result; one without rows is a table too."""
+    """A table by its rows, each a result; there may be none."""
 
     __slots__ = ()
 
@@ -91,7 +91,7 @@ class Rows(tuple[Any, ...]):
 def facts(result: object) -> Iterator[Fact]:
     """Yield the facts of a result. Raise SpecError for other values.
 
-    The facts of a dataclass without a registered function are its fields, for files alone.
+    The facts of a dataclass without a registered function are its fields, in files only.
     """
     function = _registered(facts, result)
     if function is not None:
@@ -115,17 +115,17 @@ def picture(result: object) -> Figure | None:
 
 
 def fields_of(result: Any) -> Iterator[Fact]:
-    """Yield the fields of a dataclass, for files alone."""
+    """Yield the fields of a dataclass as facts that are in files only."""
     yield from (Fact(field.name, getattr(result, field.name)) for field in fields(result))
 
 
-def said(label: str, text: str, level: int = EXPLAIN, style: str = "") -> Fact:
-    """Return a fact for people alone."""
+def line(label: str, text: str, level: int = EXPLAIN, style: str = "") -> Fact:
+    """Return a fact that is in tables only."""
     return Fact("", None, label, text, level=level, style=style)
 
 
-def kept(**values: Any) -> Iterator[Fact]:
-    """Yield facts for files alone."""
+def record(**values: Any) -> Iterator[Fact]:
+    """Yield facts that are in files only."""
     yield from (Fact(key, value) for key, value in values.items())
 
 

@@ -13,7 +13,7 @@ from aerobat.estimation import Estimates
 from aerobat.evaluation.criteria import GOAL
 from aerobat.evaluation.score import METRICS, ObserverScore, Score
 from aerobat.flatness import Reference
-from aerobat.reporting.facts import NONE, REPORT, Columns, Fact, facts, fields_of, kept, picture, said
+from aerobat.reporting.facts import NONE, REPORT, Columns, Fact, facts, fields_of, line, picture, record
 from aerobat.reporting.plans import rough_length
 from aerobat.simulation import Flight
 from aerobat.simulation.flight import setpoint_series
@@ -42,38 +42,38 @@ def _(score: Score) -> Iterator[Fact]:
         yield Fact("flights", Columns(_flights_of(score)))
         return
     yield from (fact for fact in fields_of(score) if fact.key not in EVENTS)
-    yield from kept(outcome=score.outcome, sentence=score.sentence, laps=score.laps)
+    yield from record(outcome=score.outcome, sentence=score.sentence, laps=score.laps)
     yield from _report(score)
     for lap in score.laps:
         split = "not flown" if isnan(lap.duration) else f"{lap.duration:.3f} s, until {lap.end:.3f} s"
-        yield said(f"lap {lap.lap}", split, level=REPORT)
-    yield said("outcome", score.sentence)
+        yield line(f"lap {lap.lap}", split, level=REPORT)
+    yield line("outcome", score.sentence)
     position = _pair(100 * score.max_position_error_m, 100 * score.rms_position_error_m, "cm")
-    yield said("position error", position)
+    yield line("position error", position)
     attitude = _pair(score.max_attitude_error_deg, score.rms_attitude_error_deg, "°")
-    yield said("attitude error", attitude)
+    yield line("attitude error", attitude)
     if score.observer is not None:
-        yield said("observer", _observer(score.observer))
+        yield line("observer", _observer(score.observer))
     several = bool(score.laps)
     for passage in score.passages:
-        yield said(_of_lap(passage.gate, passage.lap, several), _passed(passage))
+        yield line(_of_lap(passage.gate, passage.lap, several), _passed(passage))
     for waypoint in score.waypoints:
         met = (
             f"{length(waypoint.miss)} from it, {length(waypoint.radius)} allowed, "
             f"at {waypoint.speed:.2f} m/s at {waypoint.time:.2f} s"
         )
         missed = "not reached" if isnan(waypoint.time) else met
-        yield said(_of_lap(waypoint.waypoint, waypoint.lap, several), missed)
+        yield line(_of_lap(waypoint.waypoint, waypoint.lap, several), missed)
     if score.nearest is not None:
-        yield said("nearest", _nearest(score.nearest))
+        yield line("nearest", _nearest(score.nearest))
     if score.places or score.attitudes:
-        yield said("tolerance", _within_tolerance(score))
-    yield said("saturated", f"{100 * score.saturated_fraction:.1f} % of the time")
+        yield line("tolerance", _within_tolerance(score))
+    yield line("saturated", f"{100 * score.saturated_fraction:.1f} % of the time")
 
 
 @facts.register
 def _(found: NearestObstacle) -> Iterator[Fact]:
-    yield from kept(obstacle=found.obstacle or None, clearance_m=found.clearance, time_s=found.time)
+    yield from record(obstacle=found.obstacle or None, clearance_m=found.clearance, time_s=found.time)
 
 
 @facts.register
@@ -107,7 +107,7 @@ def _(found: Estimates) -> Iterator[Fact]:
 def _report(score: Score) -> Iterator[Fact]:
     """Yield the lines of a report on a flight."""
     if not score.outcome.is_success:
-        yield said("flight", score.sentence, level=REPORT, style="red")
+        yield line("flight", score.sentence, level=REPORT, style="red")
         return
     gates = [passage for passage in score.passages if not isnan(passage.time)]
     if gates:
@@ -115,15 +115,15 @@ def _report(score: Score) -> Iterator[Fact]:
         speeds = _span([passage.speed for passage in gates], "m/s")
         clearances = [passage.clearance for passage in gates if not isnan(passage.clearance)]
         clear = f", {rough_length(min(clearances))} clear of the frame" if clearances else ""
-        yield said(name, f"passed at {speeds}{clear}", level=REPORT)
+        yield line(name, f"passed at {speeds}{clear}", level=REPORT)
     if score.waypoints:
         nearest = max(waypoint.miss for waypoint in score.waypoints)
         reached = f"{len(score.waypoints)} reached within {rough_length(nearest)}"
-        yield said("waypoints", reached, level=REPORT)
+        yield line("waypoints", reached, level=REPORT)
     if score.nearest is not None:
-        yield said("nearest", _nearest(score.nearest), level=REPORT)
+        yield line("nearest", _nearest(score.nearest), level=REPORT)
     within = f"on its path within {rough_length(score.max_position_error_m)}"
-    yield said("flight", within, level=REPORT)
+    yield line("flight", within, level=REPORT)
 
 
 def _span(values: Sequence[float], unit: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import validated
-from aerobat.reporting.facts import Fact, Facts, facts, kept, picture
+from aerobat.reporting.facts import Fact, Facts, facts, picture, record
 from aerobat.reporting.page import blank_page, column, heading, house_style
 from aerobat.reporting.style import BLUE, FAINT, INK, RED
 from aerobat.studies.inspection import CAUSES, ErrorShare, Inspection
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @facts.register
 def _(found: Inspection) -> Iterator[Fact]:
     yield Fact("verdict", found.verdict, text=found.verdict)
-    yield from kept(
+    yield from record(
         cause=found.cause,
         inner_loop_fault=None if found.fault is None else found.fault.cause,
         max_position_error_m=found.largest,
@@ -31,12 +31,12 @@ def _(found: Inspection) -> Iterator[Fact]:
     yield Fact("shares", found.shares, "shares")
     yield from (Fact("", text=remark) for remark in found.remarks)
     place = found.alignment
-    yield from kept(
+    yield from record(
         command_delay_s=found.delay,
         saturated_fraction=found.saturated,
         has_observer=found.observed,
         alignment=Facts(
-            kept(
+            record(
                 time_shift_s=place.time_shift,
                 yaw_deg=float(np.rad2deg(place.yaw)),
                 translation_m=place.translation,

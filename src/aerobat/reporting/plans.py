@@ -14,7 +14,18 @@ from aerobat.planning import Assessment, Attempt, Flyability, Plan, Tube
 from aerobat.planning.flyability import FlownPassage
 from aerobat.planning.heading.follow import heading_error
 from aerobat.planning.time_limit import best_by_limit
-from aerobat.reporting.facts import REPORT, WARNING, Fact, Facts, Rows, facts, fields_of, kept, picture, said
+from aerobat.reporting.facts import (
+    REPORT,
+    WARNING,
+    Fact,
+    Facts,
+    Rows,
+    facts,
+    fields_of,
+    line,
+    picture,
+    record,
+)
 from aerobat.simulation.autopilot import Recoveries
 from aerobat.simulation.outcome import length
 
@@ -37,11 +48,11 @@ def _(plan: Plan) -> Figure:
 @facts.register
 def _(plan: Plan) -> Iterator[Fact]:
     margin, certificate, found = plan.margin, plan.certificate, plan.assessment
-    yield said("", plan.problem.name + ("" if plan.vehicle is None else f" · {plan.vehicle.name}"))
+    yield line("", plan.problem.name + ("" if plan.vehicle is None else f" · {plan.vehicle.name}"))
     order = "" if plan.order is None else f", order {plan.order}"
     backend = f", {plan.backend}" if plan.backend else ""
     yield Fact("planner", plan.planner, "planner", f"{plan.planner}{order}, {plan.pieces}{backend}")
-    yield from kept(order=plan.order, intervals=plan.intervals, dt_s=plan.dt)
+    yield from record(order=plan.order, intervals=plan.intervals, dt_s=plan.dt)
     beside = "" if found is None or found.poor else _beside_least(found)
     yield Fact("duration_s", plan.duration, "duration", f"{plan.duration:.2f} s{beside}", level=REPORT)
     yield Fact("rescue", plan.rescue, "rescue", level=REPORT)
@@ -50,26 +61,26 @@ def _(plan: Plan) -> Iterator[Fact]:
         most, usual = degrees(off.largest), degrees(off.median)
         text = f"{plan.problem.heading.mode}, {usual:.3g}° off, at worst {most:.3g}° at {off.time:.2f} s"
         yield Fact("heading_error_deg", most, "heading", text, level=REPORT)
-        yield from kept(heading_error_median_deg=usual, heading_error_time_s=off.time)
+        yield from record(heading_error_median_deg=usual, heading_error_time_s=off.time)
     dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
-    yield said("search", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts")
+    yield line("search", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts")
     cost = ""
     if plan.cost is not None:
         sized = "the duration" if plan.cost == plan.duration else f"{plan.cost:.7g}"
         cost = f"{sized}, {_optimality(plan)}"
     yield Fact("cost", plan.cost, "cost", cost)
-    yield from kept(attempts=Rows(plan.attempts), status=plan.status, bound=plan.bound, gap=plan.gap)
-    yield from kept(backend=plan.backend, starts_s=plan.starts, spread=plan.spread)
+    yield from record(attempts=Rows(plan.attempts), status=plan.status, bound=plan.bound, gap=plan.gap)
+    yield from record(backend=plan.backend, starts_s=plan.starts, spread=plan.spread)
     if plan.spread is not None:
         coarse = f"{plan.starts[0]:.3f} to {plan.starts[-1]:.3f} s on a coarse mesh"
-        yield said("starts", f"{len(plan.starts)}, {coarse}, {100 * plan.spread:.2g} % apart")
+        yield line("starts", f"{len(plan.starts)}, {coarse}, {100 * plan.spread:.2g} % apart")
     solved = f"{plan.nodes}, solved in {1000 * plan.solve_time:.0f} ms"
     yield Fact("nodes", plan.nodes, "nodes", solved)
     yield Fact("solve_time_s", plan.solve_time)
     label, when = "stages", [f"{stage.name} at {stage.time:.2f} s" for stage in plan.stages]
     if plan.dt is not None:
         label, when = "stage intervals", [f"{stage.name} {stage.interval}" for stage in plan.stages]
-    stages = [Facts(kept(name=s.name, interval=s.interval, time_s=s.time)) for s in plan.stages]
+    stages = [Facts(record(name=s.name, interval=s.interval, time_s=s.time)) for s in plan.stages]
     yield Fact("stages", stages, label, ", ".join(when))
     yield Fact("lap_ends_s", plan.laps)
     laps = ", ".join(f"{duration:.3f} s" for duration in plan.lap_times)
@@ -89,7 +100,7 @@ def _(plan: Plan) -> Iterator[Fact]:
     yield Fact("tube", plan.tube and Facts(_tube(plan.tube, plan.duration)))
     if plan.wants_second_opinion:
         text = "it may take longer than need be; --explain asks another planner"
-        yield said(WARNING, text, level=REPORT, style="red")
+        yield line(WARNING, text, level=REPORT, style="red")
 
 
 def evidence(plan: Plan | None) -> Iterator[Fact]:
@@ -99,24 +110,24 @@ def evidence(plan: Plan | None) -> Iterator[Fact]:
     another = "" if plan is None or plan.planner == "free-knots" else ", --planner free-knots plans anew"
     if plan is not None and found is not None and not found.poor:
         suspicion = f"; suspicious: --explain asks for a second opinion{another}"
-        yield said("possible", found.sentence + (suspicion if plan.wants_second_opinion else ""))
+        yield line("possible", found.sentence + (suspicion if plan.wants_second_opinion else ""))
     yield Fact("assessment", found)
 
 
 @facts.register
 def _(attempt: Attempt) -> Iterator[Fact]:
-    yield from kept(dt_s=attempt.dt, duration_s=attempt.duration, feasible=attempt.feasible)
-    yield from kept(status=attempt.status, outcome=attempt.outcome, cost=attempt.cost, nodes=attempt.nodes)
-    yield from kept(solve_time_s=attempt.solve_time)
+    yield from record(dt_s=attempt.dt, duration_s=attempt.duration, feasible=attempt.feasible)
+    yield from record(status=attempt.status, outcome=attempt.outcome, cost=attempt.cost, nodes=attempt.nodes)
+    yield from record(solve_time_s=attempt.solve_time)
 
 
 @facts.register
 def _(found: Flyability) -> Iterator[Fact]:
     if found.defects:
-        yield said("not flyable", str(found), level=REPORT, style="red")
+        yield line("not flyable", str(found), level=REPORT, style="red")
     else:
-        yield said("margin", _margin(found), level=REPORT)
-    yield from kept(flies=found.flies, error_m=found.error, disturbance_n=found.disturbance)
+        yield line("margin", _margin(found), level=REPORT)
+    yield from record(flies=found.flies, error_m=found.error, disturbance_n=found.disturbance)
     yield Fact("disturbed_fraction", found.disturbed_fraction)
     yield Fact("disturbed_error_m", found.disturbed_error)
     yield Fact("passages", found.passages)
@@ -127,28 +138,28 @@ def _(found: Flyability) -> Iterator[Fact]:
 @facts.register
 def _(passage: FlownPassage) -> Iterator[Fact]:
     error, tolerance = map(_in_degrees, (passage.attitude_error, passage.attitude_tolerance))
-    yield from kept(gate=passage.gate, attitude_error_deg=error, attitude_tolerance_deg=tolerance)
-    yield from kept(clearance_m=passage.clearance, failure=passage.failure or None)
+    yield from record(gate=passage.gate, attitude_error_deg=error, attitude_tolerance_deg=tolerance)
+    yield from record(clearance_m=passage.clearance, failure=passage.failure or None)
 
 
 @facts.register
 def _(found: Recoveries) -> Iterator[Fact]:
-    yield from kept(reaction_s=found.reaction, ground_m=found.ground, times_s=found.times)
-    yield from kept(lowest_m=found.lowest, height_lost_m=found.height_lost, durations_s=found.durations)
+    yield from record(reaction_s=found.reaction, ground_m=found.ground, times_s=found.times)
+    yield from record(lowest_m=found.lowest, height_lost_m=found.height_lost, durations_s=found.durations)
     spans = np.array([[span.start, span.end] for span in found.no_return]).reshape(-1, 2)  # numbers, no table
-    yield from kept(no_return_s=spans)
+    yield from record(no_return_s=spans)
     yield Fact("sentence", str(found), "recovery")
 
 
 @facts.register
 def _(found: Assessment) -> Iterator[Fact]:
-    yield from kept(least_duration_s=found.least_duration, ratio=found.ratio, suspicious=found.suspicious)
-    yield from kept(poor=found.poor, second_opinion=found.opinion, lowest_m=found.lowest)
-    yield from kept(max_speed_m_s=found.max_speed, max_tilt_rad=found.max_tilt)
-    yield from kept(max_body_rate_rad_s=found.max_body_rate, warnings=found.warnings, sentence=str(found))
+    yield from record(least_duration_s=found.least_duration, ratio=found.ratio, suspicious=found.suspicious)
+    yield from record(poor=found.poor, second_opinion=found.opinion, lowest_m=found.lowest)
+    yield from record(max_speed_m_s=found.max_speed, max_tilt_rad=found.max_tilt)
+    yield from record(max_body_rate_rad_s=found.max_body_rate, warnings=found.warnings, sentence=str(found))
     yield Fact("room_m", [found.room.lower, found.room.upper], "space", _reached(found), level=REPORT)
     for warning in found.warnings:
-        yield said(WARNING, warning, level=REPORT, style="red")
+        yield line(WARNING, warning, level=REPORT, style="red")
 
 
 @facts.register
@@ -159,11 +170,11 @@ def _(found: Certificate) -> Iterator[Fact]:
     is passed as it is asked has one row.
     """
     yield Fact("", text="certificate")
-    yield from kept(certified=found.certified, margin_n=found.margin, findings=found.findings)
+    yield from record(certified=found.certified, margin_n=found.margin, findings=found.findings)
     yield Fact("", _finding_rows(found.findings), "findings")
     yield Fact("why", found.why, text=("" if found.certified else "not certified: ") + found.why)
-    yield from kept(undetermined=found.undetermined, discontinuities=found.discontinuities)
-    yield from kept(too_unequal=found.too_unequal)
+    yield from record(undetermined=found.undetermined, discontinuities=found.discontinuities)
+    yield from record(too_unequal=found.too_unequal)
 
 
 @facts.register
@@ -217,11 +228,11 @@ def _limiting(found: Certificate) -> Iterator[Fact]:
     """The rotor nearest to its limit, and what else is next to its own; or why a plan is not certified."""
     worst, binding = found.worst, found.binding
     if not found.certified or worst is None or worst.limit is None:
-        yield said("not proven", found.why, level=REPORT, style="red")
+        yield line("not proven", found.why, level=REPORT, style="red")
         return
-    yield said("limited by", _within(worst, worst.limit), level=REPORT)
+    yield line("limited by", _within(worst, worst.limit), level=REPORT)
     if binding is not None and binding.limit is not None:
-        yield said("and by", _within(binding, binding.limit), level=REPORT)
+        yield line("and by", _within(binding, binding.limit), level=REPORT)
 
 
 def _within(found: Finding, limit: float) -> str:
@@ -261,12 +272,12 @@ def rough_length(metres: float) -> str:
 def _tube(tube: Tube, duration: float) -> Iterator[Fact]:
     """The proof that flights pass, what it costs a plan of that duration [s], and their tube over time."""
     price = tube.price(duration)
-    yield from kept(conditions=tube.conditions, seed=tube.seed, probability=tube.probability)
-    yield from kept(passed=tube.passed, flights=tube.flights, lower_bound=tube.lower_bound)
-    yield from kept(reserve=tube.reserve, plain_duration_s=tube.plain_duration, price_s=price)
-    yield from kept(level=tube.level, times_s=tube.times, position_error_m=tube.position_error)
-    yield from kept(attitude_error_deg=[degrees(angle) for angle in tube.attitude_error])
-    yield from kept(rotor_margin=tube.rotor_margin, sentence=str(tube))
+    yield from record(conditions=tube.conditions, seed=tube.seed, probability=tube.probability)
+    yield from record(passed=tube.passed, flights=tube.flights, lower_bound=tube.lower_bound)
+    yield from record(reserve=tube.reserve, plain_duration_s=tube.plain_duration, price_s=price)
+    yield from record(level=tube.level, times_s=tube.times, position_error_m=tube.position_error)
+    yield from record(attitude_error_deg=[degrees(angle) for angle in tube.attitude_error])
+    yield from record(rotor_margin=tube.rotor_margin, sentence=str(tube))
     texts = {
         "passes": f"{tube.passed} of {tube.flights} fresh flights under {tube.conditions}: "
         f"{100 * tube.lower_bound:.2f} % or more with 95 % confidence, {100 * tube.probability:g} % asked",
@@ -276,7 +287,7 @@ def _tube(tube: Tube, duration: float) -> Iterator[Fact]:
         f"{degrees(tube.max_attitude_error):.1f}°, commands {100 * tube.min_rotor_margin:.1f} % of the "
         "rotors' range from their limits",
     }
-    yield from (said(label, text, level=REPORT) for label, text in texts.items())
+    yield from (line(label, text, level=REPORT) for label, text in texts.items())
 
 
 def _reached(found: Assessment) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from aerobat.evaluation.score import Score
 from aerobat.planning import Plan
-from aerobat.reporting.facts import REPORT, Fact, Facts, facts, kept, said
+from aerobat.reporting.facts import REPORT, Fact, Facts, facts, line, record
 from aerobat.simulation.outcome import counted
 from aerobat.studies.share import Trials
 from aerobat.vehicle import implausibilities
@@ -59,7 +59,7 @@ def _(report: Report) -> Iterator[Fact]:
     name = None if plan.vehicle is None else plan.vehicle.name
     yield Fact("", text=f"{plan.problem.name} · {name}: {_verdict(report)}", level=REPORT)
     warnings = [] if plan.vehicle is None else implausibilities(plan.vehicle)
-    yield from kept(problem=plan.problem.name, vehicle=name, warnings=warnings)
+    yield from record(problem=plan.problem.name, vehicle=name, warnings=warnings)
     yield Fact("plan", plan, "plan")
     if report.score is not None:
         flown_by = {"controller": report.controller, "plant": report.plant}
@@ -68,14 +68,14 @@ def _(report: Report) -> Iterator[Fact]:
     if trials is not None:
         yield _of_trials(trials)
     for page, labels in PAGES.items():
-        yield said("", f"{page}: {', '.join(labels)}")
+        yield line("", f"{page}: {', '.join(labels)}")
 
 
 def _of_trials(trials: Trials) -> Fact:
     """Return the fact of the flights under random conditions, with the remedy if too few succeed."""
     name, share = trials.conditions.name, trials.share
     low, high = share.interval
-    values = kept(
+    values = record(
         conditions=name,
         seed=trials.seed,
         flights=share.of,

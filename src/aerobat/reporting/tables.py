@@ -65,7 +65,7 @@ def _parts(headed: Iterable[HeadedFact]) -> Iterator[Table | Text]:
     """Yield lines and tables, in their order."""
     for kind, group in groupby(headed, key=lambda each: _kind(each[1])):
         if kind == "line":
-            yield from (Text(fact.said, style=fact.style or "italic") for _, fact in group)
+            yield from (Text(fact.words, style=fact.style or "italic") for _, fact in group)
         elif kind == "rows":
             yield from (_rows([tuple(facts(row)) for row in fact.value]) for _, fact in group)
         else:
@@ -106,4 +106,4 @@ def _rows(rows: list[tuple[Fact, ...]]) -> Table:
 
 
 def _text(fact: Fact) -> Text:
-    return Text(fact.said, style=fact.style)  # none of its brackets taken for markup
+    return Text(fact.words, style=fact.style)  # none of its brackets taken for markup

@@ -11,7 +11,7 @@ from aerobat.control.parameters import hover_authority, max_bandwidth
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.problem import Problem
-from aerobat.reporting.facts import Fact, Facts, facts, said
+from aerobat.reporting.facts import Fact, Facts, facts, line
 from aerobat.simulation.outcome import length
 from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Rotor, Vehicle, implausibilities
@@ -51,7 +51,7 @@ def _(vehicle: Vehicle) -> Iterator[Fact]:
         text = f"up to {bandwidth:.3g} rad/s, {bandwidth / tau:.2g} Hz"
         yield Fact("attitude_loop_rad_s", bandwidth, "attitude loop", text)
     doubts = (*implausibilities(vehicle), *_weaknesses(vehicle))
-    yield from (said("looks wrong", doubt, style="red") for doubt in doubts)
+    yield from (line("looks wrong", doubt, style="red") for doubt in doubts)
     # an array: an empty tuple would be a table without rows
     yield Fact("doubts", np.array(doubts, dtype=object), "looks wrong", "" if doubts else "nothing")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from aerobat.reporting.facts import NONE, Columns, Fact, Facts, facts, kept, picture
+from aerobat.reporting.facts import NONE, Columns, Fact, Facts, facts, picture, record
 from aerobat.reporting.feasibility.figure import Kind, kinds_of, letter_of, map_figure
 from aerobat.studies.feasibility import Cell, Feasibility, FeasibilityMap, Requirement
 
@@ -21,10 +21,10 @@ def _(found: FeasibilityMap) -> Iterator[Fact]:
         title += f" · duration [s] over {down.label} (down) and {across.label} (across)"
     yield Fact("table", Columns(found.table))
     yield Fact("", text=title)
-    yield from kept(problem=found.problem.name, vehicle=found.vehicle.name)
-    yield from kept(over={axis.name: axis.values for axis in found.axes})
-    yield from kept(units={axis.name: axis.unit for axis in found.axes})
-    yield from kept(counts={feasibility.value: count for feasibility, count in found.counts.items()})
+    yield from record(problem=found.problem.name, vehicle=found.vehicle.name)
+    yield from record(over={axis.name: axis.values for axis in found.axes})
+    yield from record(units={axis.name: axis.unit for axis in found.axes})
+    yield from record(counts={feasibility.value: count for feasibility, count in found.counts.items()})
     yield Fact("cells", [_cell(found, cell) for cell in found.cells], "" if is_grid else "cells")
     if is_grid:
         yield Fact("", _grid(found), "grid")
@@ -66,7 +66,7 @@ def _(found: Requirement) -> Iterator[Fact]:
         yield Fact("duration_s", found.plan.duration, "planned", f"{found.plan.duration:.3f} s{proof}")
     beside = found.refusal if found.plan is None else f"at {refused} {found.feasibility}: {found.refusal}"
     yield Fact("refused", found.refused, "refused" if found.plan is None else "beside it", beside)
-    yield from kept(feasibility=found.feasibility.value, refusal=found.refusal, trials=found.trials)
+    yield from record(feasibility=found.feasibility.value, refusal=found.refusal, trials=found.trials)
 
 
 def _sizes(found: Requirement) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from aerobat.evaluation.criteria import criterion
 from aerobat.planning import planned_passages
-from aerobat.reporting.facts import Columns, Fact, Facts, facts, kept, picture, said
+from aerobat.reporting.facts import Columns, Fact, Facts, facts, line, picture, record
 from aerobat.reporting.sweeps.figure import known_opening, sweep_figure
 from aerobat.simulation import Outcome
 from aerobat.simulation.outcome import length
@@ -33,7 +33,7 @@ def _(sweep: Sweep) -> Iterator[Fact]:
     problem, vehicle, conditions = sweep.plan.problem, sweep.vehicle.name, sweep.conditions.name
     yield Fact("table", Columns(sweep.table))
     yield Fact("", text=f"{problem.name} · {vehicle} · {conditions}")
-    yield from kept(problem=problem.name, vehicle=vehicle, conditions=conditions, seed=sweep.seed)
+    yield from record(problem=problem.name, vehicle=vehicle, conditions=conditions, seed=sweep.seed)
     yield Fact("flights", len(sweep), "flights", f"{len(sweep)}, seed {sweep.seed}")
     yield Fact("went_well", sweep.success, "went well", str(sweep.success))
     yield Fact("judged_by", criterion(problem), "judged by")
@@ -48,7 +48,7 @@ def _(sweep: Sweep) -> Iterator[Fact]:
 @facts.register
 def _(share: Share) -> Iterator[Fact]:
     low, high = share.interval
-    yield from kept(count=share.count, fraction=share.fraction, low=low, high=high)
+    yield from record(count=share.count, fraction=share.fraction, low=low, high=high)
 
 
 picture.register(Sweep, sweep_figure)
@@ -84,8 +84,8 @@ def _nearest(sweep: Sweep) -> Iterator[Fact]:
     obstacle = str(sweep.table[NEAREST][least])
     low, middle = float(clearance[least]), float(np.median(clearance))
     apart = "touched" if low < 0.0 else f"{length(low)} at least"
-    yield from kept(obstacle=obstacle, least_clearance_m=low, median_clearance_m=middle)
-    yield said("nearest", f"'{obstacle}', {apart}, {length(middle)} at the median")
+    yield from record(obstacle=obstacle, least_clearance_m=low, median_clearance_m=middle)
+    yield line("nearest", f"'{obstacle}', {apart}, {length(middle)} at the median")
 
 
 def _quantiles(sweep: Sweep, column: str, label: str) -> Fact:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from aerobat.reporting.facts import Fact, Facts, facts, kept
+from aerobat.reporting.facts import Fact, Facts, facts, record
 from aerobat.studies.tune import FlightCosts, Tuning
 
 
@@ -13,7 +13,7 @@ def _(tuning: Tuning) -> Iterator[Fact]:
     yield Fact(
         "vehicle", tuning.vehicle.name, text=f"{tuning.vehicle.name} · {tuning.evaluations} sets of gains"
     )
-    yield from kept(evaluations=tuning.evaluations, flights=tuning.fresh[0].failed.size)
+    yield from record(evaluations=tuning.evaluations, flights=tuning.fresh[0].failed.size)
     own, found = tuning.vehicle.controller, tuning.controller
     gains = {name: (getattr(own, name), getattr(found, name)) for name in tuning.gains}
     changes = (
@@ -30,7 +30,7 @@ def _(tuning: Tuning) -> Iterator[Fact]:
 
 @facts.register
 def _(costs: FlightCosts) -> Iterator[Fact]:
-    yield from kept(
+    yield from record(
         cost_m=costs.cost, error_95_m=costs.error_quantile_m, failed_fraction=costs.failed_fraction
     )
 
