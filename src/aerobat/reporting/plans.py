@@ -128,10 +128,8 @@ def _(found: Flyability) -> Iterator[Fact]:
     else:
         yield line("margin", _margin(found), level=REPORT)
     yield from record(flies=found.flies, error_m=found.error, disturbance_n=found.disturbance)
-    yield Fact("disturbed_fraction", found.disturbed_fraction)
-    yield Fact("disturbed_error_m", found.disturbed_error)
-    yield Fact("passages", found.passages)
-    yield Fact("nearest", found.nearest)
+    yield from record(disturbed_fraction=found.disturbed_fraction, disturbed_error_m=found.disturbed_error)
+    yield from record(passages=found.passages, nearest=found.nearest)
     yield Fact("sentence", str(found), "flyability")
 
 

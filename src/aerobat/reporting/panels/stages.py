@@ -225,8 +225,9 @@ def _draw_names(
     inches = size[0] / float(np.ptp(axes.get_xlim()))  # per metre
     corner = np.array([axes.get_xlim()[0], axes.get_ylim()[0]])
     beside = size[1] >= size[0]
-    layout = names_beside if beside else names_below
-    anchors = layout((places - corner) * inches, thrust, size, columns) / inches + corner
+    on_page = (places - corner) * inches
+    names = _names_beside(on_page, thrust, size, columns) if beside else _names_below(on_page, size, columns)
+    anchors = names / inches + corner
     away = anchors - places
     reach = np.linalg.norm(away, axis=1, keepdims=True)
     starts = places + away * np.minimum(clear / np.maximum(reach, 1e-9), 1.0)
@@ -252,7 +253,7 @@ def _write_name(axes: Axes, keyframe: Keyframe, anchor: Array, side: str) -> Non
     axes.annotate(facts, size=SMALL, color=MUTED, linespacing=1.15, va="top", **place)
 
 
-def names_beside(places: Array, thrust: Array, size: Array, columns: tuple[float, float]) -> Array:
+def _names_beside(places: Array, thrust: Array, size: Array, columns: tuple[float, float]) -> Array:
     """Return the places of names in columns left and right of a picture, each opposite to the thrust there.
 
     All lengths are in inches from the lower left corner of a picture of `size` (2,). Names are as wide as
@@ -267,8 +268,8 @@ def names_beside(places: Array, thrust: Array, size: Array, columns: tuple[float
     return anchors
 
 
-def names_below(places: Array, thrust: Array, size: Array, columns: tuple[float, float]) -> Array:
-    """Return the places of names in a row at the foot of a picture, in inches, as in `names_beside`."""
+def _names_below(places: Array, size: Array, columns: tuple[float, float]) -> Array:
+    """Return the places of names in a row at the foot of a picture, in inches, as in `_names_beside`."""
     width = max(columns)
     across = spread_out(places[:, 0], width, 0.5 * width, size[0] - 0.5 * width)
     return np.stack([across, np.full_like(across, STAGE_ROW)], axis=1)
