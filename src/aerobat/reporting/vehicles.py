@@ -39,7 +39,11 @@ def _(vehicle: Vehicle) -> Iterator[Fact]:
     yield Fact("body_m", body, "body", f"{' x '.join(map(length, body))} with its propellers")
     lag = float(vehicle.lags.max())
     yield Fact("lag_s", lag, "lag", f"{1e3 * lag:.3g} ms of the slowest rotor")
-    if not vehicle.dead_rotors and not _why_grounded(vehicle):
+    doubts = list(implausibilities(vehicle))
+    grounded = "" if vehicle.dead_rotors else _why_grounded(vehicle)
+    if grounded:
+        doubts.append(grounded)
+    elif not vehicle.dead_rotors:
         hover = _hover(vehicle)
         yield Fact("hover", hover, "hover", f"at {100 * hover:.0f} % of the most loaded rotor's thrust")
         fleet, environment = Fleet.of([vehicle]), Environment()
@@ -50,7 +54,7 @@ def _(vehicle: Vehicle) -> Iterator[Fact]:
         bandwidth = float(max_bandwidth(fleet, environment)[0])
         text = f"up to {bandwidth:.3g} rad/s, {bandwidth / tau:.2g} Hz"
         yield Fact("attitude_loop_rad_s", bandwidth, "attitude loop", text)
-    doubts = (*implausibilities(vehicle), *_weaknesses(vehicle))
+        doubts += _weaknesses(vehicle, hover, bandwidth)
     yield from (line("looks wrong", doubt, style="red") for doubt in doubts)
     # an array: an empty tuple would be a table without rows
     yield Fact("doubts", np.array(doubts, dtype=object), "looks wrong", "" if doubts else "nothing")
@@ -75,22 +79,15 @@ def vehicle_row(vehicle: Vehicle) -> Facts:
     )
 
 
-def _weaknesses(vehicle: Vehicle) -> Iterator[str]:
+def _weaknesses(vehicle: Vehicle, hover: float, bandwidth: float) -> Iterator[str]:
     """Yield a sentence for each property that leaves a vehicle little thrust or bandwidth to maneuver."""
-    if vehicle.dead_rotors:
-        return
-    grounded = _why_grounded(vehicle)
-    if grounded:
-        yield grounded
-        return
     if vehicle.thrust_to_weight < MIN_THRUST_TO_WEIGHT:
         yield (
             f"max_thrust adds up to {vehicle.thrust_to_weight:.2f} times the weight: little is left to "
             "maneuver by; is it that of one rotor, in N?"
         )
-    if _hover(vehicle) > MAX_HOVER:
-        yield f"a hover takes {100 * _hover(vehicle):.0f} % of a rotor's thrust: little is left to turn by"
-    bandwidth = float(max_bandwidth(Fleet.of([vehicle]), Environment())[0])
+    if hover > MAX_HOVER:
+        yield f"a hover takes {100 * hover:.0f} % of a rotor's thrust: little is left to turn by"
     if not bandwidth >= MIN_BANDWIDTH:
         yield (
             f"the attitude loop has {bandwidth:.2g} rad/s at most: slow for flips; are inertia and "
