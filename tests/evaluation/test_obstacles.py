@@ -1,5 +1,6 @@
 """Flights past obstacles: the first contact of the whole body, however it is flown, cut, moved or written."""
 
+import pickle
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -212,11 +213,15 @@ def _inner(fact: Fact) -> list[Fact]:
 
 
 def test_flights_are_written_and_read_with_obstacles_and_the_walls_of_gates(tmp_path: Path) -> None:
-    wall = GateWall(Gate([0.0, 1.0, 1.0], [0.0, 1.0, 0.0], UP, wall=Wall(border=1.0)))
+    """A moving gate's wall was read as one that stands, and a flight that has a wall was not pickled."""
+    gate = Gate([0.0, 1.0, 1.0], [0.0, 1.0, 0.0], UP, wall=Wall(border=1.0), velocity=[0.2, 0.0, 0.0])
+    wall = GateWall.of(gate)
+    assert wall.velocity[0] == 0.2
     flight = fly(among(beside(0.1), Box(position=[3.0, 0.0, 0.0], size=[1.0, 1.0, 1.0], tilt=0.3), wall))
     flight.save(tmp_path / "flight.npz")
     again = load_flight(tmp_path / "flight.npz")
     assert again == flight
+    assert pickle.loads(pickle.dumps(flight)) == flight
     assert score(again, hop(), QUAD).nearest == score(flight, hop(), QUAD).nearest
 
 

@@ -108,8 +108,13 @@ def _hash(self: Any) -> int:
 
 def _reduce(self: Any) -> tuple[Any, ...]:
     """Return the pickle of the fields, which are checked again on loading, so that arrays stay read-only."""
-    values = (getattr(self, name) for name in _names(type(self)))
-    return type(self), tuple(dict(value) if isinstance(value, Mapping) else value for value in values)
+    values = {name: getattr(self, name) for name in _names(type(self))}
+    plain = {name: dict(value) if isinstance(value, Mapping) else value for name, value in values.items()}
+    return _loaded, (type(self), plain)
+
+
+def _loaded(cls: type[Any], values: dict[str, Any]) -> Any:
+    return cls(**values)
 
 
 def _text(self: Any) -> str:

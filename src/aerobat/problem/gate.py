@@ -178,7 +178,7 @@ class Gate:
     @cached_property
     def solid(self) -> Obstacle | None:
         """The wall around the opening as an obstacle; None where there is no wall."""
-        return None if self.wall is None else GateWall(self, velocity=self.velocity, path=self.path)
+        return None if self.wall is None else GateWall.of(self)
 
     def resized(self, across: float, up: float) -> Gate:
         """Return the gate with its opening scaled by `across` and `up`; by the smaller unless a rectangle."""
@@ -220,6 +220,11 @@ class GateWall(Obstacle):
 
     gate: Gate
 
+    @classmethod
+    def of(cls, gate: Gate) -> GateWall:
+        """Return the wall of a gate, which moves with the gate."""
+        return cls(gate, velocity=gate.velocity, path=gate.path)
+
     @property
     def pieces(self) -> tuple[ConvexPiece, ...]:
         """The parts of the wall beside each side of the opening."""
@@ -248,9 +253,8 @@ def tilted_gate(
         heading: of the direction of passage [rad], from x toward y.
         elevation: climb of the direction of passage [rad].
         tilt: roll about the direction of passage [rad], right-handed: 0 upright, π/2 with `up` to the right
-        in
-            the direction of passage, π upside down. The paper's α (Section II-D) is measured toward +y when
-            passing toward +x: α = −tilt.
+            in the direction of passage, π upside down. The paper's α (Section II-D) is measured toward +y
+            when passing toward +x: α = −tilt.
         width: of a rectangular opening [m], by default 1.
         height: of a rectangular opening [m], by default 0.6.
         name: by which stages refer to it.

@@ -281,7 +281,7 @@ def _obstacle_table(obstacle: Obstacle) -> dict[str, Any]:
 
 
 def _obstacle(table: dict[str, Any]) -> Obstacle:
-    return GateWall(from_table(Gate, table["gate"])) if "gate" in table else OBSTACLES.read(table)
+    return GateWall.of(from_table(Gate, table["gate"])) if "gate" in table else OBSTACLES.read(table)
 
 
 def _outcome(name: str) -> Outcome:
