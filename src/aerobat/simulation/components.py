@@ -12,7 +12,7 @@ from aerobat.kernels.control import Commands, ControllerModel, ControllerState, 
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.imu import ImuState
 from aerobat.kernels.motors import Airframe, VehicleState
-from aerobat.kernels.ops import Ops, PerRotor, Scalar, Vector, select_tree
+from aerobat.kernels.ops import PerRotor, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, to_world
 from aerobat.kernels.rate_loop import RateLoopModel, RateLoopState, RateSetpoint
 from aerobat.kernels.rigid_body import Body, EnvironmentParameters
@@ -32,13 +32,11 @@ def rigid_body_steps(duration: float) -> int:
 class StateObserver(Component):
     """The observer that returns the true state."""
 
-    def init(self, ops: Ops, parameters: tuple[()], inputs: tuple[()], signals: Signals) -> Estimate:
+    def init(self, parameters: tuple[()], inputs: tuple[()], signals: Signals) -> Estimate:
         """See `Component.init`."""
         return Estimate(signals.start)
 
-    def step(
-        self, ops: Ops, parameters: tuple[()], state: Estimate, inputs: tuple[()], signals: Signals
-    ) -> Estimate:
+    def step(self, parameters: tuple[()], state: Estimate, inputs: tuple[()], signals: Signals) -> Estimate:
         """See `Component.step`."""
         return Estimate(signals.plant.body)
 
@@ -60,31 +58,26 @@ class TrackingController(Component):
     flags: FeatureFlags
 
     def init(
-        self,
-        ops: Ops,
-        parameters: ControllerParameters,
-        inputs: ReferencePoint | tuple[()],
-        signals: Signals,
+        self, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
     ) -> ControllerState:
         """See `Component.init`."""
         reference = inputs or signals.reference
-        return control.init(ops, parameters.model, signals.observer.body, reference)
+        return control.init(signals.ops, parameters.model, signals.observer.body, reference)
 
     def step(
         self,
-        ops: Ops,
         parameters: ControllerParameters,
         state: ControllerState,
         inputs: ReferencePoint | tuple[()],
         signals: Signals,
     ) -> ControllerState:
         """See `Component.step`."""
-        body, reference = controller_inputs(ops, parameters, state, inputs, signals)
-        return control.step(ops, self.flags, parameters.model, state, body, reference, signals.clock.elapsed)
+        body, reference = controller_inputs(parameters, state, inputs, signals)
+        ops, elapsed = signals.ops, signals.clock.elapsed
+        return control.step(ops, self.flags, parameters.model, state, body, reference, elapsed)
 
 
 def controller_inputs(
-    ops: Ops,
     parameters: ControllerParameters,
     state: Controlling,
     inputs: ReferencePoint | tuple[()],
@@ -95,7 +88,6 @@ def controller_inputs(
     """Return the state when the commands take effect, and the reference corrected for the disturbance.
 
     Args:
-        ops: The operations of an engine.
         parameters: A controller and its delay.
         state: The controller's state, of which the thrusts and the last commands are used.
         inputs: The controller's own reference if its commands are delayed, else ().
@@ -109,7 +101,7 @@ def controller_inputs(
         reference = _compensated(reference, body, disturbance, takes_moments)
     if not isinstance(parameters.delay, tuple):
         elapsed = signals.clock.elapsed
-        body = control.predicted(ops, parameters.model, state, body, elapsed, parameters.delay)
+        body = control.predicted(signals.ops, parameters.model, state, body, elapsed, parameters.delay)
     return body, reference
 
 
@@ -158,24 +150,17 @@ class ComputationDelay(Component):
     controller already computes its next commands.
     """
 
-    def init(
-        self, ops: Ops, parameters: tuple[()], takes_effect: Scalar, signals: Signals
-    ) -> DelayedCommands:
+    def init(self, parameters: tuple[()], takes_effect: Scalar, signals: Signals) -> DelayedCommands:
         """See `Component.init`."""
         sent = _sent_commands(signals.controller)
         return DelayedCommands(sent, sent)
 
     def step(
-        self,
-        ops: Ops,
-        parameters: tuple[()],
-        state: DelayedCommands,
-        takes_effect: Scalar,
-        signals: Signals,
+        self, parameters: tuple[()], state: DelayedCommands, takes_effect: Scalar, signals: Signals
     ) -> DelayedCommands:
         """See `Component.step`."""
         return DelayedCommands(
-            select_tree(ops, takes_effect > 0.5, state.latest, state.in_effect),
+            select_tree(signals.ops, takes_effect > 0.5, state.latest, state.in_effect),
             _sent_commands(signals.controller),
         )
 
@@ -194,22 +179,20 @@ class RigidBodyPlant(Component):
     substeps: int
     feedthrough: bool = False
 
-    def init(
-        self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals
-    ) -> VehicleState:
+    def init(self, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> VehicleState:
         """See `Component.init`; the initial rotor thrusts are those that the controller assumes."""
         return VehicleState(signals.start, signals.controller.thrusts)
 
     def step(
-        self, ops: Ops, parameters: PlantParameters, motion: VehicleState, inputs: tuple[()], signals: Signals
+        self, parameters: PlantParameters, motion: VehicleState, inputs: tuple[()], signals: Signals
     ) -> VehicleState:
         """See `Component.step`."""
-        airframe = with_ceiling(ops, parameters.airframe, signals)
+        airframe = with_ceiling(parameters.airframe, signals)
         environment = with_wind(parameters.environment, signals)
         commands = commands_in_effect(signals)
         dt = signals.clock.period / self.substeps
         for _ in range(self.substeps):
-            motion = motors.advance(ops, airframe, environment, motion, commands, dt)
+            motion = motors.advance(signals.ops, airframe, environment, motion, commands, dt)
         return motion
 
 
@@ -217,21 +200,16 @@ class RigidBodyPlant(Component):
 class RateLoop(Component):
     """The inner loop of a flight controller, which tracks commanded body rates and thrust by its own gyro."""
 
-    def init(self, ops: Ops, parameters: RateLoopModel, inputs: tuple[()], signals: Signals) -> RateLoopState:
+    def init(self, parameters: RateLoopModel, inputs: tuple[()], signals: Signals) -> RateLoopState:
         """See `Component.init`."""
         return rate_loop.init(signals.controller.thrusts, signals.start.omega_body)
 
     def step(
-        self,
-        ops: Ops,
-        parameters: RateLoopModel,
-        state: RateLoopState,
-        inputs: tuple[()],
-        signals: Signals,
+        self, parameters: RateLoopModel, state: RateLoopState, inputs: tuple[()], signals: Signals
     ) -> RateLoopState:
         """See `Component.step`."""
         setpoint, elapsed = setpoint_in_effect(signals), signals.clock.elapsed
-        return rate_loop.step(ops, parameters, state, setpoint, gyro(signals), elapsed)
+        return rate_loop.step(signals.ops, parameters, state, setpoint, gyro(signals), elapsed)
 
 
 def gyro(signals: Signals) -> Vector:
@@ -273,14 +251,14 @@ def with_wind(environment: EnvironmentParameters, signals: Signals) -> Environme
     return environment if wind is None else environment._replace(wind=wind.velocity)
 
 
-def with_ceiling(ops: Ops, airframe: Airframe, signals: Signals) -> Airframe:
+def with_ceiling(airframe: Airframe, signals: Signals) -> Airframe:
     """Return the airframe with the maximum thrusts that the battery allows, if the loop has a battery."""
     battery = signals.find(BatteryState)
     if battery is None:
         return airframe
     rotors, ceiling = airframe.rotors, battery.ceiling
     limits = zip(rotors.min_thrust, rotors.max_thrust, strict=True)
-    lowered = tuple(ops.maximum(ceiling * high, low) for low, high in limits)
+    lowered = tuple(signals.ops.maximum(ceiling * high, low) for low, high in limits)
     return airframe._replace(rotors=rotors._replace(max_thrust=lowered))
 
 

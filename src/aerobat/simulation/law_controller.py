@@ -52,11 +52,11 @@ class LawController(Component):
     flags: FeatureFlags  # for the control allocation, from the law's force and moment to rotor commands
 
     def init(
-        self, ops: Ops, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
+        self, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
     ) -> LawState:
         """See `Component.init`."""
         reference = inputs or signals.reference
-        body = signals.observer.body
+        ops, body = signals.ops, signals.observer.body
         first = control.init(ops, parameters.model, body, reference)
         with _compiled(ops, self.law.init):
             own = self.law.init(ops, parameters.model, Seen(body, first.thrusts, reference))
@@ -66,16 +66,15 @@ class LawController(Component):
 
     def step(
         self,
-        ops: Ops,
         parameters: ControllerParameters,
         state: LawState,
         inputs: ReferencePoint | tuple[()],
         signals: Signals,
     ) -> LawState:
         """See `Component.step`."""
-        model, elapsed = parameters.model, signals.clock.elapsed
+        ops, model, elapsed = signals.ops, parameters.model, signals.clock.elapsed
         takes = self.law.TAKES_DISTURBANCES, not self.law.GIVES_RATES
-        body, reference = controller_inputs(ops, parameters, state, inputs, signals, *takes)
+        body, reference = controller_inputs(parameters, state, inputs, signals, *takes)
         rotors = model.airframe.rotors
         decay_factors = motors.decay_factors(ops, rotors, elapsed)
         thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)

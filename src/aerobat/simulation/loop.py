@@ -48,8 +48,9 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class Signals:
-    """All that components see of each other at a tick: their states, which are found by type."""
+    """All that a component sees at a tick, beside its own: the states of the others are found by type."""
 
+    ops: Ops  # the arithmetic of the engine
     clock: StepClock
     reference: ReferencePoint
     start: Body  # the true initial state
@@ -127,10 +128,10 @@ class Component(Protocol):
         """True if the new state is seen at the tick of its step, false if at the next tick."""
         return True
 
-    def init(self, ops: Ops, parameters: Tree, inputs: Tree, signals: Signals) -> Tree:
+    def init(self, parameters: Tree, inputs: Tree, signals: Signals) -> Tree:
         """Return the state before the first tick; `signals` holds the states of earlier components."""
 
-    def step(self, ops: Ops, parameters: Tree, state: Tree, inputs: Tree, signals: Signals) -> Tree:
+    def step(self, parameters: Tree, state: Tree, inputs: Tree, signals: Signals) -> Tree:
         """Return the next state, from the component's parameters and inputs and the others' states."""
 
 
@@ -142,20 +143,20 @@ def compose(components: tuple[Component, ...], log: Log) -> tuple[Init, Step]:
     """
 
     def init(ops: Ops, parameters: LoopParameters, inputs: LoopInput) -> tuple[Tree, ...]:
-        signals = Signals(inputs.clock, inputs.reference, parameters.start, [])
+        signals = Signals(ops, inputs.clock, inputs.reference, parameters.start, [])
         for component, own, given in zip(components, parameters.own, inputs.own, strict=True):
-            signals.states.append(component.init(ops, own, given, signals))
+            signals.states.append(component.init(own, given, signals))
         return tuple(signals.states)
 
     def step(
         ops: Ops, parameters: LoopParameters, carry: tuple[Tree, ...], inputs: LoopInput
     ) -> tuple[tuple[Tree, ...], Tree]:
-        signals = Signals(inputs.clock, inputs.reference, parameters.start, list(carry))
+        signals = Signals(ops, inputs.clock, inputs.reference, parameters.start, list(carry))
         following = []
         each = zip(components, parameters.own, carry, inputs.due, inputs.own, strict=True)
         for k, (component, own, before, due, given) in enumerate(each):
             seen = signals if not due else replace(signals, clock=due.clock)
-            state = component.step(ops, own, before, given, seen)
+            state = component.step(own, before, given, seen)
             if due:
                 state = select_tree(ops, due.now > 0.5, state, before)
             following.append(state)

@@ -18,7 +18,7 @@ from aerobat.environment import Environment
 from aerobat.kernels import running_metrics
 from aerobat.kernels.gates import approach, pointing, progress
 from aerobat.kernels.gates.section import BoundingEllipsoid
-from aerobat.kernels.ops import Ops, Quaternion, Scalar, Vector
+from aerobat.kernels.ops import Quaternion, Scalar, Vector
 from aerobat.kernels.running_metrics import (
     Ground,
     MetricsParameters,
@@ -53,23 +53,18 @@ class Criteria(NamedTuple):
 class MetricsMonitor(Component):
     """The loop's component that accumulates a flight's metrics."""
 
-    def init(self, ops: Ops, parameters: MetricsParameters, time: Scalar, signals: Signals) -> RunningMetrics:
+    def init(self, parameters: MetricsParameters, time: Scalar, signals: Signals) -> RunningMetrics:
         """See `Component.init`."""
         return running_metrics.init(parameters)
 
     def step(
-        self,
-        ops: Ops,
-        parameters: MetricsParameters,
-        metrics: RunningMetrics,
-        time: Scalar,
-        signals: Signals,
+        self, parameters: MetricsParameters, metrics: RunningMetrics, time: Scalar, signals: Signals
     ) -> RunningMetrics:
         """See `Component.step`."""
         motion, commands = signals.plant, rotor_commands(signals)
         reference = (signals.reference.position, signals.reference.q_world_body)
         actuation = (motion.thrusts, commands.thrusts, commands.saturated)
-        return running_metrics.step(ops, parameters, metrics, motion.body, reference, actuation, time)
+        return running_metrics.step(signals.ops, parameters, metrics, motion.body, reference, actuation, time)
 
 
 def metrics_row(signals: Signals) -> RunningMetrics:

@@ -47,22 +47,16 @@ class AutopilotController(Component):
 
     flags: FeatureFlags
 
-    def init(
-        self, ops: Ops, parameters: AutopilotModel, inputs: Guidance, signals: Signals
-    ) -> ControllerState:
+    def init(self, parameters: AutopilotModel, inputs: Guidance, signals: Signals) -> ControllerState:
         """See `Component.init`."""
-        return control.init(ops, parameters.tracking, signals.observer.body, signals.reference)
+        return control.init(signals.ops, parameters.tracking, signals.observer.body, signals.reference)
 
     def step(
-        self,
-        ops: Ops,
-        parameters: AutopilotModel,
-        state: ControllerState,
-        inputs: Guidance,
-        signals: Signals,
+        self, parameters: AutopilotModel, state: ControllerState, inputs: Guidance, signals: Signals
     ) -> ControllerState:
         """See `Component.step`."""
-        body, reference, elapsed = signals.observer.body, signals.reference, signals.clock.elapsed
+        ops, elapsed = signals.ops, signals.clock.elapsed
+        body, reference = signals.observer.body, signals.reference
         model, authority, slower = parameters
         commanded, upright = inputs.by_attitude > 0.5, inputs.upright > 0.5
         gains = select_tree(ops, upright, slower, model.gains)

@@ -11,7 +11,7 @@ from aerobat.kernels import ekf, motors, rigid_body
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.ekf import EkfParameters, EkfState
 from aerobat.kernels.imu import ImuState
-from aerobat.kernels.ops import Ops, Scalar, select_tree
+from aerobat.kernels.ops import Scalar, select_tree
 from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.vectors import ZERO, add_scaled, low_passed, scale, subtract
 from aerobat.simulation.components import Disturbance
@@ -35,22 +35,15 @@ class DisturbanceObserver(Component):
     gyroscopic moment. The angular acceleration is measured as the difference of the gyro's successive rates.
     """
 
-    def init(
-        self, ops: Ops, parameters: DisturbanceParameters, inputs: tuple[()], signals: Signals
-    ) -> Disturbance:
+    def init(self, parameters: DisturbanceParameters, inputs: tuple[()], signals: Signals) -> Disturbance:
         """See `Component.init`."""
         return Disturbance(ZERO, ZERO, ZERO, 0.0)
 
     def step(
-        self,
-        ops: Ops,
-        parameters: DisturbanceParameters,
-        state: Disturbance,
-        inputs: tuple[()],
-        signals: Signals,
+        self, parameters: DisturbanceParameters, state: Disturbance, inputs: tuple[()], signals: Signals
     ) -> Disturbance:
         """See `Component.step`."""
-        model, elapsed = parameters.model, signals.clock.elapsed
+        ops, model, elapsed = signals.ops, parameters.model, signals.clock.elapsed
         mass_properties, rotors = model.airframe
         observer, controller = signals.observer, signals.controller
         decay = motors.decay_factors(ops, rotors, ops.maximum(elapsed - parameters.delay, 0.0))
@@ -103,9 +96,7 @@ class EkfObserver(Component):
     exposure_period: int  # ticks
     latency: int  # ticks
 
-    def init(
-        self, ops: Ops, parameters: ObserverParameters, inputs: ObserverInput, signals: Signals
-    ) -> Estimate:
+    def init(self, parameters: ObserverParameters, inputs: ObserverInput, signals: Signals) -> Estimate:
         """See `Component.init`; the initial velocity estimate is that of the reference."""
         pose = signals.of(MocapState).delivered.pose
         state = ekf.init(parameters.ekf, pose, signals.reference.velocity)
@@ -114,37 +105,26 @@ class EkfObserver(Component):
         return Estimate(body, FilterState(state, (pose,) * waiting))
 
     def step(
-        self,
-        ops: Ops,
-        parameters: ObserverParameters,
-        state: Estimate,
-        inputs: ObserverInput,
-        signals: Signals,
+        self, parameters: ObserverParameters, state: Estimate, inputs: ObserverInput, signals: Signals
     ) -> Estimate:
         """See `Component.step`."""
-        sample = signals.of(ImuState).sample
+        ops, sample = signals.ops, signals.of(ImuState).sample
         before = ekf.propagate(ops, parameters.ekf, state.own.filter, sample, inputs.elapsed)
         pushed = (ekf.pose_of(before), *state.own.exposures[:-1])
         exposures = select_tree(ops, inputs.exposes > 0.5, pushed, state.own.exposures)
-        fused = self._fused(ops, parameters, before, exposures, signals)
+        fused = self._fused(parameters, before, exposures, signals)
         after, exposures = select_tree(ops, inputs.arrives > 0.5, fused, (before, exposures))
         return Estimate(ekf.estimated_body(after, sample), FilterState(after, exposures))
 
     def _fused(
-        self,
-        ops: Ops,
-        parameters: ObserverParameters,
-        state: EkfState,
-        exposures: tuple[Pose, ...],
-        signals: Signals,
+        self, parameters: ObserverParameters, state: EkfState, exposures: tuple[Pose, ...], signals: Signals
     ) -> tuple[EkfState, tuple[Pose, ...]]:
         """Return the filter and its poses at exposures after fusing the pose that arrives, if valid."""
-        measured = signals.of(MocapState).delivered
+        ops, measured = signals.ops, signals.of(MocapState).delivered
         before = ekf.predict_covariance(ops, parameters.ekf, state)
         age = self.latency * parameters.tick
-        after = ekf.fuse(
-            ops, parameters.ekf, before, measured.pose, exposures[-1], age, measured.is_valid > 0.5
-        )
+        is_valid = measured.is_valid > 0.5
+        after = ekf.fuse(ops, parameters.ekf, before, measured.pose, exposures[-1], age, is_valid)
         ages = ((self.latency - k * self.exposure_period) * parameters.tick for k in range(len(exposures)))
         known = zip(exposures, reversed([*ages]), strict=True)
         return after, tuple(ekf.carried_back(before, after, past, since) for past, since in known)

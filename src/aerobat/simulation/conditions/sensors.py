@@ -16,7 +16,6 @@ from aerobat.kernels.battery import BatteryParameters, BatteryState
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
 from aerobat.kernels.mocap import MocapInput, MocapParameters, PoseSample
 from aerobat.kernels.motors import Airframe
-from aerobat.kernels.ops import Ops
 from aerobat.kernels.rigid_body import EnvironmentParameters
 from aerobat.kernels.wind import GustNoise, WindParameters, WindState
 from aerobat.simulation.components import with_wind
@@ -29,12 +28,12 @@ from aerobat.simulation.loop import Component, Signals, Source
 class Wind(Component):
     """The wind, held from one step to the next; it acts on the plant and on the accelerometer."""
 
-    def init(self, ops: Ops, parameters: WindParameters, noise: GustNoise, signals: Signals) -> WindState:
+    def init(self, parameters: WindParameters, noise: GustNoise, signals: Signals) -> WindState:
         """See `Component.init`."""
         return wind.init(parameters)
 
     def step(
-        self, ops: Ops, parameters: WindParameters, state: WindState, noise: GustNoise, signals: Signals
+        self, parameters: WindParameters, state: WindState, noise: GustNoise, signals: Signals
     ) -> WindState:
         """See `Component.step`."""
         return wind.step(parameters, state, noise)
@@ -53,34 +52,27 @@ def wind_source(draws: Draws, period: int) -> Source:
 class BatterySag(Component):
     """The battery, discharged by the rotors' thrusts; it lowers the rotors' maximum thrusts."""
 
-    def init(
-        self, ops: Ops, parameters: BatteryParameters, inputs: tuple[()], signals: Signals
-    ) -> BatteryState:
+    def init(self, parameters: BatteryParameters, inputs: tuple[()], signals: Signals) -> BatteryState:
         """See `Component.init`."""
         return battery.init(parameters)
 
     def step(
-        self,
-        ops: Ops,
-        parameters: BatteryParameters,
-        state: BatteryState,
-        inputs: tuple[()],
-        signals: Signals,
+        self, parameters: BatteryParameters, state: BatteryState, inputs: tuple[()], signals: Signals
     ) -> BatteryState:
         """See `Component.step`."""
-        return battery.step(ops, parameters, state, signals.plant.thrusts, signals.clock.elapsed)
+        return battery.step(signals.ops, parameters, state, signals.plant.thrusts, signals.clock.elapsed)
 
 
 @dataclass(frozen=True)
 class ImuBias(Component):
     """The biases of an IMU, held from one step to the next."""
 
-    def init(self, ops: Ops, parameters: BiasParameters, noise: ImuSample, signals: Signals) -> ImuSample:
+    def init(self, parameters: BiasParameters, noise: ImuSample, signals: Signals) -> ImuSample:
         """See `Component.init`."""
         return parameters.start
 
     def step(
-        self, ops: Ops, parameters: BiasParameters, bias: ImuSample, noise: ImuSample, signals: Signals
+        self, parameters: BiasParameters, bias: ImuSample, noise: ImuSample, signals: Signals
     ) -> ImuSample:
         """See `Component.step`."""
         return imu.walk(parameters, bias, noise)
@@ -98,12 +90,12 @@ class ImuSensorParameters(NamedTuple):
 class ImuSensor(Component):
     """An IMU at the centre of mass, with the biases of `ImuBias`; its sample ends at the tick of its step."""
 
-    def init(self, ops: Ops, parameters: ImuSensorParameters, noise: ImuSample, signals: Signals) -> ImuState:
+    def init(self, parameters: ImuSensorParameters, noise: ImuSample, signals: Signals) -> ImuState:
         """See `Component.init`."""
         return imu.init()
 
     def step(
-        self, ops: Ops, parameters: ImuSensorParameters, state: ImuState, noise: ImuSample, signals: Signals
+        self, parameters: ImuSensorParameters, state: ImuState, noise: ImuSample, signals: Signals
     ) -> ImuState:
         """See `Component.step`."""
         body, thrusts = signals.plant
@@ -111,7 +103,7 @@ class ImuSensor(Component):
         environment = with_wind(parameters.environment, signals)
         force = rigid_body.specific_force(parameters.airframe.mass_properties, environment, body, thrust)
         true_sample = ImuSample(body.omega_body, force)
-        return imu.step(ops, parameters.errors, state, true_sample, signals.of(ImuSample), noise)
+        return imu.step(signals.ops, parameters.errors, state, true_sample, signals.of(ImuSample), noise)
 
 
 def imu_source(draws: Draws, stream: str, period: int, block: int = 256) -> Source:
@@ -153,21 +145,16 @@ class MotionCaptureSensor(Component):
     period: int  # ticks from one exposure to the next
     latency: int  # ticks
 
-    def init(self, ops: Ops, parameters: MocapParameters, inputs: MocapInput, signals: Signals) -> MocapState:
+    def init(self, parameters: MocapParameters, inputs: MocapInput, signals: Signals) -> MocapState:
         """See `Component.init`."""
-        known = PoseSample(mocap.first_pose(ops, parameters, signals.start), 0.0)
+        known = PoseSample(mocap.first_pose(signals.ops, parameters, signals.start), 0.0)
         return MocapState((known,) * (self.latency // self.period + 1))
 
     def step(
-        self,
-        ops: Ops,
-        parameters: MocapParameters,
-        state: MocapState,
-        inputs: MocapInput,
-        signals: Signals,
+        self, parameters: MocapParameters, state: MocapState, inputs: MocapInput, signals: Signals
     ) -> MocapState:
         """See `Component.step`."""
-        taken = mocap.sample(ops, parameters, signals.plant.body, inputs)
+        taken = mocap.sample(signals.ops, parameters, signals.plant.body, inputs)
         return MocapState((taken, *state.queue[:-1]))
 
 

@@ -21,7 +21,7 @@ from aerobat.kernels import motors
 from aerobat.kernels.control import Commands, Controlling
 from aerobat.kernels.imu import ImuState
 from aerobat.kernels.motors import VehicleState
-from aerobat.kernels.ops import Ops, Vector
+from aerobat.kernels.ops import Vector
 from aerobat.kernels.rate_loop import RateSetpoint
 from aerobat.kernels.rigid_body import EnvironmentParameters, specific_force
 from aerobat.kernels.vectors import ZERO
@@ -51,19 +51,12 @@ from aerobat.vehicle.ellipsoid import Ellipsoid
 class OutsidePlant(Component):
     """A plant whose state is an input at every tick; its parameters are those of the vehicle's model."""
 
-    def init(
-        self, ops: Ops, parameters: PlantParameters, inputs: VehicleState, signals: Signals
-    ) -> VehicleState:
+    def init(self, parameters: PlantParameters, inputs: VehicleState, signals: Signals) -> VehicleState:
         """See `Component.init`."""
         return inputs
 
     def step(
-        self,
-        ops: Ops,
-        parameters: PlantParameters,
-        state: VehicleState,
-        inputs: VehicleState,
-        signals: Signals,
+        self, parameters: PlantParameters, state: VehicleState, inputs: VehicleState, signals: Signals
     ) -> VehicleState:
         """See `Component.step`."""
         return inputs
@@ -73,19 +66,19 @@ class OutsidePlant(Component):
 class Actuator(Component):
     """The inputs of the external plant: commands, wind, and the rotor limits that the battery allows."""
 
-    def init(self, ops: Ops, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Actuation:
+    def init(self, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Actuation:
         """See `Component.init`."""
         thrusts = rotor_commands(signals).thrusts
         return Actuation(thrusts, parameters.environment.wind, parameters.airframe.rotors.max_thrust)
 
     def step(
-        self, ops: Ops, parameters: PlantParameters, state: Actuation, inputs: tuple[()], signals: Signals
+        self, parameters: PlantParameters, state: Actuation, inputs: tuple[()], signals: Signals
     ) -> Actuation:
         """See `Component.step`."""
         return Actuation(
             commands_in_effect(signals),
             with_wind(parameters.environment, signals).wind,
-            with_ceiling(ops, parameters.airframe, signals).rotors.max_thrust,
+            with_ceiling(parameters.airframe, signals).rotors.max_thrust,
         )
 
 
