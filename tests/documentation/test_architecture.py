@@ -50,7 +50,7 @@ HANDED_ON = (
     "named_gate",
     "init",
     "of_flight",
-    "_of_flight",
+    "map_arrays",
     "__getitem__",
 )
 WINDOW = """

@@ -10,7 +10,7 @@ from aerobat.environment import Environment
 from aerobat.flatness import reference
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.links.goals import PathGoal
-from aerobat.simulation.flight import setpoint_rows
+from aerobat.simulation.nested import rows_of
 from aerobat.simulation.reference_source import reference_points
 from aerobat.states import FlatState
 from aerobat.trajectory import Trajectory
@@ -37,7 +37,7 @@ class SetpointStream:
         self._offset = np.asarray(offset, dtype=float)
         rows = reference(trajectory, vehicle, rate=_RATE, environment=environment).setpoint
         ticks = len(rows.q_world_body)
-        following = setpoint_rows(rows, np.minimum(np.arange(1, ticks + 1), ticks - 1))
+        following = rows_of(rows, np.minimum(np.arange(1, ticks + 1), ticks - 1))
         points = reference_points(rows, following, environment, vehicle)
         self._tree = points
         self._rows = np.column_stack(tree_leaves(points))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -158,7 +158,11 @@ class Flight:
     @cached_property
     def setpoint(self) -> Setpoint:
         """Set-points of the trajectory (of the first vehicle, where vehicles differ), (T, ·)."""
-        return _setpoint(self.series)
+        series = self.series
+        flat = FlatState(**{name: series[f"setpoint_{name}"] for name in FlatState.__dataclass_fields__})
+        wrench = Wrench(series["setpoint_thrust"], series["setpoint_moment_body"])
+        own = ("q_world_body", "omega_body", "omega_dot_body")
+        return Setpoint(flat=flat, wrench=wrench, **{name: series[f"setpoint_{name}"] for name in own})
 
     @cached_property
     def position_error(self) -> Array:
@@ -294,24 +298,6 @@ def setpoint_series(setpoint: Setpoint) -> dict[str, Array]:
     """Return set-points as arrays by the names of SERIES."""
     parts = vars(setpoint) | vars(setpoint.flat) | vars(setpoint.wrench)
     return {f"setpoint_{name}": part for name, part in parts.items() if isinstance(part, np.ndarray)}
-
-
-def setpoint_rows(setpoint: Setpoint, rows: slice | NDArray[np.intp]) -> Setpoint:
-    """Return some rows of set-points."""
-    return _setpoint({name: values[rows] for name, values in setpoint_series(setpoint).items()})
-
-
-def joined_setpoints(parts: Sequence[Setpoint]) -> Setpoint:
-    """Return the set-points of consecutive parts as one."""
-    series = [setpoint_series(part) for part in parts]
-    return _setpoint({name: np.concatenate([each[name] for each in series]) for name in series[0]})
-
-
-def _setpoint(series: Mapping[str, Array]) -> Setpoint:
-    flat = FlatState(**{name: series[f"setpoint_{name}"] for name in FlatState.__dataclass_fields__})
-    wrench = Wrench(series["setpoint_thrust"], series["setpoint_moment_body"])
-    own = ("q_world_body", "omega_body", "omega_dot_body")
-    return Setpoint(flat=flat, wrench=wrench, **{name: series[f"setpoint_{name}"] for name in own})
 
 
 def _checked(series: Series, values: Array, shape: tuple[int, ...]) -> Array:

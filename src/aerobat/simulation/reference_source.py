@@ -15,8 +15,8 @@ from aerobat.engines.pytree import Tree, components, tree_map
 from aerobat.environment import Environment
 from aerobat.flatness.references import axial_drag, force_balance, has_unequal_drag, reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
-from aerobat.simulation.flight import joined_setpoints, setpoint_rows
 from aerobat.simulation.loop import Due, StepClock, due_ticks
+from aerobat.simulation.nested import joined, rows_of
 from aerobat.states import BodyState, Setpoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle
@@ -56,9 +56,8 @@ class ReferenceSource:
     def setpoint(self, ticks: NDArray[np.intp]) -> Setpoint:
         """Return the set-points of some ticks, in rising order."""
         in_blocks = np.split(ticks, np.flatnonzero(np.diff(ticks // BLOCK)) + 1)
-        return joined_setpoints(
-            [setpoint_rows(_block(self, int(each[0]) // BLOCK).setpoint, each % BLOCK) for each in in_blocks]
-        )
+        parts = [rows_of(_block(self, int(each[0]) // BLOCK).setpoint, each % BLOCK) for each in in_blocks]
+        return joined(parts)
 
     def chunk(self, begin: int, end: int) -> ReferencePoint:
         """Return the controller's references at the ticks from `begin` to before `end`, within one block."""
@@ -108,8 +107,8 @@ def _block(source: ReferenceSource, number: int) -> _Block:
     known = grid[np.minimum(np.arange(first, first + ticks + every), last)]
     times = np.minimum(known + source.delay, grid[last])
     rows = reference(source.trajectory, vehicle, times, environment=environment).setpoint
-    setpoint, following = setpoint_rows(rows, slice(ticks)), np.arange(every, every + ticks)
-    points = reference_points(setpoint, setpoint_rows(rows, following), environment, vehicle)
+    setpoint, following = rows_of(rows, slice(ticks)), np.arange(every, every + ticks)
+    points = reference_points(setpoint, rows_of(rows, following), environment, vehicle)
     return _Block(setpoint, tree_map(read_only, points))
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Annotated, Any
+from dataclasses import dataclass, replace
+from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from aerobat.control import ControlLaw, Controller
@@ -16,6 +15,7 @@ from aerobat.evaluation.score import Score
 from aerobat.evaluation.score_flights import score_flights
 from aerobat.planning import Plan
 from aerobat.simulation import FlightConfig, Outcome
+from aerobat.simulation.nested import joined
 from aerobat.studies.share import Share, Trials
 from aerobat.studies.workers import Pool, pool
 from aerobat.vehicle import Vehicle
@@ -98,16 +98,3 @@ def _score_chunk(tasks: tuple[FlightTask, ...], part: tuple[int, range]) -> Scor
     number, flights = part
     task = tasks[number]
     return score_flights(task.plan, task.vehicle, config=task.config(flights))
-
-
-def joined(parts: list[Any]) -> Any:
-    """Join scores of consecutive flights into one: arrays are concatenated, in tuples and dataclasses too."""
-    first = parts[0]
-    if isinstance(first, np.ndarray):
-        return np.concatenate(parts)
-    if isinstance(first, tuple):
-        return tuple(joined(list(each)) for each in zip(*parts, strict=True))
-    if is_dataclass(first) and not isinstance(first, type):
-        names = [field.name for field in fields(first)]
-        return replace(first, **{name: joined([getattr(part, name) for part in parts]) for name in names})
-    return first

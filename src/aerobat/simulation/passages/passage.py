@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import partial
 from math import degrees
 from typing import Any, Self
@@ -32,6 +32,7 @@ from aerobat.kernels.gates.swath import NOWHERE, Extreme, Swath
 from aerobat.problem.gate import Gate
 from aerobat.problem.opening import EdgeProbe, edge_name
 from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
+from aerobat.simulation.nested import map_arrays
 from aerobat.simulation.outcome import FlightFailure, Outcome
 from aerobat.vehicle import Ellipsoid
 
@@ -51,18 +52,7 @@ class PerFlight:
 
     def of_flight(self, k: int) -> Self:
         """Return the finding of one flight of many, in plain numbers, nested findings included."""
-        return replace(
-            self, **{field.name: _of_flight(getattr(self, field.name), k) for field in fields(self)}
-        )
-
-
-def _of_flight(value: Any, k: int) -> Any:
-    """Return one flight's part of a field that holds many."""
-    if isinstance(value, tuple):
-        return tuple(_of_flight(each, k) for each in value)
-    if isinstance(value, PerFlight):
-        return value.of_flight(k)
-    return value[k].item() if isinstance(value, np.ndarray) else value
+        return map_arrays(lambda values: values[k].item(), self)
 
 
 @by_value

@@ -19,7 +19,8 @@ from aerobat.optimization.deadline import processor
 from aerobat.planning import Attempt, Plan, Planner, as_planner
 from aerobat.planning.result import FLYING_RESERVE
 from aerobat.problem import Problem
-from aerobat.studies.flights import joined, passed
+from aerobat.simulation.nested import joined
+from aerobat.studies.flights import passed
 from aerobat.studies.passing.spread import with_more_thrust, with_narrower_gates
 from aerobat.studies.passing.task import PassingTask, Variant, warm_started_refinement
 from aerobat.studies.share import Share, Trials

@@ -14,7 +14,8 @@ from aerobat.optimization.deadline import processor, within_time
 from aerobat.planning import Attempt, Plan, Planner, plan
 from aerobat.planning.planners import planner_with_reserve
 from aerobat.problem import Problem
-from aerobat.studies.flights import FlightTask, fly_scores, joined, passed
+from aerobat.simulation.nested import joined
+from aerobat.studies.flights import FlightTask, fly_scores, passed
 from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool
 from aerobat.vehicle import Vehicle
@@ -99,8 +100,7 @@ class PassingTask:
         first = self.scores(found, flights[:SCREENING_FLIGHTS])
         if len(flights) <= SCREENING_FLIGHTS or passed(first).interval[1] < self.probability:
             return first
-        scores: Score = joined([first, self.scores(found, flights[SCREENING_FLIGHTS:])])
-        return scores
+        return joined([first, self.scores(found, flights[SCREENING_FLIGHTS:])])
 
     def share(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Share:
         """Return the share of flights of a plan that pass."""
