@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.evaluation.score import METRICS, Score
-from aerobat.evaluation.score_flights import ErrorsOverTime, score_over_time
+from aerobat.evaluation.score_flights import score_over_time
 from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.passages import Passage, passage_names
 from aerobat.studies.flights import CHUNK, FlightTask, cut
@@ -66,29 +66,33 @@ class Chunk:
             return None
         return found if all(column.shape == (count,) for column in columns.values()) else None
 
+    @classmethod
+    def joined(cls, chunks: Sequence[Chunk]) -> Chunk:
+        """Return chunks of consecutive flights as one."""
+        sampled = [chunk for chunk in chunks if len(chunk.times)] or chunks[:1]
+        return cls(
+            {name: np.concatenate([chunk.columns[name] for chunk in chunks]) for name in chunks[0].columns},
+            sampled[0].times,
+            np.concatenate([chunk.position_error for chunk in sampled]),
+            np.concatenate([chunk.attitude_error for chunk in sampled]),
+        )
+
 
 def fly_chunk(task: FlightTask, flights: range) -> Chunk:
     """Fly flights of consecutive numbers; the batch size does not change a bit."""
     is_sampled = flights.start < SAMPLED
-    parts = [_flown(task, numbers, is_sampled) for numbers in cut(flights, task.batch)]
-    columns = {name: np.concatenate([part[name] for part, _ in parts]) for name in parts[0][0]}
-    if not is_sampled:
-        return Chunk(columns, np.zeros(0), *np.zeros((2, 0, 0)))
-    errors = [each for _, each in parts]
-    return Chunk(
-        columns,
-        errors[0].times,
-        np.concatenate([each.position for each in errors]),
-        np.concatenate([each.attitude for each in errors]),
-    )
+    return Chunk.joined([_flown(task, numbers, is_sampled) for numbers in cut(flights, task.batch)])
 
 
-def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> tuple[Columns, ErrorsOverTime]:
-    """Return columns of the table for some flights, and their errors over time if they are sampled."""
+def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> Chunk:
+    """Fly one batch."""
     draws = Draws(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
     stride = STRIDE if is_sampled else None
     scores, errors = score_over_time(task.plan, task.vehicle, None, None, task.config(numbers), stride)
-    return _drawn(draws) | _scored(scores), errors
+    columns = _drawn(draws) | _scored(scores)
+    if not is_sampled:
+        return Chunk(columns, np.zeros(0), *np.zeros((2, 0, 0)))
+    return Chunk(columns, errors.times, errors.position, errors.attitude)
 
 
 def _drawn(draws: Draws) -> Columns:

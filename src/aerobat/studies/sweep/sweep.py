@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import asdict
 from pathlib import Path
@@ -97,7 +97,17 @@ def sweep(
         for flights, chunk in flown:
             kept.write(_name(flights), chunk.arrays)
             take(flights, chunk)
-    return _joined(task, [chunks[flights] for flights in spans])
+    whole = Chunk.joined([chunks[flights] for flights in spans])
+    return Sweep(
+        plan=plan,
+        vehicle=vehicle,
+        conditions=conditions,
+        seed=seed,
+        table=whole.columns,
+        times=whole.times,
+        position_error=whole.position_error,
+        attitude_error=whole.attitude_error,
+    )
 
 
 def finished_flights(folder: Path) -> int:
@@ -126,18 +136,3 @@ def _inputs_summary(task: FlightTask) -> dict[str, Any]:
         "engine": task.engine,
         "chunks": [CHUNK, SAMPLED, STRIDE],
     }
-
-
-def _joined(task: FlightTask, chunks: Sequence[Chunk]) -> Sweep:
-    """Return all flights as one sweep."""
-    sampled = [chunk for chunk in chunks if len(chunk.times)]
-    return Sweep(
-        plan=task.plan,
-        vehicle=task.vehicle,
-        conditions=task.conditions,
-        seed=task.seed,
-        table={n: np.concatenate([chunk.columns[n] for chunk in chunks]) for n in chunks[0].columns},
-        times=sampled[0].times,
-        position_error=np.concatenate([chunk.position_error for chunk in sampled]),
-        attitude_error=np.concatenate([chunk.attitude_error for chunk in sampled]),
-    )
