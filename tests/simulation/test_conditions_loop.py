@@ -1,6 +1,5 @@
 """Conditions in the loop: the same numbers in every engine, chunk and batch; none where nothing is asked."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
@@ -12,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from aerobat.engines.engine import Coded, expanded
+from aerobat.engines.engine import expanded
 from aerobat.engines.pytree import tree_leaves
 from aerobat.environment import Battery, Dispersion, Gusts, HandOff, Imu, MotionCapture, load_dispersion
 from aerobat.kernels.battery import BatteryState
@@ -22,7 +21,7 @@ from aerobat.kernels.wind import WindState
 from aerobat.simulation import Outcome, fly
 from aerobat.simulation.components import log_row
 from aerobat.simulation.conditions.draw import Draws
-from aerobat.simulation.conditions.random_source import RandomSource
+from aerobat.simulation.conditions.random_source import InputNumber, RandomSource
 from aerobat.simulation.conditions.sensors import MocapState
 from aerobat.simulation.setup import LoopPart
 from aerobat.trajectory import Trajectory
@@ -34,6 +33,7 @@ SEAM = HandOff((0.3, 0.0, 0.0), (1.0, 0.0, 0.0), 0.05, 0.03, 0.01)
 LAB = load_dispersion("lab")
 ALL = replace(LAB, motion_capture=replace(LAB.motion_capture, hand_off=SEAM, outlier=0.1, dropout=0.1))
 TICKS = 120
+TWO_NORMALS_AND_A_UNIFORM = (InputNumber.NORMAL, InputNumber.NORMAL, InputNumber.UNIFORM)
 
 
 def position(signals: Any) -> Any:
@@ -138,10 +138,6 @@ def numbers(source: RandomSource, begin: int, end: int) -> np.ndarray:
     return np.array(expanded(source.chunk(begin, end)))
 
 
-def side_by_side(normals: Sequence[Coded], uniforms: np.ndarray, ticks: np.ndarray) -> tuple[Any, ...]:
-    return (*normals, *uniforms)
-
-
 @examples(30)
 @given(st.lists(st.integers(0, 300), min_size=2, max_size=6), st.sampled_from([1, 3, 10]))
 def test_random_numbers_are_the_same_however_they_are_asked_for(cuts: list[int], period: int) -> None:
@@ -149,13 +145,13 @@ def test_random_numbers_are_the_same_however_they_are_asked_for(cuts: list[int],
     seeds = [np.random.SeedSequence(5, spawn_key=(k,)) for k in range(3)]
 
     def source() -> RandomSource:
-        return RandomSource(seeds, side_by_side, normals=2, uniforms=1, period=period, block=8)
+        return RandomSource(seeds, TWO_NORMALS_AND_A_UNIFORM, period=period, block=8)
 
     whole, cut = numbers(source(), 0, 302), source()
     for begin, end in pairwise(cuts):
         begin, end = min(begin, end), max(begin, end) + 1
         np.testing.assert_array_equal(numbers(cut, begin, end), whole[:, begin:end])
-    one = RandomSource(seeds[1:2], side_by_side, normals=2, uniforms=1, period=period, block=8)
+    one = RandomSource(seeds[1:2], TWO_NORMALS_AND_A_UNIFORM, period=period, block=8)
     alone = numbers(one, 0, 302)
     np.testing.assert_array_equal(alone[..., 0], whole[..., 1])
     samples = whole[:, ::period]
@@ -165,7 +161,7 @@ def test_random_numbers_are_the_same_however_they_are_asked_for(cuts: list[int],
 
 def test_random_numbers_are_normal_and_uniform() -> None:
     seeds = [np.random.SeedSequence(5, spawn_key=(k,)) for k in range(70)]
-    normal, other, uniform = numbers(RandomSource(seeds, side_by_side, normals=2, uniforms=1), 0, 500)
+    normal, other, uniform = numbers(RandomSource(seeds, TWO_NORMALS_AND_A_UNIFORM), 0, 500)
     for values, law in ((normal, "norm"), (other, "norm"), (uniform, "uniform")):
         assert stats.kstest(values.ravel(), law).pvalue > 1e-3
     assert abs(np.corrcoef(normal.ravel(), other.ravel())[0, 1]) < 0.02

@@ -15,7 +15,8 @@ from aerobat.environment import Dispersion, Imu, MotionCapture
 from aerobat.kernels import imu
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
 from aerobat.simulation.conditions.draw import Draws
-from aerobat.simulation.conditions.sensors import imu_source
+from aerobat.simulation.conditions.random_source import RandomSource
+from aerobat.simulation.conditions.sensors import IMU_NOISE
 from dispersed_loops import RATE, dispersed_setup, drawn, rows_of
 
 QUAD = ab.load_vehicle("agile-quad")
@@ -76,7 +77,7 @@ def measured(parameters: ImuParameters, felt: ImuSample, noise: ImuSample) -> Im
 
 def noise_of(ticks: int, vehicles: int, stream: str = "imu") -> ImuSample:
     draws = Draws(Dispersion(), 4, 1, range(vehicles))
-    noise: ImuSample = expanded(imu_source(draws, stream, 1)(0, ticks))
+    noise: ImuSample = expanded(RandomSource(draws.stream(stream), IMU_NOISE).chunk(0, ticks))
     return noise
 
 

@@ -16,7 +16,8 @@ from aerobat.kernels.battery import BatteryState
 from aerobat.kernels.wind import GustFilter, GustNoise
 from aerobat.simulation.conditions.draw import Draws, dispersed_fleet
 from aerobat.simulation.conditions.parts import DispersedFlights, gust_filter, wind_part
-from aerobat.simulation.conditions.sensors import wind_source
+from aerobat.simulation.conditions.random_source import RandomSource
+from aerobat.simulation.conditions.sensors import GUST_NOISE
 from aerobat.trajectory import Trajectory
 from dispersed_loops import dispersed_setup, drawn, rows_of
 
@@ -33,7 +34,7 @@ def gusts_of(rate: float, steps: int, **changes: float) -> np.ndarray:
     flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, Environment(), rate, hover(1.0))
     part = wind_part(dispersion.gusts, flights)
     state = wind.init(part.parameters)
-    noise = expanded(wind_source(draws, 1)(0, steps))
+    noise = expanded(RandomSource(draws.stream("wind"), GUST_NOISE, block=32).chunk(0, steps))
     rows = []
     for k in range(steps):
         along, across, vertical = noise.along[k], *(tuple(x[k] for x in pair) for pair in noise[1:])

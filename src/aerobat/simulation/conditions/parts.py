@@ -28,16 +28,17 @@ from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.wind import GustFilter, GustState, WindParameters
 from aerobat.problem import Gate
 from aerobat.simulation.conditions.draw import Draws
+from aerobat.simulation.conditions.random_source import RandomSource
 from aerobat.simulation.conditions.sensors import (
+    GUST_NOISE,
+    IMU_NOISE,
+    MOCAP_INPUT,
     BatterySag,
     ImuBias,
     ImuSensor,
     ImuSensorParameters,
     MotionCaptureSensor,
     Wind,
-    imu_source,
-    mocap_source,
-    wind_source,
 )
 from aerobat.simulation.setup import LoopPart
 from aerobat.trajectory import Trajectory
@@ -115,7 +116,8 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
         gust_filter(period / flights.rate / time_constant),
         GustState(along, (first, second), (third, fourth)),
     )
-    return LoopPart(Wind(), parameters, wind_source(flights.draws, period), period)
+    noise = RandomSource(flights.draws.stream("wind"), GUST_NOISE, period=period, block=32)
+    return LoopPart(Wind(), parameters, noise.chunk, period)
 
 
 def gust_filter(step: float) -> GustFilter:
@@ -164,9 +166,11 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
             imu.gyro_noise * noise, imu.accelerometer_noise * noise, imu.gyro_range, imu.accelerometer_range
         ),
     )
+    steps = RandomSource(flights.draws.stream("imu_bias"), IMU_NOISE, period=slow, block=32)
+    white = RandomSource(flights.draws.stream("imu"), IMU_NOISE, period=period)
     return (
-        LoopPart(ImuBias(), biases, imu_source(flights.draws, "imu_bias", slow, block=32), slow),
-        LoopPart(ImuSensor(), parameters, imu_source(flights.draws, "imu", period), period),
+        LoopPart(ImuBias(), biases, steps.chunk, slow),
+        LoopPart(ImuSensor(), parameters, white.chunk, period),
     )
 
 
@@ -192,8 +196,9 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
         hand_off=_hand_off_parameters(capture.hand_off, flights),
         first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
     )
-    source = mocap_source(flights.draws, period, flights.rate)
-    return LoopPart(MotionCaptureSensor(period, latency), parameters, source, period)
+    stream = flights.draws.stream("motion_capture")
+    source = RandomSource(stream, MOCAP_INPUT, period=period, block=32, rate=flights.rate)
+    return LoopPart(MotionCaptureSensor(period, latency), parameters, source.chunk, period)
 
 
 def _hand_off_parameters(hand_off: HandOff | None, flights: DispersedFlights) -> HandOffParameters:

@@ -7,8 +7,10 @@ version of NumPy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from enum import Enum
 from functools import cache
+from itertools import repeat
 from typing import TypeAlias
 
 import numpy as np
@@ -17,10 +19,9 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array, frozen
 from aerobat.engines.engine import Coded, Held
-from aerobat.engines.pytree import Tree
+from aerobat.engines.pytree import Tree, tree_leaves, tree_map
 
 Words: TypeAlias = NDArray[np.uint16]
-Arrange: TypeAlias = Callable[[Sequence[Coded], Array, NDArray[np.intp]], Tree]
 
 _LEVELS = 2**16
 _WORDS_PER_NUMBER = 4  # 16-bit words in one 64-bit number of the generator
@@ -29,8 +30,16 @@ _ROW_PADDING = 8  # [64-bit numbers] between vehicles' rows: rows a power of two
 _SAMPLES_PER_DRAW = 256  # samples of a vehicle: one call of its generator costs as much as some hundred words
 
 
+class InputNumber(Enum):
+    """The numbers that a leaf of a component's inputs stands for."""
+
+    NORMAL = "standard normals"
+    UNIFORM = "uniform numbers in (0, 1)"
+    TIME = "times of the samples [s]"
+
+
 class RandomSource:
-    """Standard normals and uniform numbers of a component that steps every `period` ticks.
+    """Random inputs of a component that steps every `period` ticks.
 
     The numbers are drawn in blocks of samples that begin at multiples of the block size, so that any cuts of
     ticks, in any order, give the same bits. Only ticks at which the component steps draw numbers.
@@ -39,29 +48,27 @@ class RandomSource:
     def __init__(
         self,
         seeds: Sequence[ISeedSequence],
-        arrange: Arrange,
+        inputs: Tree,
         *,
-        normals: int,
-        uniforms: int = 0,
         period: int = 1,
         block: int = 256,
+        rate: float = 1.0,
     ) -> None:
         """Prepare the generators.
 
         Args:
             seeds: one for each vehicle.
-            arrange: makes a component's inputs of the normals, of the uniforms (numbers, samples, vehicles),
-                and of the ticks at which the component steps, (samples,).
-            normals: standard normals per sample.
-            uniforms: numbers in (0, 1) per sample.
+            inputs: the component's inputs, with members of InputNumber as leaves.
             period: ticks from one sample to the next.
             block: samples whose numbers are consecutive in the generator's sequence, a multiple of 4.
+            rate: of the ticks [1/s].
         """
         self._seeds = seeds
-        self._arrange = arrange
-        self._normals = normals
-        self._words = normals + 2 * uniforms
-        self._period = period
+        self._inputs = inputs
+        leaves = tree_leaves(inputs)
+        self._normals = leaves.count(InputNumber.NORMAL)
+        self._words = self._normals + 2 * leaves.count(InputNumber.UNIFORM)
+        self._period, self._rate = period, rate
         self._size = block
         self._blocks = max(1, _SAMPLES_PER_DRAW // block)
         self._restart()
@@ -71,9 +78,12 @@ class RandomSource:
         first = begin // self._period
         words = self._samples(first, (end - 1) // self._period + 1)
         high, low = words[self._normals :: 2], words[self._normals + 1 :: 2]
-        uniforms = (high + (low + 0.5) / _LEVELS) / _LEVELS
-        normals = [Coded(word, _quantiles()) for word in words[: self._normals]]
-        samples = self._arrange(normals, uniforms, (first + np.arange(words.shape[1])) * self._period)
+        numbers = {
+            InputNumber.NORMAL: iter([Coded(word, _quantiles()) for word in words[: self._normals]]),
+            InputNumber.UNIFORM: iter((high + (low + 0.5) / _LEVELS) / _LEVELS),
+            InputNumber.TIME: repeat((first + np.arange(words.shape[1])) * self._period / self._rate),
+        }
+        samples = tree_map(lambda kind: next(numbers[kind]), self._inputs)
         return samples if self._period == 1 else Held(np.arange(begin, end) // self._period - first, samples)
 
     def _samples(self, begin: int, end: int) -> Words:

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from aerobat.arrays import Array
-from aerobat.engines.engine import Coded
 from aerobat.kernels import battery, imu, mocap, motors, rigid_body, wind
 from aerobat.kernels.battery import BatteryParameters, BatteryState
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample, ImuState
@@ -19,9 +13,14 @@ from aerobat.kernels.motors import Airframe
 from aerobat.kernels.rigid_body import EnvironmentParameters
 from aerobat.kernels.wind import GustNoise, WindParameters, WindState
 from aerobat.simulation.components import with_wind
-from aerobat.simulation.conditions.draw import Draws
-from aerobat.simulation.conditions.random_source import RandomSource
-from aerobat.simulation.loop import Component, Signals, Source
+from aerobat.simulation.conditions.random_source import InputNumber
+from aerobat.simulation.loop import Component, Signals
+
+_NORMAL, _NORMALS = InputNumber.NORMAL, (InputNumber.NORMAL,) * 3
+# random inputs of the components
+GUST_NOISE = GustNoise(_NORMAL, (_NORMAL, _NORMAL), (_NORMAL, _NORMAL))
+IMU_NOISE = ImuSample(_NORMALS, _NORMALS)  # of its white noise, and of the walk of its biases
+MOCAP_INPUT = MocapInput(InputNumber.TIME, _NORMALS, _NORMALS, _NORMALS, InputNumber.UNIFORM)
 
 
 @dataclass(frozen=True)
@@ -37,15 +36,6 @@ class Wind(Component):
     ) -> WindState:
         """See `Component.step`."""
         return wind.step(parameters, state, noise)
-
-
-def wind_source(draws: Draws, period: int) -> Source:
-    """Return the random numbers of gusts, for a component that steps every `period` ticks."""
-
-    def noise(x: Sequence[Coded], *_: object) -> GustNoise:
-        return GustNoise(x[0], (x[1], x[2]), (x[3], x[4]))
-
-    return RandomSource(draws.stream("wind"), noise, normals=5, period=period, block=32).chunk
 
 
 @dataclass(frozen=True)
@@ -106,22 +96,6 @@ class ImuSensor(Component):
         return imu.step(signals.ops, parameters.errors, state, true_sample, signals.of(ImuSample), noise)
 
 
-def imu_source(draws: Draws, stream: str, period: int, block: int = 256) -> Source:
-    """Return the random numbers of an IMU's white noise, or of the walk of its biases.
-
-    Args:
-        draws: of each vehicle.
-        stream: "imu" or "imu_bias".
-        period: ticks from one sample to the next.
-        block: samples drawn at once.
-    """
-
-    def noise(x: Sequence[Coded], *_: object) -> ImuSample:
-        return ImuSample((x[0], x[1], x[2]), (x[3], x[4], x[5]))
-
-    return RandomSource(draws.stream(stream), noise, normals=6, period=period, block=block).chunk
-
-
 class MocapState(NamedTuple):
     """Poses in transit, the latest first."""
 
@@ -156,20 +130,3 @@ class MotionCaptureSensor(Component):
         """See `Component.step`."""
         taken = mocap.sample(signals.ops, parameters, signals.plant.body, inputs)
         return MocapState((taken, *state.queue[:-1]))
-
-
-def mocap_source(draws: Draws, period: int, rate: float) -> Source:
-    """Return the time, and the random numbers of motion capture.
-
-    Args:
-        draws: of each vehicle.
-        period: ticks from one sample to the next.
-        rate: of the ticks [1/s].
-    """
-
-    def sampled(x: Sequence[Coded], chance: Array, ticks: NDArray[np.intp]) -> MocapInput:
-        return MocapInput(ticks / rate, (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8]), chance[0])
-
-    return RandomSource(
-        draws.stream("motion_capture"), sampled, normals=9, uniforms=1, period=period, block=32
-    ).chunk
