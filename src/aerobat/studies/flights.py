@@ -17,7 +17,7 @@ from aerobat.planning import Plan
 from aerobat.simulation import FlightConfig, Outcome
 from aerobat.simulation.nested import joined
 from aerobat.studies.share import Share, Trials
-from aerobat.studies.workers import Pool, pool
+from aerobat.studies.workers import Pool
 from aerobat.vehicle import Vehicle
 
 CHUNK = 50  # flights that are flown, kept and resumed as a unit, whatever the batches and the workers
@@ -76,16 +76,16 @@ def fly_trials(task: FlightTask, progress: Callable[[int, int], None] | None = N
         progress: Called with the number of finished flights and of successful ones.
     """
     flown, failures = 0, list[Outcome]()
-    with pool(1, None, 1) as flying:  # hundreds of flights end before another process starts
-        for look in LOOKS:
-            (scores,) = fly_scores(flying, (task,), range(flown, look))
-            flown, failures = look, [*failures, *(end for end in scores.outcomes if not end.is_success)]
-            share = Share(flown - len(failures), flown)
-            if progress is not None:
-                progress(flown, share.count)
-            trials = Trials(task.conditions, task.seed, share, tuple(failures))
-            if trials.proven or trials.refuted:
-                break
+    here = Pool()  # this process: hundreds of flights end before another one starts
+    for look in LOOKS:
+        (scores,) = fly_scores(here, (task,), range(flown, look))
+        flown, failures = look, [*failures, *(end for end in scores.outcomes if not end.is_success)]
+        share = Share(flown - len(failures), flown)
+        if progress is not None:
+            progress(flown, share.count)
+        trials = Trials(task.conditions, task.seed, share, tuple(failures))
+        if trials.proven or trials.refuted:
+            break
     return trials
 
 

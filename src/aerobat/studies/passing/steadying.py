@@ -24,7 +24,7 @@ from aerobat.studies.flights import passed
 from aerobat.studies.passing.spread import with_more_thrust, with_narrower_gates
 from aerobat.studies.passing.task import PassingTask, Variant, warm_started_refinement
 from aerobat.studies.share import Share, Trials
-from aerobat.studies.workers import pool
+from aerobat.studies.workers import Pool
 
 MAX_LAG_ANGLE = radians(5.0)  # [rad] turned within the rotors' lag, above which flights may be too late
 SELECTION_FLIGHTS = range(10**6, 10**6 + 200)  # flights that select the plan; other flights judge it
@@ -102,19 +102,18 @@ def steadied(
     if float(vehicle.lags.max()) * (plan.assessment.max_body_rate or 0.0) <= MAX_LAG_ANGLE:
         return plan
     kept = reserve if plan.keeps(reserve) else 0.0
-    with pool(1, None, 1) as flying:
-        task = PassingTask(
-            problem=plan.problem,
-            planner=warm_started_refinement(planner, plan, kept),
-            vehicle=vehicle,
-            conditions=as_dispersion(conditions),
-            seed=seed,
-            controller=controller,
-            probability=Trials.NEEDED,
-            progress=progress,
-            flying=flying,
-        )
-        return _steadier(task, plan, kept, may_grow=reserve == FLYING_RESERVE)
+    task = PassingTask(
+        problem=plan.problem,
+        planner=warm_started_refinement(planner, plan, kept),
+        vehicle=vehicle,
+        conditions=as_dispersion(conditions),
+        seed=seed,
+        controller=controller,
+        probability=Trials.NEEDED,
+        progress=progress,
+        flying=Pool(),
+    )
+    return _steadier(task, plan, kept, may_grow=reserve == FLYING_RESERVE)
 
 
 @dataclass(frozen=True)
