@@ -44,7 +44,6 @@ TUNED = (
 TUNABLE = (*TUNED, "jerk_filter", "lead_time_constant")
 MAX_FACTOR = 4.0  # [-] largest factor by which a gain is raised or lowered
 QUANTILE = 0.95  # quantile over flights of the largest position error that is minimized
-FAILURE = DIVERGENCE_RADIUS  # [m] cost if all flights fail: 1 % of failures costs 5 cm
 _FIRST_FACTOR = 1.4  # [-] factor on each gain in turn in the initial simplex
 _RESOLUTION = 0.01  # [-] relative tolerance of the gains at which the search ends
 _RESAMPLES = 1000  # number of bootstrap samples of the fresh flights
@@ -84,7 +83,7 @@ class FlightCosts:
     @property
     def cost(self) -> float:
         """The minimized cost [m]: `error_quantile_m`, plus 5 cm for each 1 % of failed flights."""
-        return self.error_quantile_m + FAILURE * self.failed_fraction
+        return self.error_quantile_m + DIVERGENCE_RADIUS * self.failed_fraction
 
     def resampled(self, flights: NDArray[np.int64]) -> FlightCosts:
         """Return the costs of the flights with these numbers, which may repeat."""

@@ -38,7 +38,6 @@ _NORMALS = (  # standard normals of a draw, always all of them in this order, wh
 _ENDS = np.cumsum([count for _, count in _NORMALS]).tolist()
 # Cholesky factor [-] of (1/2, 1/4; 1/4, 1/4), the covariance of the two filters of a second-order gust
 _GUST_FIRST, _GUST_SECOND = sqrt(0.5), sqrt(0.125)
-_SEED_WORDS = 3  # words of 64 bits in the state of a generator
 
 
 class Draws:
@@ -62,7 +61,7 @@ class Draws:
         flights = self.flights = tuple(flights)
         count = sum(count for _, count in _NORMALS)
         normals, uniforms = np.empty((len(flights), count + 2 * rotors)), np.empty((len(flights), 2))
-        words = np.empty((len(flights), 1 + len(STREAMS), _SEED_WORDS), dtype=np.uint64)
+        words = np.empty((len(flights), 1 + len(STREAMS), 3), dtype=np.uint64)  # of a generator's state
         for k, flight in enumerate(flights):
             own = np.random.SeedSequence(seed, spawn_key=(flight,))
             words[k] = own.generate_state(words[k].size, np.uint64).reshape(words[k].shape)

@@ -193,7 +193,7 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
         outlier=capture.outlier,
         outlier_size=capture.outlier_size,
         outage=(begin, end),
-        hand_off=_hand_off_parameters(capture.hand_off, flights),
+        hand_off=_hand_off_parameters(capture.hand_off or HandOff(), flights),
         first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
     )
     stream = flights.draws.stream("motion_capture")
@@ -201,16 +201,16 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
     return LoopPart(MotionCaptureSensor(period, latency), parameters, source.chunk, period)
 
 
-def _hand_off_parameters(hand_off: HandOff | None, flights: DispersedFlights) -> HandOffParameters:
-    """Return the plane of hand-off; without a hand-off, an arbitrary plane without misfit."""
-    point, normal = hand_off_plane(hand_off or HandOff(), flights.trajectory, flights.gates)
+def _hand_off_parameters(hand_off: HandOff, flights: DispersedFlights) -> HandOffParameters:
+    """Return the plane of hand-off and the misfit there, which is zero by default."""
+    point, normal = hand_off_plane(hand_off, flights.trajectory, flights.gates)
     rotation = so3.exp(flights.draws.columns["hand_off_rotation"])
     return HandOffParameters(
         components(point),
         components(normal),
         Pose(flights.each("hand_off_translation"), components(rotation)),
         flights.each("warp"),
-        1.0 / (hand_off or HandOff()).warp_depth,
+        1.0 / hand_off.warp_depth,
     )
 
 

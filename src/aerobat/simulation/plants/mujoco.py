@@ -43,7 +43,6 @@ _KINDS = {
     _OBSTACLE: Contact.OBSTACLE,
 }
 _NO_LAG_RATE = 1e4  # [1/s] a rotor whose inverse time constant is at least this is simulated without lag
-_ROUNDING = 1e-9  # [-] rounding of a number of steps
 
 
 class Mujoco(Plant):
@@ -105,7 +104,7 @@ class MujocoRun:
 
     def advance(self, actuation: Actuation, duration: float) -> None:
         """See `PlantRun.advance`."""
-        steps = ceil(duration / self._max_step - _ROUNDING)
+        steps = ceil(duration / self._max_step - 1e-9)
         self._model.opt.timestep = duration / max(steps, 1)
         self._data.ctrl[:] = np.clip(actuation.commands, self._airframe.rotors.min_thrust, actuation.ceilings)
         drag = np.array(self._airframe.mass_properties.drag_body)

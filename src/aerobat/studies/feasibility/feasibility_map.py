@@ -38,9 +38,6 @@ from aerobat.studies.workers import Pool, Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
 
 MAX_CELLS = 10_000  # cells of a map: hours of planning
-DIGITS = 12  # decimals to which values of a range are rounded: steps of 0.1 add up to 0.3
-ROUNDING = 1e-9  # [-] of a step, tolerance for the end of a range
-MAX_AXES = 2
 
 
 @dataclass(frozen=True)
@@ -102,7 +99,7 @@ def _range(name: str, first: float, last: float, step: float) -> tuple[float, ..
     """Return the values from first to last in equal steps; last is included if a step ends there."""
     if step == 0.0:
         raise SpecError(f"the step of {name} is 0; give another, or one value, as {name}={first:g}")
-    count = floor((last - first) / step + ROUNDING) + 1
+    count = floor((last - first) / step + 1e-9) + 1
     if count < 1:
         raise SpecError(
             f"the range of {name} is empty: steps of {step:g} do not lead from {first:g} to {last:g}; "
@@ -110,7 +107,7 @@ def _range(name: str, first: float, last: float, step: float) -> tuple[float, ..
         )
     if count > MAX_CELLS:
         raise SpecError(f"{name} has {count} values, {MAX_CELLS} at most are allowed; take a larger step")
-    return tuple(round(first + k * step, DIGITS) + 0.0 for k in range(count))
+    return tuple(round(first + k * step, 12) + 0.0 for k in range(count))  # steps of 0.1 add up to 0.3
 
 
 @by_value
@@ -274,7 +271,7 @@ def _inputs_summary(axes: Sequence[Axis], task: ProbedTask) -> dict[str, Any]:
 
 def _fields(axes: Sequence[Axis], scenario: Scenario) -> tuple[Lens, ...]:
     """Return the fields of axes. Raises SpecError for axes that are no map of a scenario."""
-    if not 1 <= len(axes) <= MAX_AXES:
+    if not 1 <= len(axes) <= 2:
         raise SpecError(f"over must name one field or two, got {len(axes)}")
     cells = prod(len(axis.values) for axis in axes)
     if cells > MAX_CELLS:

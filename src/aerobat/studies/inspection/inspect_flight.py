@@ -28,7 +28,6 @@ from aerobat.studies.inspection.rotors import rotor_fault
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
 
-_DIGITS = 9  # decimals of a row's duration [s], so that equal rows share a step
 _MIN_FEEDBACK = 1e-3  # [m/s²] feedback below this is rounding
 NAMES = ("start", "hand-off", "vehicle", "saturation", "delay", "gains")  # causes in every flight
 MIN_ROWS = 10  # fewest rows of a log that can be inspected
@@ -61,7 +60,7 @@ def responses(
     state = np.zeros((3, len(names), 3))  # position, velocity, integral
     state[0, 0], state[1, 0] = start
     errors = [state[0]]
-    durations = np.round(np.diff(times), _DIGITS)
+    durations = np.round(np.diff(times), 9)  # so that equal rows share a step
     steps = {float(h): _step(float(h), loop) for h in np.unique(durations)}
     usual = names.index(fault or unsaturated)
     responsible, before = usual, ShortfallCause.UNSATURATED

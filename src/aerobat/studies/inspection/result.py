@@ -16,7 +16,6 @@ from aerobat.studies.inspection.alignment import Alignment
 
 NEGLIGIBLE = 0.005  # [m] largest error without a cause: the best flights have errors of millimetres
 _SHOWN = 5e-4  # [m] smallest part of an error that is shown
-_RISE = 1e-9  # [m] below which an error has no direction
 CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "start": ("the start offset", "hold the vehicle at the plan's start for longer before it begins"),
@@ -142,7 +141,7 @@ class Inspection:
     @property
     def direction(self) -> Array:
         """The direction of the largest error, a unit vector in world axes, (3,); zero without an error."""
-        return np.asarray(self.error[self._worst] / max(self.largest, _RISE))
+        return np.asarray(self.error[self._worst] / max(self.largest, 1e-9))
 
     @cached_property
     def shares(self) -> tuple[ErrorShare, ...]:

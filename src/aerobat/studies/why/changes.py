@@ -18,7 +18,6 @@ from aerobat.problem.stage import Stage
 from aerobat.studies.lens import lens
 from aerobat.vehicle import Vehicle
 
-HALF = 0.5
 THRUST_FACTOR = 1.5  # factor on the rotors' maximum thrusts
 
 
@@ -126,14 +125,14 @@ def _with_half_the_thrust(stage: Stage) -> Stage:
     return replace(
         stage,
         conditions=tuple(map(_at_half_the_thrust, stage.conditions)),
-        min_upright_thrust=None if stage.min_upright_thrust is None else HALF * stage.min_upright_thrust,
-        attitude=None if attitude is None else replace(attitude, min_thrust=HALF * attitude.min_thrust),
+        min_upright_thrust=None if stage.min_upright_thrust is None else 0.5 * stage.min_upright_thrust,
+        attitude=None if attitude is None else replace(attitude, min_thrust=0.5 * attitude.min_thrust),
     )
 
 
 def _at_half_the_thrust(condition: Condition) -> Condition:
     if condition.min_thrust <= 0.0:
         return condition
-    lower = HALF * condition.lower if condition.lower > 0.0 else condition.lower
-    upper = HALF * condition.upper if condition.upper < 0.0 else condition.upper
+    lower = 0.5 * condition.lower if condition.lower > 0.0 else condition.lower
+    upper = 0.5 * condition.upper if condition.upper < 0.0 else condition.upper
     return replace(condition, lower=lower, upper=upper)
