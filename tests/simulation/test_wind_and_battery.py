@@ -18,6 +18,7 @@ from aerobat.simulation.conditions.draw import Draws, dispersed_fleet
 from aerobat.simulation.conditions.parts import DispersedFlights, gust_filter, wind_part
 from aerobat.simulation.conditions.random_source import RandomSource
 from aerobat.simulation.conditions.sensors import GUST_NOISE
+from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.trajectory import Trajectory
 from dispersed_loops import dispersed_setup, drawn, rows_of
 
@@ -31,7 +32,8 @@ def gusts_of(rate: float, steps: int, **changes: float) -> np.ndarray:
     """Gusts at so many ticks a second, along, across and vertical, (3, steps, flights)."""
     dispersion = Dispersion(gusts=Gusts(intensity=INTENSITY, length=LENGTH, airspeed=AIRSPEED, **changes))
     draws = Draws(dispersion, 6, 3, range(FLIGHTS))
-    flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, Environment(), rate, hover(1.0))
+    path = ReferenceSource(hover(1.0), HEXA, Environment(), rate)
+    flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), path)
     part = wind_part(dispersion.gusts, flights)
     state = wind.init(part.parameters)
     noise = expanded(RandomSource(draws.stream("wind"), GUST_NOISE, block=32).chunk(0, steps))
@@ -89,7 +91,8 @@ def test_the_mean_wind_is_that_of_the_place_and_the_flight_s_own() -> None:
     dispersion = Dispersion(gusts=Gusts(mean_wind=1.0))
     draws = Draws(dispersion, 6, 3, range(3))
     windy = Environment(wind=(0.0, 2.0, 0.5))
-    flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), HEXA, windy, 1000.0, hover(1.0))
+    path = ReferenceSource(hover(1.0), HEXA, windy, 1000.0)
+    flights = DispersedFlights(draws, dispersed_fleet(HEXA, draws), path)
     state = wind.init(wind_part(dispersion.gusts, flights).parameters)
     expected = windy.wind + draws.columns["mean_wind"]
     np.testing.assert_allclose(np.transpose(state.velocity), expected, atol=1e-15)

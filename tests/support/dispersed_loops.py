@@ -11,7 +11,6 @@ from aerobat.simulation import FlightConfig, prepare
 from aerobat.simulation.conditions.draw import Draws, dispersed_fleet
 from aerobat.simulation.conditions.parts import DispersedFlights, condition_parts
 from aerobat.simulation.setup import FlightSetup
-from aerobat.trajectory import as_trajectory
 from aerobat.vehicle import Vehicle
 
 RATE = 1000.0  # [1/s]
@@ -35,7 +34,7 @@ def dispersed_setup(
     setup = prepare(plan, [vehicle] * len(draws), config=config)
     fleet = dispersed_fleet(vehicle, draws)
     gates = () if problem is None else problem.gates
-    flights = DispersedFlights(draws, fleet, vehicle, setup.environment, RATE, as_trajectory(plan), gates)
+    flights = DispersedFlights(draws, fleet, setup.reference, gates)
     observer, controller, plant = setup.parts
     actual = plant.parameters._replace(airframe=airframe_parameters(fleet, flights.effectiveness))
     parts = (*condition_parts(dispersion, flights), observer, controller, replace(plant, parameters=actual))

@@ -14,7 +14,6 @@ from aerobat.engines.pytree import Tree, components
 from aerobat.environment import (
     Battery,
     Dispersion,
-    Environment,
     Gusts,
     HandOff,
     Imu,
@@ -40,9 +39,9 @@ from aerobat.simulation.conditions.sensors import (
     MotionCaptureSensor,
     Wind,
 )
+from aerobat.simulation.reference_source import ReferenceSource
 from aerobat.simulation.setup import LoopPart
 from aerobat.trajectory import Trajectory
-from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
 SLOW_RATE = 100.0  # [1/s] rate of slow components: sensor biases, battery charge, and wind without fast gusts
@@ -58,11 +57,8 @@ class DispersedFlights:
 
     draws: Draws
     fleet: Fleet  # vehicles that really fly, unlike the nominal one
-    nominal: Vehicle
-    environment: Environment
-    rate: float  # [1/s] of the ticks
-    trajectory: Trajectory  # that is flown
-    gates: tuple[Gate, ...] = ()  # on its way; the first gate is the default plane of a hand-off
+    reference: ReferenceSource  # with the nominal vehicle, the environment without gusts, and the ticks' rate
+    gates: tuple[Gate, ...] = ()  # on the way; the first gate is the default plane of a hand-off
 
     def each(self, name: str) -> Tree:
         """Return a field of the draws: a leaf (vehicles,), or for an array a tuple of leaves."""
@@ -76,7 +72,7 @@ class DispersedFlights:
 
     def slow_period(self, rate: float = SLOW_RATE) -> int:
         """Return the ticks per step of a component that steps at `rate` [1/s], or somewhat faster."""
-        return max(1, int(self.rate / rate + TICK_TOLERANCE))
+        return max(1, int(self.reference.rate / rate + TICK_TOLERANCE))
 
 
 def condition_parts(dispersion: Dispersion, flights: DispersedFlights) -> tuple[LoopPart, ...]:
@@ -100,7 +96,7 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
     """Return the part for mean wind and gusts."""
     time_constant = gusts.length / gusts.airspeed
     period = flights.slow_period(max(SLOW_RATE, GUST_STEPS / time_constant))
-    mean = flights.environment.wind + flights.draws.columns["mean_wind"]
+    mean = flights.reference.environment.wind + flights.draws.columns["mean_wind"]
     speed = np.hypot(mean[:, 0], mean[:, 1])
     heading = flights.draws.columns["gust_heading"]
     is_calm = speed == 0.0
@@ -113,7 +109,7 @@ def wind_part(gusts: Gusts, flights: DispersedFlights) -> LoopPart:
             np.where(is_calm, np.sin(heading), mean[:, 1] / divisor),
         ),
         gusts.intensity,
-        gust_filter(period / flights.rate / time_constant),
+        gust_filter(period / flights.reference.rate / time_constant),
         GustState(along, (first, second), (third, fourth)),
     )
     noise = RandomSource(flights.draws.stream("wind"), GUST_NOISE, period=period, block=32)
@@ -139,9 +135,10 @@ def gust_filter(step: float) -> GustFilter:
 
 def battery_part(battery: Battery, flights: DispersedFlights) -> LoopPart:
     """Return the part for a battery that hover of the nominal vehicle empties within its endurance."""
-    nominal = Fleet.of([flights.nominal])
-    hover = flights.nominal.mass * flights.environment.gravity * np.abs(nominal.mixer[0, :, 0])
-    radii = np.array([rotor.radius for rotor in flights.nominal.rotors])
+    vehicle = flights.reference.vehicle
+    weight = vehicle.mass * flights.reference.environment.gravity
+    hover = weight * np.abs(Fleet.of([vehicle]).mixer[0, :, 0])
+    radii = np.array([rotor.radius for rotor in vehicle.rotors])
     hover_power = np.sum(hover**1.5 / radii)
     usage = flights.effectiveness**1.5 / radii / hover_power / battery.endurance
     parameters = BatteryParameters(flights.each("charge"), components(usage), battery.sag)
@@ -151,17 +148,17 @@ def battery_part(battery: Battery, flights: DispersedFlights) -> LoopPart:
 def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
     """Return the parts for an IMU's biases and for the IMU."""
     slow = flights.slow_period()
-    walk = np.sqrt(slow / flights.rate)
+    walk = np.sqrt(slow / flights.reference.rate)
     biases = BiasParameters(
         ImuSample(flights.each("gyro_bias"), flights.each("accelerometer_bias")),
         imu.gyro_bias_walk * walk,
         imu.accelerometer_bias_walk * walk,
     )
-    period = whole_ticks(flights.rate, imu.rate, "imu.rate")
+    period = whole_ticks(flights.reference.rate, imu.rate, "imu.rate")
     noise = np.sqrt(imu.rate)
     parameters = ImuSensorParameters(
         airframe_parameters(flights.fleet, flights.effectiveness),
-        environment_parameters(flights.environment, len(flights.draws)),
+        environment_parameters(flights.reference.environment, len(flights.draws)),
         ImuParameters(
             imu.gyro_noise * noise, imu.accelerometer_noise * noise, imu.gyro_range, imu.accelerometer_range
         ),
@@ -176,8 +173,8 @@ def imu_parts(imu: Imu, flights: DispersedFlights) -> tuple[LoopPart, LoopPart]:
 
 def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> LoopPart:
     """Return the part for motion capture."""
-    period = whole_ticks(flights.rate, capture.rate, "motion_capture.rate")
-    latency = round(capture.latency * flights.rate)
+    period = whole_ticks(flights.reference.rate, capture.rate, "motion_capture.rate")
+    latency = round(capture.latency * flights.reference.rate)
     if latency >= MAX_QUEUE * period:
         raise SpecError(
             f"motion_capture.latency must be below {MAX_QUEUE} periods of its rate, "
@@ -197,13 +194,13 @@ def motion_capture_part(capture: MotionCapture, flights: DispersedFlights) -> Lo
         first_error=(flights.each("first_position_error"), flights.each("first_attitude_error")),
     )
     stream = flights.draws.stream("motion_capture")
-    source = RandomSource(stream, MOCAP_INPUT, period=period, block=32, rate=flights.rate)
+    source = RandomSource(stream, MOCAP_INPUT, period=period, block=32, rate=flights.reference.rate)
     return LoopPart(MotionCaptureSensor(period, latency), parameters, source.chunk, period)
 
 
 def _hand_off_parameters(hand_off: HandOff, flights: DispersedFlights) -> HandOffParameters:
     """Return the plane of hand-off and the misfit there, which is zero by default."""
-    point, normal = hand_off_plane(hand_off, flights.trajectory, flights.gates)
+    point, normal = hand_off_plane(hand_off, flights.reference.trajectory, flights.gates)
     rotation = so3.exp(flights.draws.columns["hand_off_rotation"])
     return HandOffParameters(
         components(point),

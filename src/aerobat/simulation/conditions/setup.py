@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 from aerobat.environment import Dispersion, Environment
@@ -60,20 +61,13 @@ def dispersed_setup(
     numbers = config.flights or range(1)
     draws = Draws(conditions, len(nominal.rotors), config.seed, numbers)
     controller = config.controller_of([nominal])
-    flights = DispersedFlights(
-        draws=draws,
-        fleet=dispersed_fleet(nominal, draws),
-        nominal=nominal,
-        environment=environment,
-        rate=rate,
-        trajectory=as_trajectory(plan),
-        gates=() if isinstance(plan, Trajectory) else plan.problem.gates,
-    )
     reference = ReferenceSource(as_trajectory(plan), nominal, environment, rate)
+    gates = () if isinstance(plan, Trajectory) else plan.problem.gates
+    flights = DispersedFlights(draws, dispersed_fleet(nominal, draws), reference, gates)
     known = Fleet.of([nominal])
     disturbed = condition_parts(conditions, flights)
     return FlightSetup(
-        start=bodies(flights.draws.starts(reference.start)),
+        start=bodies(draws.starts(reference.start)),
         parts=(
             *disturbed,
             _observer(conditions, flights, disturbed),
@@ -111,11 +105,11 @@ def _observer(conditions: Dispersion, flights: DispersedFlights, disturbed: Sequ
         return LoopPart(StateObserver())
     sensor = next(p.component for p in disturbed if isinstance(p.component, MotionCaptureSensor))
     settings = Ekf.of_sensors(imu, capture, max(conditions.start_velocity, _MIN_START_VELOCITY))
-    parameters = ekf_parameters(settings, flights.environment.gravity, len(flights.draws))
+    parameters = ekf_parameters(settings, flights.reference.environment.gravity, len(flights.draws))
     return LoopPart(
         EkfObserver(sensor.period, sensor.latency),
-        ObserverParameters(parameters, 1.0 / flights.rate),
-        observer_source(sensor, flights.rate),
+        ObserverParameters(parameters, 1.0 / flights.reference.rate),
+        observer_source(sensor, flights.reference.rate),
     )
 
 
@@ -130,8 +124,8 @@ def _controller(
 
     The controller's reference is that of the time when its commands take effect.
     """
-    nominal, environment, rate = flights.nominal, flights.environment, flights.rate
-    model = controller_model(settings, (nominal,), known, environment)
+    nominal, rate = flights.reference.vehicle, flights.reference.rate
+    model = controller_model(settings, (nominal,), known, flights.reference.environment)
     period = whole_ticks(rate, config.control_rate, "control_rate")
     delay = round(conditions.computation_delay * rate)
     if delay > period:
@@ -147,9 +141,7 @@ def _controller(
         observer = (LoopPart(DisturbanceObserver(), DisturbanceParameters(model, *times), period=period),)
     source = None
     if period > 1 or delay > 0:
-        source = ReferenceSource(
-            flights.trajectory, nominal, environment, rate, every=period, delay=delay / rate
-        ).chunk
+        source = replace(flights.reference, every=period, delay=delay / rate).chunk
     parameters = ControllerParameters(model, delay / rate if delay else ())
     controller = LoopPart(controller_component(config.law, settings), parameters, source, period)
     takes_effect = partial(due_ticks, period, delay=delay)
