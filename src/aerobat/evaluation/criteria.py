@@ -50,10 +50,6 @@ def criteria_of(goal: Problem | Plan, path: SampledPath) -> Criteria:
 
     A plan's stages give the times of passages. Without a plan the times are those of the set-points' nearest
     approaches to the centres, in the stages' order where they have one.
-
-    Args:
-        goal: the problem, or a plan for it.
-        path: the set-points of the flights.
     """
     problem = goal.problem if isinstance(goal, Plan) else goal
     placed = timed_stages(goal.stages, problem) if isinstance(goal, Plan) else ()

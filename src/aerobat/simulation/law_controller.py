@@ -129,24 +129,14 @@ def _law_message(method: Any, complaint: str) -> str:
 
 
 def controller_component(law: ControlLaw | None, settings: Controller) -> Component:
-    """Return the controller's component: of a control law, or the tracking controller.
-
-    Args:
-        law: The control law; None for the tracking controller.
-        settings: Of which the feature flags are used.
-    """
+    """Return the controller's component: of a control law, or else the tracking controller."""
     if law is None:
         return TrackingController(settings.feature_flags)
     return LawController(law, _RATE_LAW_FLAGS if law.GIVES_RATES else settings.feature_flags)
 
 
 def inner_loop(law: ControlLaw | None, model: ControllerModel) -> tuple[LoopPart, ...]:
-    """Return the inner loop behind a law that gives body rates, one part; nothing for other controllers.
-
-    Args:
-        law: The control law; None for the tracking controller.
-        model: The model of the nominal vehicles.
-    """
+    """Return the inner loop behind a law that gives body rates, one part; nothing for other controllers."""
     if law is None or not law.GIVES_RATES:
         return ()
     return (LoopPart(RateLoop(), RateLoopModel(model.airframe, model.mixer, GYRO, DERIVATIVE)),)

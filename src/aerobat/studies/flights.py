@@ -56,13 +56,7 @@ def cut(flights: range, size: int = CHUNK) -> list[range]:
 
 
 def fly_scores(flying: Pool, tasks: tuple[FlightTask, ...], flights: range) -> list[Score]:
-    """Score the same flights of each task.
-
-    Args:
-        flying: The workers.
-        tasks: The plans and settings.
-        flights: The numbers of the flights.
-    """
+    """Score the flights of these numbers, the same ones of each task."""
     parts = [(k, numbers) for k in range(len(tasks)) for numbers in cut(flights)]
     found = dict(flying.results(_score_chunk, tasks, parts, together=CHUNKS_PER_GROUP, compiles=True))
     return [joined([found[k, numbers] for numbers in cut(flights)]) for k in range(len(tasks))]
@@ -71,9 +65,7 @@ def fly_scores(flying: Pool, tasks: tuple[FlightTask, ...], flights: range) -> l
 def fly_trials(task: FlightTask, progress: Callable[[int, int], None] | None = None) -> Trials:
     """Fly until the share of successes is decided, or the flights of all LOOKS are flown.
 
-    Args:
-        task: The plan, its conditions and settings.
-        progress: Called with the number of finished flights and of successful ones.
+    `progress` is called with the number of finished flights and of successful ones.
     """
     flown, failures = 0, list[Outcome]()
     here = Pool()  # this process: hundreds of flights end before another one starts

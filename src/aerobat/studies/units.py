@@ -46,12 +46,7 @@ OF = MappingProxyType(  # units of names that mean something else in these owner
 
 
 def unit_of(names: tuple[str, ...]) -> str:
-    """Return the unit of a number, empty where it has none.
-
-    Args:
-        names: the keys that lead to the number, from the problem, the vehicle and so on, without list
-            indices.
-    """
+    """Return the unit of the number that these keys, without indices, lead to; empty where it has none."""
     holder = "limits" if names[1:2] == ("limits",) else names[0]
     own = OF.get(holder, {})
     if names[-1].endswith(DEGREES) and names[-1] not in own:

@@ -56,12 +56,7 @@ class Surface:
         return np.concatenate([*fans, np.zeros((0, 3, 3))])
 
     def within(self, lower: Array, upper: Array) -> Surface:
-        """Return the part of the surface inside a box, open where the box cuts it.
-
-        Args:
-            lower: The box's lower corner [m], (3,).
-            upper: Its upper corner [m], (3,).
-        """
+        """Return the part inside the box with these corners [m], (3,) each, open where the box cuts it."""
         points = self.points
         if len(points) and (points >= lower).all() and (points <= upper).all():
             return self

@@ -24,11 +24,9 @@ MAX_CUT_PIECES = 300  # limit of pieces; with more, as in a map, each is drawn u
 
 
 def surfaces_around(pieces: Sequence[ConvexPiece], points: Array) -> tuple[Surface, ...]:
-    """Return the visible surfaces of the pieces near points; distant parts are cut off.
+    """Return the visible surfaces of the pieces near points [m], (n, 3), of the other objects in a picture.
 
-    Args:
-        pieces: The pieces in the world; moving pieces are not cut.
-        points: Points of the other objects in the picture [m], (n, 3).
+    Distant parts are cut off, except of moving pieces.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max())

@@ -57,12 +57,7 @@ class FlownBodies(NamedTuple):
 
 
 def nearest_obstacles(pieces: Pieces, flown: FlownBodies) -> NearestObstacle:
-    """Return the nearest obstacles of many flights, fields (flights,).
-
-    Args:
-        pieces: The convex pieces of all obstacles, at least one.
-        flown: The flights.
-    """
+    """Return the nearest obstacles of many flights, fields (flights,), for one convex piece or more."""
     count = len(flown.rows)
     stretches = -(-len(flown.times) // ROWS_PER_BOX)
     size = max(1, MAX_PAIRS // (stretches * len(pieces)))

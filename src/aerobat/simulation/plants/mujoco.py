@@ -136,12 +136,7 @@ def moving_bodies(scene: PlantScene) -> list[ObstacleMotion]:
 
 
 def mujoco_model(scene: PlantScene, contacts: bool = True) -> str:
-    """Return the MuJoCo model (MJCF) of a vehicle, gates, obstacles and ground.
-
-    Args:
-        scene: the vehicle and its surroundings.
-        contacts: whether the vehicle collides with gates, obstacles and ground.
-    """
+    """Return the MuJoCo model (MJCF) of a vehicle among gates, obstacles and ground, with contacts or not."""
     root = Element("mujoco", model="aerobat")
     SubElement(root, "option", integrator="RK4", gravity=f"0 0 {-scene.gravity!r}", density="0")
     shapes = [(each.motion, shape) for each in scene.obstacles for shape in _shapes(each)]

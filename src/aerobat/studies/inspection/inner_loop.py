@@ -40,12 +40,7 @@ _AXES = ("roll", "pitch", "yaw")
 
 
 def inner_loop_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
-    """Return the fault of the inner loop that a log shows; None where there is none, or no inner loop.
-
-    Args:
-        flight: The log of one flight.
-        vehicle: The vehicle that the inner loop was configured for.
-    """
+    """Return the fault of the inner loop configured for a vehicle, as a log shows it; None for no fault."""
     if not flight.has_inner_loop:
         return None
     log = _InnerLoopLog.of(flight, vehicle)

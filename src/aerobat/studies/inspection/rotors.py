@@ -28,10 +28,7 @@ _RESIDUAL_RATIO = 0.5  # largest residual of a lag over that of a delay for whic
 def rotor_fault(flight: Flight, vehicle: Vehicle, delay: CommandDelay) -> Fault | None:
     """Return the fault of rotors that a log shows, None where it shows none.
 
-    Args:
-        flight: The log of one flight.
-        vehicle: The nominal vehicle.
-        delay: Of its commands, an alternative explanation of late rotors.
+    The delay of its commands is an alternative explanation of late rotors.
     """
     weak = _weak_rotor(flight, vehicle)
     missing, change = _missing_and_change(flight)

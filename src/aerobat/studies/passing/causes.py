@@ -33,10 +33,7 @@ def main_failure_cause(
 ) -> str:
     """Return a sentence on the cause without which most flights pass; empty where nothing varies.
 
-    Args:
-        conditions: The conditions of the flights.
-        probability: With which a flight must pass.
-        share: Flies the same flights under other conditions, and returns the share that passes.
+    `share` flies the same flights under other conditions, and returns the share that passes.
     """
     shares: dict[str, Share] = {}
     for cause, off in SWITCHED_OFF.items():

@@ -54,11 +54,6 @@ def with_narrower_gates(problem: Problem, vehicle: Vehicle, scores: Score) -> Pr
     """Return the problem with openings and attitude tolerances reduced by the spread of flights at the gates.
 
     Openings stay as they are where the vehicle would not fit through the smaller ones.
-
-    Args:
-        problem: The problem.
-        vehicle: The vehicle.
-        scores: Of the flights of its plan.
     """
     tighter = replace(problem, gates=tuple(_with_smaller_tolerance(gate, scores) for gate in problem.gates))
     narrower = replace(

@@ -96,12 +96,9 @@ def why(
 
 
 def explained(refusal: Infeasible, task: Request, progress: Tried | None = None) -> Why:
-    """Return the explanation of a refusal.
+    """Return the explanation of a task's refusal by its planner.
 
-    Args:
-        refusal: The refusal of the task by its planner.
-        task: The refused task.
-        progress: Called with each change, and whether it helps, as they are tried.
+    `progress` is called with each change, and whether it helps, as they are tried.
     """
     search = _RemedySearch(task, progress or (lambda words, helps: None))
     name, sentence, is_proven = task.problem.name, refusal.sentence, not refusal.attempts
@@ -156,11 +153,10 @@ class _RemedySearch:
 
 
 def _planners(task: Request, refused: bool) -> Iterator[Planner]:
-    """Yield the planners to try: the task's, the one that suits it, all others, with the task's reserve.
+    """Yield the planners to try: the task's unless it has refused, the one that suits, all others.
 
-    Args:
-        task: The task; without a vehicle no others are tried, since only miqp holds the problem's limits.
-        refused: Whether the task's own planner has already refused it.
+    All keep the task's reserve. Without a vehicle no others are tried, since only miqp holds the problem's
+    limits.
     """
     suits = suited_planner(task.problem, task.vehicle)
     suited = planner_with_reserve(suits, task.reserve)
