@@ -57,10 +57,10 @@ class HeldPlant:
 
     feedthrough: bool = False
 
-    def init(self, thrusts: Any, inputs: Any, signals: Any) -> VehicleState:
+    def init(self, thrusts: Any, signals: Any) -> VehicleState:
         return VehicleState(signals.start, thrusts)
 
-    def step(self, thrusts: Any, motion: VehicleState, inputs: Any, signals: Any) -> VehicleState:
+    def step(self, thrusts: Any, motion: VehicleState, signals: Any) -> VehicleState:
         return motion
 
 

@@ -130,10 +130,10 @@ class Counter:
     kind: type[Count]
     feedthrough: bool = True
 
-    def init(self, parameters: Any, inputs: Any, signals: Any) -> Count:
+    def init(self, parameters: Any, signals: Any) -> Count:
         return self.kind(0.0, 0.0)
 
-    def step(self, parameters: Any, state: Count, inputs: Any, signals: Any) -> Count:
+    def step(self, parameters: Any, state: Count, signals: Any) -> Count:
         return self.kind(state.steps + 1.0, signals.clock.elapsed)
 
 
@@ -144,10 +144,10 @@ class Follower:
     of: type[Count]
     feedthrough: bool = True
 
-    def init(self, parameters: Any, inputs: Any, signals: Any) -> Seen:
+    def init(self, parameters: Any, signals: Any) -> Seen:
         return Seen(0.0)
 
-    def step(self, parameters: Any, state: Seen, inputs: Any, signals: Any) -> Seen:
+    def step(self, parameters: Any, state: Seen, signals: Any) -> Seen:
         return Seen(signals.of(self.of).steps)
 
 

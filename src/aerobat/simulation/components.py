@@ -32,11 +32,11 @@ def rigid_body_steps(duration: float) -> int:
 class StateObserver(Component):
     """The observer that returns the true state."""
 
-    def init(self, parameters: tuple[()], inputs: tuple[()], signals: Signals) -> Estimate:
+    def init(self, parameters: tuple[()], signals: Signals) -> Estimate:
         """See `Component.init`."""
         return Estimate(signals.start)
 
-    def step(self, parameters: tuple[()], state: Estimate, inputs: tuple[()], signals: Signals) -> Estimate:
+    def step(self, parameters: tuple[()], state: Estimate, signals: Signals) -> Estimate:
         """See `Component.step`."""
         return Estimate(signals.plant.body)
 
@@ -57,22 +57,16 @@ class TrackingController(Component):
 
     flags: FeatureFlags
 
-    def init(
-        self, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
-    ) -> ControllerState:
+    def init(self, parameters: ControllerParameters, signals: Signals) -> ControllerState:
         """See `Component.init`."""
-        reference = inputs or signals.reference
+        reference = signals.inputs or signals.reference
         return control.init(signals.ops, parameters.model, signals.observer.body, reference)
 
     def step(
-        self,
-        parameters: ControllerParameters,
-        state: ControllerState,
-        inputs: ReferencePoint | tuple[()],
-        signals: Signals,
+        self, parameters: ControllerParameters, state: ControllerState, signals: Signals
     ) -> ControllerState:
         """See `Component.step`."""
-        body, reference = controller_inputs(parameters, state, inputs, signals)
+        body, reference = controller_inputs(parameters, state, signals)
         ops, elapsed = signals.ops, signals.clock.elapsed
         return control.step(ops, self.flags, parameters.model, state, body, reference, elapsed)
 
@@ -80,7 +74,6 @@ class TrackingController(Component):
 def controller_inputs(
     parameters: ControllerParameters,
     state: Controlling,
-    inputs: ReferencePoint | tuple[()],
     signals: Signals,
     takes_forces: bool = True,
     takes_moments: bool = True,
@@ -90,12 +83,11 @@ def controller_inputs(
     Args:
         parameters: A controller and its delay.
         state: The controller's state, of which the thrusts and the last commands are used.
-        inputs: The controller's own reference if its commands are delayed, else ().
-        signals: The signals of the loop.
+        signals: Its signals; its input is a reference of its own if its commands are delayed, else ().
         takes_forces: Whether the estimated disturbing force is subtracted from the reference.
         takes_moments: Whether the estimated disturbing moment is, too; only with `takes_forces`.
     """
-    body, reference = signals.observer.body, inputs or signals.reference
+    body, reference = signals.observer.body, signals.inputs or signals.reference
     disturbance = signals.find(Disturbance)
     if takes_forces and disturbance is not None:
         reference = _compensated(reference, body, disturbance, takes_moments)
@@ -150,19 +142,16 @@ class ComputationDelay(Component):
     controller already computes its next commands.
     """
 
-    def init(self, parameters: tuple[()], takes_effect: Scalar, signals: Signals) -> DelayedCommands:
+    def init(self, parameters: tuple[()], signals: Signals) -> DelayedCommands:
         """See `Component.init`."""
         sent = _sent_commands(signals.controller)
         return DelayedCommands(sent, sent)
 
-    def step(
-        self, parameters: tuple[()], state: DelayedCommands, takes_effect: Scalar, signals: Signals
-    ) -> DelayedCommands:
+    def step(self, parameters: tuple[()], state: DelayedCommands, signals: Signals) -> DelayedCommands:
         """See `Component.step`."""
-        return DelayedCommands(
-            select_tree(signals.ops, takes_effect > 0.5, state.latest, state.in_effect),
-            _sent_commands(signals.controller),
-        )
+        takes_effect = signals.inputs > 0.5
+        in_effect = select_tree(signals.ops, takes_effect, state.latest, state.in_effect)
+        return DelayedCommands(in_effect, _sent_commands(signals.controller))
 
 
 class PlantParameters(NamedTuple):
@@ -179,13 +168,11 @@ class RigidBodyPlant(Component):
     substeps: int
     feedthrough: bool = False
 
-    def init(self, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> VehicleState:
+    def init(self, parameters: PlantParameters, signals: Signals) -> VehicleState:
         """See `Component.init`; the initial rotor thrusts are those that the controller assumes."""
         return VehicleState(signals.start, signals.controller.thrusts)
 
-    def step(
-        self, parameters: PlantParameters, motion: VehicleState, inputs: tuple[()], signals: Signals
-    ) -> VehicleState:
+    def step(self, parameters: PlantParameters, motion: VehicleState, signals: Signals) -> VehicleState:
         """See `Component.step`."""
         airframe = with_ceiling(parameters.airframe, signals)
         environment = with_wind(parameters.environment, signals)
@@ -200,13 +187,11 @@ class RigidBodyPlant(Component):
 class RateLoop(Component):
     """The inner loop of a flight controller, which tracks commanded body rates and thrust by its own gyro."""
 
-    def init(self, parameters: RateLoopModel, inputs: tuple[()], signals: Signals) -> RateLoopState:
+    def init(self, parameters: RateLoopModel, signals: Signals) -> RateLoopState:
         """See `Component.init`."""
         return rate_loop.init(signals.controller.thrusts, signals.start.omega_body)
 
-    def step(
-        self, parameters: RateLoopModel, state: RateLoopState, inputs: tuple[()], signals: Signals
-    ) -> RateLoopState:
+    def step(self, parameters: RateLoopModel, state: RateLoopState, signals: Signals) -> RateLoopState:
         """See `Component.step`."""
         setpoint, elapsed = setpoint_in_effect(signals), signals.clock.elapsed
         return rate_loop.step(signals.ops, parameters, state, setpoint, gyro(signals), elapsed)

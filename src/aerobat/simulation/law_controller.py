@@ -17,7 +17,7 @@ from aerobat.engines.pytree import tree_leaves
 from aerobat.errors import SpecError
 from aerobat.kernels import control, motors
 from aerobat.kernels.control import Commands, ControllerModel, FeatureFlags
-from aerobat.kernels.control_loops import ReferencePoint, moment_and_change
+from aerobat.kernels.control_loops import moment_and_change
 from aerobat.kernels.ops import Ops, PerRotor
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rate_loop import RateLoopModel
@@ -51,11 +51,9 @@ class LawController(Component):
     law: ControlLaw
     flags: FeatureFlags  # for the control allocation, from the law's force and moment to rotor commands
 
-    def init(
-        self, parameters: ControllerParameters, inputs: ReferencePoint | tuple[()], signals: Signals
-    ) -> LawState:
+    def init(self, parameters: ControllerParameters, signals: Signals) -> LawState:
         """See `Component.init`."""
-        reference = inputs or signals.reference
+        reference = signals.inputs or signals.reference
         ops, body = signals.ops, signals.observer.body
         first = control.init(ops, parameters.model, body, reference)
         with _compiled(ops, self.law.init):
@@ -64,17 +62,11 @@ class LawController(Component):
             raise _law_error(self.law.init, f"returned {shown(own)}, not a tree of tuples of numbers")
         return LawState(own, first.thrusts, first.commands)
 
-    def step(
-        self,
-        parameters: ControllerParameters,
-        state: LawState,
-        inputs: ReferencePoint | tuple[()],
-        signals: Signals,
-    ) -> LawState:
+    def step(self, parameters: ControllerParameters, state: LawState, signals: Signals) -> LawState:
         """See `Component.step`."""
         ops, model, elapsed = signals.ops, parameters.model, signals.clock.elapsed
         takes = self.law.TAKES_DISTURBANCES, not self.law.GIVES_RATES
-        body, reference = controller_inputs(parameters, state, inputs, signals, *takes)
+        body, reference = controller_inputs(parameters, state, signals, *takes)
         rotors = model.airframe.rotors
         decay_factors = motors.decay_factors(ops, rotors, elapsed)
         thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)

@@ -48,12 +48,13 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class Signals:
-    """All that a component sees at a tick, beside its own: the states of the others are found by type."""
+    """All that a component sees at a tick: time, inputs, and the states of the others, found by type."""
 
     ops: Ops  # the arithmetic of the engine
     clock: StepClock
     reference: ReferencePoint
     start: Body  # the true initial state
+    inputs: Tree  # of the component itself; () where it has none
     states: list[Tree]  # of the components in order; in `init`, of the components initialized so far
 
     def find(self, kind: type[State]) -> State | None:
@@ -128,11 +129,11 @@ class Component(Protocol):
         """True if the new state is seen at the tick of its step, false if at the next tick."""
         return True
 
-    def init(self, parameters: Tree, inputs: Tree, signals: Signals) -> Tree:
+    def init(self, parameters: Tree, signals: Signals) -> Tree:
         """Return the state before the first tick; `signals` holds the states of earlier components."""
 
-    def step(self, parameters: Tree, state: Tree, inputs: Tree, signals: Signals) -> Tree:
-        """Return the next state, from the component's parameters and inputs and the others' states."""
+    def step(self, parameters: Tree, state: Tree, signals: Signals) -> Tree:
+        """Return the next state, from the component's parameters and its signals."""
 
 
 @lru_cache(maxsize=64)
@@ -143,20 +144,20 @@ def compose(components: tuple[Component, ...], log: Log) -> tuple[Init, Step]:
     """
 
     def init(ops: Ops, parameters: LoopParameters, inputs: LoopInput) -> tuple[Tree, ...]:
-        signals = Signals(ops, inputs.clock, inputs.reference, parameters.start, [])
+        signals = Signals(ops, inputs.clock, inputs.reference, parameters.start, (), [])
         for component, own, given in zip(components, parameters.own, inputs.own, strict=True):
-            signals.states.append(component.init(own, given, signals))
+            signals.states.append(component.init(own, replace(signals, inputs=given)))
         return tuple(signals.states)
 
     def step(
         ops: Ops, parameters: LoopParameters, carry: tuple[Tree, ...], inputs: LoopInput
     ) -> tuple[tuple[Tree, ...], Tree]:
-        signals = Signals(ops, inputs.clock, inputs.reference, parameters.start, list(carry))
+        signals = Signals(ops, inputs.clock, inputs.reference, parameters.start, (), list(carry))
         following = []
         each = zip(components, parameters.own, carry, inputs.due, inputs.own, strict=True)
         for k, (component, own, before, due, given) in enumerate(each):
-            seen = signals if not due else replace(signals, clock=due.clock)
-            state = component.step(own, before, given, seen)
+            seen = replace(signals, clock=due.clock if due else signals.clock, inputs=given)
+            state = component.step(own, before, seen)
             if due:
                 state = select_tree(ops, due.now > 0.5, state, before)
             following.append(state)

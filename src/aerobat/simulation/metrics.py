@@ -53,18 +53,19 @@ class Criteria(NamedTuple):
 class MetricsMonitor(Component):
     """The loop's component that accumulates a flight's metrics."""
 
-    def init(self, parameters: MetricsParameters, time: Scalar, signals: Signals) -> RunningMetrics:
+    def init(self, parameters: MetricsParameters, signals: Signals) -> RunningMetrics:
         """See `Component.init`."""
         return running_metrics.init(parameters)
 
     def step(
-        self, parameters: MetricsParameters, metrics: RunningMetrics, time: Scalar, signals: Signals
+        self, parameters: MetricsParameters, metrics: RunningMetrics, signals: Signals
     ) -> RunningMetrics:
         """See `Component.step`."""
+        ops, time = signals.ops, signals.inputs
         motion, commands = signals.plant, rotor_commands(signals)
         reference = (signals.reference.position, signals.reference.q_world_body)
         actuation = (motion.thrusts, commands.thrusts, commands.saturated)
-        return running_metrics.step(signals.ops, parameters, metrics, motion.body, reference, actuation, time)
+        return running_metrics.step(ops, parameters, metrics, motion.body, reference, actuation, time)
 
 
 def metrics_row(signals: Signals) -> RunningMetrics:

@@ -47,18 +47,17 @@ class AutopilotController(Component):
 
     flags: FeatureFlags
 
-    def init(self, parameters: AutopilotModel, inputs: Guidance, signals: Signals) -> ControllerState:
+    def init(self, parameters: AutopilotModel, signals: Signals) -> ControllerState:
         """See `Component.init`."""
         return control.init(signals.ops, parameters.tracking, signals.observer.body, signals.reference)
 
-    def step(
-        self, parameters: AutopilotModel, state: ControllerState, inputs: Guidance, signals: Signals
-    ) -> ControllerState:
+    def step(self, parameters: AutopilotModel, state: ControllerState, signals: Signals) -> ControllerState:
         """See `Component.step`."""
         ops, elapsed = signals.ops, signals.clock.elapsed
         body, reference = signals.observer.body, signals.reference
         model, authority, slower = parameters
-        commanded, upright = inputs.by_attitude > 0.5, inputs.upright > 0.5
+        guidance: Guidance = signals.inputs
+        commanded, upright = guidance.by_attitude > 0.5, guidance.upright > 0.5
         gains = select_tree(ops, upright, slower, model.gains)
         outer = step_position_loop(ops, gains, state.outer, body, reference, elapsed)
         demand = thrust_demand(model.airframe.mass_properties, model.environment, reference)

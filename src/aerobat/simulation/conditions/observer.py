@@ -35,13 +35,11 @@ class DisturbanceObserver(Component):
     gyroscopic moment. The angular acceleration is measured as the difference of the gyro's successive rates.
     """
 
-    def init(self, parameters: DisturbanceParameters, inputs: tuple[()], signals: Signals) -> Disturbance:
+    def init(self, parameters: DisturbanceParameters, signals: Signals) -> Disturbance:
         """See `Component.init`."""
         return Disturbance(ZERO, ZERO, ZERO, 0.0)
 
-    def step(
-        self, parameters: DisturbanceParameters, state: Disturbance, inputs: tuple[()], signals: Signals
-    ) -> Disturbance:
+    def step(self, parameters: DisturbanceParameters, state: Disturbance, signals: Signals) -> Disturbance:
         """See `Component.step`."""
         ops, model, elapsed = signals.ops, parameters.model, signals.clock.elapsed
         mass_properties, rotors = model.airframe
@@ -96,7 +94,7 @@ class EkfObserver(Component):
     exposure_period: int  # ticks
     latency: int  # ticks
 
-    def init(self, parameters: ObserverParameters, inputs: ObserverInput, signals: Signals) -> Estimate:
+    def init(self, parameters: ObserverParameters, signals: Signals) -> Estimate:
         """See `Component.init`; the initial velocity estimate is that of the reference."""
         pose = signals.of(MocapState).delivered.pose
         state = ekf.init(parameters.ekf, pose, signals.reference.velocity)
@@ -104,10 +102,9 @@ class EkfObserver(Component):
         body = ekf.estimated_body(state, signals.of(ImuState).sample)
         return Estimate(body, FilterState(state, (pose,) * waiting))
 
-    def step(
-        self, parameters: ObserverParameters, state: Estimate, inputs: ObserverInput, signals: Signals
-    ) -> Estimate:
+    def step(self, parameters: ObserverParameters, state: Estimate, signals: Signals) -> Estimate:
         """See `Component.step`."""
+        inputs: ObserverInput = signals.inputs
         ops, sample = signals.ops, signals.of(ImuState).sample
         before = ekf.propagate(ops, parameters.ekf, state.own.filter, sample, inputs.elapsed)
         pushed = (ekf.pose_of(before), *state.own.exposures[:-1])

@@ -27,28 +27,24 @@ MOCAP_INPUT = MocapInput(InputNumber.TIME, _NORMALS, _NORMALS, _NORMALS, InputNu
 class Wind(Component):
     """The wind, held from one step to the next; it acts on the plant and on the accelerometer."""
 
-    def init(self, parameters: WindParameters, noise: GustNoise, signals: Signals) -> WindState:
+    def init(self, parameters: WindParameters, signals: Signals) -> WindState:
         """See `Component.init`."""
         return wind.init(parameters)
 
-    def step(
-        self, parameters: WindParameters, state: WindState, noise: GustNoise, signals: Signals
-    ) -> WindState:
+    def step(self, parameters: WindParameters, state: WindState, signals: Signals) -> WindState:
         """See `Component.step`."""
-        return wind.step(parameters, state, noise)
+        return wind.step(parameters, state, signals.inputs)
 
 
 @dataclass(frozen=True)
 class BatterySag(Component):
     """The battery, discharged by the rotors' thrusts; it lowers the rotors' maximum thrusts."""
 
-    def init(self, parameters: BatteryParameters, inputs: tuple[()], signals: Signals) -> BatteryState:
+    def init(self, parameters: BatteryParameters, signals: Signals) -> BatteryState:
         """See `Component.init`."""
         return battery.init(parameters)
 
-    def step(
-        self, parameters: BatteryParameters, state: BatteryState, inputs: tuple[()], signals: Signals
-    ) -> BatteryState:
+    def step(self, parameters: BatteryParameters, state: BatteryState, signals: Signals) -> BatteryState:
         """See `Component.step`."""
         return battery.step(signals.ops, parameters, state, signals.plant.thrusts, signals.clock.elapsed)
 
@@ -57,15 +53,13 @@ class BatterySag(Component):
 class ImuBias(Component):
     """The biases of an IMU, held from one step to the next."""
 
-    def init(self, parameters: BiasParameters, noise: ImuSample, signals: Signals) -> ImuSample:
+    def init(self, parameters: BiasParameters, signals: Signals) -> ImuSample:
         """See `Component.init`."""
         return parameters.start
 
-    def step(
-        self, parameters: BiasParameters, bias: ImuSample, noise: ImuSample, signals: Signals
-    ) -> ImuSample:
+    def step(self, parameters: BiasParameters, bias: ImuSample, signals: Signals) -> ImuSample:
         """See `Component.step`."""
-        return imu.walk(parameters, bias, noise)
+        return imu.walk(parameters, bias, signals.inputs)
 
 
 class ImuSensorParameters(NamedTuple):
@@ -80,20 +74,19 @@ class ImuSensorParameters(NamedTuple):
 class ImuSensor(Component):
     """An IMU at the centre of mass, with the biases of `ImuBias`; its sample ends at the tick of its step."""
 
-    def init(self, parameters: ImuSensorParameters, noise: ImuSample, signals: Signals) -> ImuState:
+    def init(self, parameters: ImuSensorParameters, signals: Signals) -> ImuState:
         """See `Component.init`."""
         return imu.init()
 
-    def step(
-        self, parameters: ImuSensorParameters, state: ImuState, noise: ImuSample, signals: Signals
-    ) -> ImuState:
+    def step(self, parameters: ImuSensorParameters, state: ImuState, signals: Signals) -> ImuState:
         """See `Component.step`."""
         body, thrusts = signals.plant
         thrust = motors.collective_thrust(parameters.airframe.rotors, thrusts)
         environment = with_wind(parameters.environment, signals)
         force = rigid_body.specific_force(parameters.airframe.mass_properties, environment, body, thrust)
         true_sample = ImuSample(body.omega_body, force)
-        return imu.step(signals.ops, parameters.errors, state, true_sample, signals.of(ImuSample), noise)
+        ops, biases, noise = signals.ops, signals.of(ImuSample), signals.inputs
+        return imu.step(ops, parameters.errors, state, true_sample, biases, noise)
 
 
 class MocapState(NamedTuple):
@@ -119,14 +112,12 @@ class MotionCaptureSensor(Component):
     period: int  # ticks from one exposure to the next
     latency: int  # ticks
 
-    def init(self, parameters: MocapParameters, inputs: MocapInput, signals: Signals) -> MocapState:
+    def init(self, parameters: MocapParameters, signals: Signals) -> MocapState:
         """See `Component.init`."""
         known = PoseSample(mocap.first_pose(signals.ops, parameters, signals.start), 0.0)
         return MocapState((known,) * (self.latency // self.period + 1))
 
-    def step(
-        self, parameters: MocapParameters, state: MocapState, inputs: MocapInput, signals: Signals
-    ) -> MocapState:
+    def step(self, parameters: MocapParameters, state: MocapState, signals: Signals) -> MocapState:
         """See `Component.step`."""
-        taken = mocap.sample(signals.ops, parameters, signals.plant.body, inputs)
+        taken = mocap.sample(signals.ops, parameters, signals.plant.body, signals.inputs)
         return MocapState((taken, *state.queue[:-1]))

@@ -51,29 +51,27 @@ from aerobat.vehicle.ellipsoid import Ellipsoid
 class OutsidePlant(Component):
     """A plant whose state is an input at every tick; its parameters are those of the vehicle's model."""
 
-    def init(self, parameters: PlantParameters, inputs: VehicleState, signals: Signals) -> VehicleState:
+    def init(self, parameters: PlantParameters, signals: Signals) -> VehicleState:
         """See `Component.init`."""
-        return inputs
+        motion: VehicleState = signals.inputs
+        return motion
 
-    def step(
-        self, parameters: PlantParameters, state: VehicleState, inputs: VehicleState, signals: Signals
-    ) -> VehicleState:
+    def step(self, parameters: PlantParameters, state: VehicleState, signals: Signals) -> VehicleState:
         """See `Component.step`."""
-        return inputs
+        motion: VehicleState = signals.inputs
+        return motion
 
 
 @dataclass(frozen=True)
 class Actuator(Component):
     """The inputs of the external plant: commands, wind, and the rotor limits that the battery allows."""
 
-    def init(self, parameters: PlantParameters, inputs: tuple[()], signals: Signals) -> Actuation:
+    def init(self, parameters: PlantParameters, signals: Signals) -> Actuation:
         """See `Component.init`."""
         thrusts = rotor_commands(signals).thrusts
         return Actuation(thrusts, parameters.environment.wind, parameters.airframe.rotors.max_thrust)
 
-    def step(
-        self, parameters: PlantParameters, state: Actuation, inputs: tuple[()], signals: Signals
-    ) -> Actuation:
+    def step(self, parameters: PlantParameters, state: Actuation, signals: Signals) -> Actuation:
         """See `Component.step`."""
         return Actuation(
             commands_in_effect(signals),
