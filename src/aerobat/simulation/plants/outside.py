@@ -49,14 +49,14 @@ from aerobat.vehicle.ellipsoid import Ellipsoid
 
 @dataclass(frozen=True)
 class OutsidePlant(Component):
-    """A plant whose state is an input at every tick; its parameters are those of the vehicle's model."""
+    """A plant whose state is an input at every tick."""
 
-    def init(self, parameters: PlantParameters, signals: Signals) -> VehicleState:
+    def init(self, parameters: tuple[()], signals: Signals) -> VehicleState:
         """See `Component.init`."""
         motion: VehicleState = signals.inputs
         return motion
 
-    def step(self, parameters: PlantParameters, state: VehicleState, signals: Signals) -> VehicleState:
+    def step(self, parameters: tuple[()], state: VehicleState, signals: Signals) -> VehicleState:
         """See `Component.step`."""
         motion: VehicleState = signals.inputs
         return motion

@@ -152,7 +152,7 @@ def _parameters_of(airframe: Airframe) -> dict[str, Any]:
         raise SpecError("the plant rotorpy knows no thrust below 0; give every rotor a min_thrust of 0")
     if (collective != 1.0).any():
         raise SpecError(
-            "the plant rotorpy knows rotors of one kind only; leave `thrust` out of the conditions"
+            "the plant rotorpy knows rotors of one kind only; leave `rotor` out of the conditions"
         )
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = properties.inertia
     torque = np.abs(mz).max()
