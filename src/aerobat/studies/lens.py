@@ -65,14 +65,10 @@ class Lens:
     @property
     def unit(self) -> str:
         """The unit of the field, empty where it has none."""
-        if self._is_angle:
-            return "°"
         return unit_of(tuple(key for key in self.keys if isinstance(key, str)))
 
     def get(self, whole: Any) -> Any:
         """Return the field's value; a vector if one number may stand for all of its entries."""
-        if self._is_angle:
-            return degrees(whole.problem.gates[0].angles[2])
         value = whole
         for key in self.keys:
             value = _inner(value, key)
@@ -84,8 +80,6 @@ class Lens:
         Raises FieldError: for `place`, where the field cannot take the value; for another field, where that
         field contradicts the value.
         """
-        if self._is_angle:
-            return _with_field(whole, PROBLEM, _tilted(_inner(whole, PROBLEM), value))  # type: ignore[no-any-return]
         try:
             return _changed(whole, self.keys, value)  # type: ignore[no-any-return]
         except FieldError as error:
@@ -93,19 +87,14 @@ class Lens:
 
     def require(self, whole: Any, values: Sequence[float]) -> None:
         """Raise SpecError for a field that is no number, and for values that the field cannot take."""
-        if not self._is_angle:
-            with within_field(self.place):
-                _require_number(self.get(whole), len(self.keys) > 1 and self._takes_number(whole))
+        with within_field(self.place):
+            _require_number(self.get(whole), len(self.keys) > 1 and self._takes_number(whole))
         for value in values:
             try:
                 self.set(whole, value)
             except FieldError as error:
                 if error.field in (self.place, re.sub(rf"(\[\d\]|{DEGREES})$", "", self.place)):
                     raise SpecError(f"{self.name} at {value:g}: {error}") from None
-
-    @property
-    def _is_angle(self) -> bool:
-        return self.keys == (ANGLE,)
 
     def _takes_number(self, whole: Any) -> bool:
         """Return True for a vector for which one number may stand, as for limits per axis."""
@@ -129,7 +118,7 @@ def lens(name: str, whole: Any) -> Lens:
     problem: Problem | None = getattr(whole, PROBLEM, None)
     if keys == (ANGLE,) and problem is not None:
         problem.maneuver.with_gate_tilt(problem.gates, 0.0)
-        return Lens(name, keys)
+        return Lens(name, (PROBLEM, ANGLE))
     roots = [field.name for field in fields(whole)]
     if problem is not None:
         if len(keys) == 1 and keys[0] not in (*roots, *_names(problem), GATE):
@@ -236,6 +225,8 @@ def _inner(value: Any, key: Key) -> Any:
         return degrees(value.angles[Gate.ANGLES.index(key)])
     if key == ALL_ROTORS:
         return value.rotors[0]
+    if isinstance(value, Problem) and key == ANGLE:
+        return degrees(value.gates[0].angles[2])
     if not hasattr(value, key):
         angle = getattr(value, key.removesuffix(DEGREES))
         return angle if angle is None else degrees(angle)
@@ -260,11 +251,15 @@ def _changed(value: Any, keys: Sequence[Key], new: Any) -> Any:
 
 
 def _with_field(value: Any, name: str, inner: Any) -> Any:
-    """Return a copy of the declared value with one of its `_names` changed. Raises FieldError."""
+    """Return a copy of the declared value with one of its `_names`, or angle, changed. Raises FieldError."""
     if name == THRUST_TO_WEIGHT:
         if inner <= 0:
             raise FieldError(name, f"must be positive, got {inner:g}")
         return value.with_thrust_to_weight(inner)
+    if isinstance(value, Problem) and name == ANGLE:
+        if not abs(inner) <= MAX_ANGLE:
+            raise FieldError(ANGLE, f"must be from {-MAX_ANGLE:g} to {MAX_ANGLE:g} degrees, got {inner:g}")
+        return _with_field(value, "gates", value.maneuver.with_gate_tilt(value.gates, radians(inner)))
     if not hasattr(value, "__checked_init__"):  # a plain dataclass of values that are themselves checked
         changes: dict[str, Any] = {name: inner}
         return replace(value, **changes)
@@ -278,11 +273,3 @@ def _with_field(value: Any, name: str, inner: Any) -> Any:
         if isinstance(table[name], Heading) and table[name].mode is not HeadingMode.FREE:
             inner = _with_field(table[name], "start", inner)
     return from_table(type(value), table | {name: inner})
-
-
-def _tilted(problem: Problem, angle: float) -> Problem:
-    """Return the problem with its half-flip's gate at another tilt [deg]. Raises FieldError."""
-    if not abs(angle) <= MAX_ANGLE:
-        raise FieldError(ANGLE, f"must be from {-MAX_ANGLE:g} to {MAX_ANGLE:g} degrees, got {angle:g}")
-    gates = problem.maneuver.with_gate_tilt(problem.gates, radians(angle))
-    return _with_field(problem, "gates", gates)  # type: ignore[no-any-return]

@@ -27,7 +27,7 @@ UNITS = MappingProxyType(
 OF = MappingProxyType(  # units of names that mean something else in these owners
     {
         "limits": {"lower": "m", "upper": "m"},
-        "problem": {"min_thrust": "m/s²", "point": "m", "start": "rad"},
+        "problem": {"angle": "°", "min_thrust": "m/s²", "point": "m", "start": "rad"},
         "vehicle": {"min_thrust": "N"},
         "conditions": {
             "accelerometer_bias": "m/s²", "accelerometer_bias_walk": "m/s³/√Hz",
