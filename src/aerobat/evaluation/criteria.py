@@ -6,7 +6,7 @@ stages, and to the whole path where there is no gate or waypoint.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from math import degrees, inf, isfinite
 from typing import NamedTuple
@@ -52,20 +52,35 @@ def criteria_of(goal: Problem | Plan, path: SampledPath) -> Criteria:
     approaches to the centres, in the stages' order where they have one.
     """
     problem = goal.problem if isinstance(goal, Plan) else goal
+    tolerance = problem.tolerance
     placed = timed_stages(goal.stages, problem) if isinstance(goal, Plan) else ()
     passed = [(stage, time) for stage, time in placed if stage.gate is not None or stage.ball is not None]
     others = [(stage, time) for stage, time in placed if stage.gate is None and stage.ball is None]
     passed = passed or _nearest_stages(problem, path)
     gates = tuple(PlannedPassage.of(s, problem.gate(s.gate), t) for s, t in passed if s.gate is not None)
     waypoints = tuple(PlannedWaypoint(s.name, s.ball, t, s.lap) for s, t in passed if s.ball is not None)
+    places = [
+        PlannedWaypoint(s.name, Ball(_between(path, path.position, t), tolerance.position), t, s.lap)
+        for s, t in others
+        if s.where
+    ]
+    if problem.ends:
+        end = float(path.times[-1])
+        places.append(PlannedWaypoint(GOAL, Ball(path.position[-1], tolerance.position), end))
+    axes = thrust_axis(path.q_world_body)
+    attitudes = [
+        PlannedAttitude(s.name, unit(_between(path, axes, t)), t, tolerance.attitude, s.lap)
+        for s, t in others
+        if _requires_attitude(s)
+    ]
     duration = goal.duration if isinstance(goal, Plan) else float(path.times[-1])
     return Criteria(
         gates=gates,
         waypoints=waypoints,
         lap_begin=0.0 if problem.ends else _latest(gates, waypoints, path) - duration,
-        places=(*_places(others, problem, path), *_goal(problem, path)),
-        attitudes=tuple(_attitudes(others, problem, path)),
-        path_radius=inf if passed else problem.tolerance.position,
+        places=tuple(places),
+        attitudes=tuple(attitudes),
+        path_radius=inf if passed else tolerance.position,
     )
 
 
@@ -78,34 +93,6 @@ def _latest(
     met = [float(each.time[0]) for each in found]  # infinite where the path ends before
     met = [time if isfinite(time) else each.time for time, each in zip(met, waypoints, strict=True)]
     return max([*(gate.time for gate in gates), *met], default=0.0)
-
-
-def _places(
-    others: Sequence[tuple[Stage, float]], problem: Problem, path: SampledPath
-) -> Iterator[PlannedWaypoint]:
-    """Yield the places of other stages that constrain the position."""
-    for stage, time in others:
-        if stage.where:
-            ball = Ball(_between(path, path.position, time), problem.tolerance.position)
-            yield PlannedWaypoint(stage.name, ball, time, stage.lap)
-
-
-def _goal(problem: Problem, path: SampledPath) -> Iterator[PlannedWaypoint]:
-    """Yield the end of the path; a closed course has none."""
-    if problem.ends:
-        ball = Ball(path.position[-1], problem.tolerance.position)
-        yield PlannedWaypoint(GOAL, ball, float(path.times[-1]))
-
-
-def _attitudes(
-    others: Sequence[tuple[Stage, float]], problem: Problem, path: SampledPath
-) -> Iterator[PlannedAttitude]:
-    """Yield the attitudes of other stages that require one."""
-    axes = thrust_axis(path.q_world_body)
-    for stage, time in others:
-        if _requires_attitude(stage):
-            up = unit(_between(path, axes, time))
-            yield PlannedAttitude(stage.name, up, time, problem.tolerance.attitude, stage.lap)
 
 
 def _requires_attitude(stage: Stage) -> bool:

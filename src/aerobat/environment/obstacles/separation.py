@@ -13,7 +13,6 @@ meet. Where the normals of the hull's own faces have a larger gap, the search st
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations
@@ -185,7 +184,8 @@ class Pieces:
     @cached_property
     def _points(self) -> Array:
         """The points of every piece, padded with the first point, (P, V, 3)."""
-        return _padded([piece.points for piece in self.pieces])
+        rows = np.arange(max(len(piece.points) for piece in self.pieces))
+        return np.array([piece.points[np.where(rows < len(piece.points), rows, 0)] for piece in self.pieces])
 
     @cached_property
     def _roundings(self) -> Array:
@@ -348,9 +348,3 @@ def _best_of(piece: ConvexPiece, centres: Array, shapes: Array) -> Array:
 def _times(matrices: Array, vectors: Array) -> Array:
     """Return matrices (m, k, 3) times vectors (m, 3), (m, k)."""
     return np.asarray((matrices @ vectors[..., None])[..., 0])
-
-
-def _padded(rows: Sequence[Array]) -> Array:
-    """Return arrays (k, 3) of different lengths as one, padded with their first rows."""
-    most = max(map(len, rows))
-    return np.array([np.concatenate([each, np.repeat(each[:1], most - len(each), axis=0)]) for each in rows])

@@ -78,7 +78,8 @@ class _InnerLoopLog:
 
     def rates(self) -> Fault | None:
         """Return a fault if the commands fit a multiple of the commanded rates."""
-        setpoint, rest = self._setpoint_term, self._commanded + self._model_feedback
+        setpoint = self._proportional_integral(self.flight.rate_setpoint)
+        rest = self._commanded + self._model_feedback
         factors, unexplained, before = [], 0.0, 0.0
         for axis in range(len(_AXES)):
             columns = np.stack([setpoint[:, axis], np.ones(len(setpoint))], axis=1)[self.free]
@@ -137,11 +138,6 @@ class _InnerLoopLog:
         return np.asarray(moment @ np.linalg.inv(self.fleet.inertia[0]).T)
 
     @property
-    def _setpoint_term(self) -> Array:
-        """The part of the model's commands from the rate set-points [rad/s²], (T, 3)."""
-        return self._proportional_integral(self.flight.rate_setpoint)
-
-    @property
     def _model_feedback(self) -> Array:
         """The part of the model's commands from the measured rates, with opposite sign [rad/s²], (T, 3)."""
         omega = self.flight.omega_body
@@ -149,6 +145,7 @@ class _InnerLoopLog:
         return np.asarray(self._proportional_integral(omega) + slope)
 
     def _proportional_integral(self, rates: Array) -> Array:
+        """Return the part of the model's commands from rates without their slope [rad/s²], (T, 3)."""
         gains = self._gains
         integral = np.asarray(gains.integral) * self._integral(rates)
         return np.asarray(np.asarray(gains.proportional) * rates + integral)

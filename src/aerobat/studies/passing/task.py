@@ -57,10 +57,6 @@ class PassingTask:
     progress: Callable[[Attempt], None] | None
     flying: Pool
 
-    def plain(self) -> Plan:
-        """Return the plan as the planner finds it."""
-        return plan(self.problem, self.planner, self.vehicle, self.progress)
-
     def tightened(
         self, plain: Plan, reserve: float, variant: Variant, problem: Problem, limit: float
     ) -> Plan:
