@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from math import sqrt, tau
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Dispersion, Gusts, HandOff, Imu, MotionCapture
+from aerobat.simulation.nested import rows_of
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
@@ -169,23 +171,13 @@ def _directions(normals: Array) -> Array:
 
 def dispersed_fleet(nominal: Vehicle, draws: Draws) -> Fleet:
     """Return the vehicles that really fly, as arrays: `Fleet.of` each draw's vehicle, made directly."""
-    one, shape = Fleet.of([nominal]), (len(draws),)
+    one = Fleet.of([nominal])
     drag = draws.columns["drag"] * nominal.mass
-
-    def repeated(array: Array) -> Array:
-        return np.broadcast_to(array[0], shape + array.shape[1:]).copy()
-
-    return Fleet(
+    return replace(
+        rows_of(one, np.zeros(len(draws), np.intp)),
         names=one.names * len(draws),
         mass=draws.columns["mass"] * nominal.mass,
         inertia=draws.columns["inertia"][:, None, None] * nominal.inertia,
         drag_body=nominal.drag_body + drag[:, None],
-        rotor_positions=repeated(one.rotor_positions),
-        spins=repeated(one.spins),
-        min_thrusts=repeated(one.min_thrusts),
-        max_thrusts=repeated(one.max_thrusts),
-        torque_coefficients=repeated(one.torque_coefficients),
         lags=draws.columns["lags"] * one.lags,
-        body_centres=repeated(one.body_centres),
-        semi_axes=repeated(one.semi_axes),
     )
