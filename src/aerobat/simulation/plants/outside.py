@@ -35,7 +35,6 @@ from aerobat.simulation.components import (
     log_row,
     rigid_body_steps,
     rotor_commands,
-    setpoint_in_effect,
     with_ceiling,
     with_wind,
 )
@@ -93,7 +92,7 @@ class OutsideRow(NamedTuple):
 
     log: LogRow
     actuation: Actuation
-    firmware: FirmwareInputs | tuple[()]  # () where no firmware flies
+    firmware: FirmwareInputs | tuple[()]  # () where no body rates are commanded
 
 
 class RigidBodyRun:
@@ -143,8 +142,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
         first_numbers(setup.start), tuple(0.0 for _ in parameters.airframe.rotors.max_thrust)
     )
     first = _with_motion(inside.first_tick, motion)
-    log = _outside_row if autopilot is None else _firmware_row
-    init, step = compose(inside.components, log)
+    init, step = compose(inside.components, _outside_row)
     loop = inside.engine().compile(init, step, inside.parameters, first)
     carry = loop.init(first)
     numbers = first_numbers(inside.parameters), first_numbers(expanded(first))
@@ -224,15 +222,10 @@ class _Firmware:
 
 
 def _outside_row(signals: Signals) -> OutsideRow:
-    return OutsideRow(log_row(signals), signals.of(Actuation), ())
-
-
-def _firmware_row(signals: Signals) -> OutsideRow:
-    imu = signals.find(ImuState)
+    row, imu = log_row(signals), signals.find(ImuState)
     specific_force = () if imu is None else imu.sample.specific_force
-    return _outside_row(signals)._replace(
-        firmware=FirmwareInputs(gyro(signals), specific_force, setpoint_in_effect(signals))
-    )
+    firmware = FirmwareInputs(gyro(signals), specific_force, row.rate_setpoint) if row.rate_setpoint else ()
+    return OutsideRow(row, signals.of(Actuation), firmware)
 
 
 def _with_motion(inputs: LoopInput, motion: VehicleState) -> LoopInput:
