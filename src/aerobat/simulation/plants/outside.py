@@ -6,6 +6,7 @@ controller's body rates; the plant takes the firmware's rotor commands.
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
@@ -151,7 +152,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
     scene = _scene(setup, gates)
     run: PlantRun = RigidBodyRun(scene, motion) if plant is None else _begin_run(plant, scene, motion)
     rows, touched = [], np.zeros(len(setup.times), dtype=np.int64)
-    with _Firmware(setup, scene) as firmware:
+    with closing(_Firmware(setup, scene)) as firmware:
         for tick, period in enumerate(np.diff(setup.times, append=setup.times[-1]).tolist()):
             before = run.motion
             carry, row = loop.step(carry, _with_motion(inside.tick(tick), before))
@@ -186,10 +187,8 @@ class _Firmware:
         self._setup, self._scene = setup, scene
         self._run: AutopilotRun | None = None
 
-    def __enter__(self) -> _Firmware:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """End the firmware, if it has begun."""
         if self._run is not None:
             self._run.close()
 
