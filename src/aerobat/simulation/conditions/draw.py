@@ -20,24 +20,23 @@ from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
 STREAMS = ("imu", "imu_bias", "motion_capture", "wind")  # streams of random numbers along a flight
-_NORMALS = (  # standard normals of a draw, always all of them in this order, whatever the conditions
-    ("mass", 1),
-    ("inertia", 1),
-    ("drag", 1),
-    ("start_position", 3),
-    ("start_velocity", 3),
-    ("start_attitude", 3),
-    ("gyro_bias", 3),
-    ("accelerometer_bias", 3),
-    ("first_position_error", 3),
-    ("first_attitude_error", 3),
-    ("hand_off_translation", 3),
-    ("hand_off_rotation", 3),
-    ("warp", 3),
-    ("mean_wind", 2),
-    ("gust", 5),
-)
-_ENDS = np.cumsum([count for _, count in _NORMALS]).tolist()
+_NORMALS = {  # standard normals of a draw, always all of them in this order, whatever the conditions
+    "mass": 1,
+    "inertia": 1,
+    "drag": 1,
+    "start_position": 3,
+    "start_velocity": 3,
+    "start_attitude": 3,
+    "gyro_bias": 3,
+    "accelerometer_bias": 3,
+    "first_position_error": 3,
+    "first_attitude_error": 3,
+    "hand_off_translation": 3,
+    "hand_off_rotation": 3,
+    "warp": 3,
+    "mean_wind": 2,
+    "gust": 5,
+}
 # Cholesky factor [-] of (1/2, 1/4; 1/4, 1/4), the covariance of the two filters of a second-order gust
 _GUST_FIRST, _GUST_SECOND = sqrt(0.5), sqrt(0.125)
 
@@ -61,7 +60,7 @@ class Draws:
             flights: their numbers, from 0.
         """
         flights = self.flights = tuple(flights)
-        count = sum(count for _, count in _NORMALS)
+        count = sum(_NORMALS.values())
         normals, uniforms = np.empty((len(flights), count + 2 * rotors)), np.empty((len(flights), 2))
         words = np.empty((len(flights), 1 + len(STREAMS), 3), dtype=np.uint64)  # of a generator's state
         for k, flight in enumerate(flights):
@@ -70,10 +69,9 @@ class Draws:
             generator = np.random.Generator(np.random.SFC64(_Seed(words[k, 0])))  # type: ignore[arg-type]
             generator.random(out=uniforms[k])
             generator.standard_normal(out=normals[k])  # rotors last: other vehicles draw the rest alike
-        normal = {
-            name: normals[:, end - count : end] for (name, count), end in zip(_NORMALS, _ENDS, strict=True)
-        }
-        each_rotor = normals[:, count:].reshape(-1, 2, rotors).swapaxes(0, 1)
+        *parts, of_rotors = np.split(normals, np.cumsum(list(_NORMALS.values())), axis=1)
+        normal = dict(zip(_NORMALS, parts, strict=True))
+        each_rotor = of_rotors.reshape(-1, 2, rotors).swapaxes(0, 1)
         self.columns = {
             **_of_vehicle(dispersion, normal, each_rotor),
             **_of_sensors(dispersion, normal),
