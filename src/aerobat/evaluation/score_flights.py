@@ -50,7 +50,8 @@ def score_flights(
 
     SpecError is raised for inconsistent arguments, BackendMissing for an engine that is not installed.
     """
-    return score_over_time(plan, vehicles, problem, environment, config.changed(changes))[0]
+    config = config.changed(changes)
+    return score_over_time(plan, vehicles, config, problem=problem, environment=environment)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,20 +78,21 @@ class ErrorsOverTime:
 def score_over_time(
     plan: Plan | Trajectory,
     vehicles: Vehicle | str | Sequence[Vehicle | str] | None,
-    problem: Problem | str | None,
-    environment: Environment | None,
     config: FlightConfig,
     stride: int | None = None,
+    *,
+    problem: Problem | str | None = None,
+    environment: Environment | None = None,
 ) -> tuple[Score, ErrorsOverTime]:
     """Score flights as `score_flights` does, and also return their errors over time.
 
     Args:
         plan: the plan to fly.
         vehicles: the vehicles.
-        problem: the problem that gives the criteria.
-        environment: the environment.
         config: settings of the flights.
         stride: ticks between the returned times; None for the last time only.
+        problem: the problem that gives the criteria.
+        environment: the environment.
     """
     goal = plan if problem is None else as_problem(problem)
     if isinstance(goal, Trajectory):

@@ -88,7 +88,7 @@ def _flown(task: FlightTask, numbers: range, is_sampled: bool) -> Chunk:
     """Fly one batch."""
     draws = Draws(task.conditions, len(task.vehicle.rotors), task.seed, numbers)
     stride = STRIDE if is_sampled else None
-    scores, errors = score_over_time(task.plan, task.vehicle, None, None, task.config(numbers), stride)
+    scores, errors = score_over_time(task.plan, task.vehicle, task.config(numbers), stride)
     columns = _drawn(draws) | _scored(scores)
     if not is_sampled:
         return Chunk(columns, np.zeros(0), *np.zeros((2, 0, 0)))
