@@ -47,7 +47,7 @@ def test_every_limit_of_problem_and_vehicle_is_a_change_to_be_tried() -> None:
     problem = replace(problem, environment=ab.Environment(ground=-3.0))
     idle = replace(QUAD, rotors=tuple(replace(rotor, min_thrust=0.1) for rotor in QUAD.rotors))
     task = Request(problem, idle, ab.Miqp(reserve=0.1))
-    found = changes(task)
+    found = list(changes(task))
     for change in found:
         changed = change.apply(task)
         assert (changed.problem, changed.vehicle, changed.planner) != (problem, idle, task.planner)

@@ -48,20 +48,32 @@ class Change:
     apply: Callable[[Request], Request]
 
 
-def changes(task: Request) -> list[Change]:
-    """Return the changes that are possible for a task."""
-    return [*_of_limits(task), *_of_reserve(task), *_of_vehicle(task), *_of_stages(task)]
-
-
-def _of_limits(task: Request) -> Iterator[Change]:
+def changes(task: Request) -> Iterator[Change]:
+    """Yield the changes that are possible for a task."""
+    problem, vehicle = task.problem, task.vehicle
     for derivative, name in enumerate(DERIVATIVES):
-        if np.isfinite(np.concatenate(task.problem.limits.of(derivative))).any():
+        if np.isfinite(np.concatenate(problem.limits.of(derivative))).any():
             key = "limits.lower and limits.upper" if derivative == 0 else f"limits.{name}"
             yield Change(f"without {key}", partial(_without_limit, derivative))
-    if np.isfinite(task.problem.limits.max_tilt):
+    if np.isfinite(problem.limits.max_tilt):
         yield Change("without limits.max_tilt", partial(_with_field, "limits.max_tilt", np.inf))
-    if task.problem.environment.ground is not None:
+    if problem.environment.ground is not None:
         yield Change("without environment.ground", partial(_with_field, "environment.ground", None))
+    if task.reserve > 0.0:
+        yield Change("without reserve", partial(_with_field, "planner.reserve", 0.0))
+    if vehicle is not None:
+        yield Change(f"with {THRUST_FACTOR:g} times the max_thrust", _with_stronger_rotors)
+        if (vehicle.min_thrusts > 0.0).any():
+            yield Change("with min_thrust 0", partial(_with_field, "vehicle.rotor_defaults.min_thrust", 0.0))
+        if vehicle.lags.any():
+            yield Change("with rotors without lag", partial(_with_field, "vehicle.rotor_defaults.lag", 0.0))
+        if np.isfinite(vehicle.max_body_rate):
+            yield Change("without max_body_rate", partial(_with_field, "vehicle.max_body_rate", np.inf))
+    stages = problem.stages(task.max_specific_thrust).stages
+    if any(stage.at != "free" for stage in stages):
+        yield Change("with its stages at any time", partial(_with_stages, _at_any_time))
+    if any(condition.min_thrust > 0.0 for stage in stages for condition in stage.conditions):
+        yield Change("with half the thrust that its stages ask", partial(_with_stages, _with_half_the_thrust))
 
 
 def _with_field(name: str, value: float | None, task: Request) -> Request:
@@ -73,36 +85,10 @@ def _without_limit(derivative: int, task: Request) -> Request:
     return replace(task, problem=replace(task.problem, limits=task.problem.limits.without(derivative)))
 
 
-def _of_reserve(task: Request) -> Iterator[Change]:
-    if task.reserve > 0.0:
-        yield Change("without reserve", partial(_with_field, "planner.reserve", 0.0))
-
-
-def _of_vehicle(task: Request) -> Iterator[Change]:
-    vehicle = task.vehicle
-    if vehicle is None:
-        return
-    yield Change(f"with {THRUST_FACTOR:g} times the max_thrust", _with_stronger_rotors)
-    if (vehicle.min_thrusts > 0.0).any():
-        yield Change("with min_thrust 0", partial(_with_field, "vehicle.rotor_defaults.min_thrust", 0.0))
-    if vehicle.lags.any():
-        yield Change("with rotors without lag", partial(_with_field, "vehicle.rotor_defaults.lag", 0.0))
-    if np.isfinite(vehicle.max_body_rate):
-        yield Change("without max_body_rate", partial(_with_field, "vehicle.max_body_rate", np.inf))
-
-
 def _with_stronger_rotors(task: Request) -> Request:
     assert task.vehicle is not None
     rotors = (replace(rotor, max_thrust=THRUST_FACTOR * rotor.max_thrust) for rotor in task.vehicle.rotors)
     return replace(task, vehicle=replace(task.vehicle, rotors=tuple(rotors)))
-
-
-def _of_stages(task: Request) -> Iterator[Change]:
-    stages = task.problem.stages(task.max_specific_thrust).stages
-    if any(stage.at != "free" for stage in stages):
-        yield Change("with its stages at any time", partial(_with_stages, _at_any_time))
-    if any(condition.min_thrust > 0.0 for stage in stages for condition in stage.conditions):
-        yield Change("with half the thrust that its stages ask", partial(_with_stages, _with_half_the_thrust))
 
 
 def _with_stages(ease: Callable[[Stage], Stage], task: Request) -> Request:

@@ -120,7 +120,7 @@ class _RemedySearch:
 
     def by_changes(self) -> list[Remedy]:
         """Return the changes that suffice alone; if there are none, a smallest sufficient set."""
-        found = changes(self.task)
+        found = list(changes(self.task))
         alone = []
         for change in found:
             if out_of_time():
