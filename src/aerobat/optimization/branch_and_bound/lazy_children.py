@@ -11,7 +11,7 @@ import numpy as np
 
 from aerobat.arrays import Array, Indices
 from aerobat.optimization.branch_and_bound.least_distance import QPSolution
-from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds, LowerBounds
+from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds, DualSteps, LowerBounds
 
 _NONE = np.zeros(0, dtype=np.intp)
 _FIRST_BATCH = 4  # candidates paired in the first batch; each later batch is twice as large
@@ -47,15 +47,24 @@ class LazyChildren:
     paired on demand.
     """
 
-    def __init__(self, dual_bounds: DualBounds, solution: QPSolution, lower_bounds: LowerBounds) -> None:
-        """`solution` is the node's; `lower_bounds` have candidates of every pending group."""
+    def __init__(
+        self,
+        dual_bounds: DualBounds,
+        solution: QPSolution,
+        lower_bounds: LowerBounds,
+        steps: DualSteps | None,
+    ) -> None:
+        """`solution` is the node's; `lower_bounds` have candidates of every pending group.
+
+        `steps` prove these bounds; None where they are inherited from the parent.
+        """
         self.lower_bounds = lower_bounds
         self._dual_bounds = dual_bounds
         self._solution = solution
+        self._steps = steps
         group, value = lower_bounds.group, lower_bounds.value
         self._starts = np.concatenate([[0], (group[1:] != group[:-1]).nonzero()[0] + 1])
         self._spans = [slice(a, b) for a, b in pairwise((*self._starts.tolist(), len(group)))]
-        self._floor = float(np.minimum.reduceat(value, self._starts).max())  # lower bound of every completion
         sizes = np.diff([*self._starts, len(group)])
         average = np.add.reduceat(value, self._starts) / sizes
         self._branching_group = int(average.argmax())
@@ -71,7 +80,7 @@ class LazyChildren:
         evaluated = self._evaluated[0][0] if self._evaluated else inf
         if not self._waiting:
             return evaluated
-        return min(evaluated, max(float(self.lower_bounds.value[self._waiting[0]]), self._floor))
+        return min(evaluated, float(self.lower_bounds.value[self._waiting[0]]))
 
     def evaluate_best(self) -> float:
         """Pair candidates until the best branch is known; return its bound."""
@@ -106,21 +115,22 @@ class LazyChildren:
 
     def _push(self, bound: float, pairing: _Pairing) -> None:
         if bound < inf:
-            heappush(self._evaluated, (max(bound, self._floor), next(self._ticket), pairing))
+            heappush(self._evaluated, (bound, next(self._ticket), pairing))
 
     def _evaluate(self, batch: list[int]) -> None:
         candidates = self.lower_bounds.candidates
         value = self.lower_bounds.value
-        steps = self.lower_bounds.steps
-        if steps is None or len(self._spans) == 1:
+        if self._steps is None or len(self._spans) == 1:
             for i in batch:
                 self._push(float(value[i]), _Pairing(int(candidates[i]), _NONE, value[:0]))
             return
-        pairs = self._dual_bounds.pairwise_bounds(self._solution, self.lower_bounds, steps, np.array(batch))
+        pairs = self._dual_bounds.pairwise_bounds(
+            self._solution, self.lower_bounds, self._steps, np.array(batch)
+        )
         by_group = np.minimum.reduceat(pairs, self._starts, axis=1)
         by_group[:, self._branching_group] = -inf
         partner_groups = by_group.argmax(axis=1).tolist()
         bounds = by_group.max(axis=1).tolist()
         for i, row, bound, partner in zip(batch, pairs, bounds, partner_groups, strict=True):
-            span = slice(0, 0) if i in steps.blocked else self._spans[partner]
+            span = slice(0, 0) if i in self._steps.blocked else self._spans[partner]
             self._push(bound, _Pairing(int(candidates[i]), candidates[span], row[span]))

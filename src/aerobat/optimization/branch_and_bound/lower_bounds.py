@@ -8,11 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
-from aerobat.optimization.branch_and_bound.candidates import (
-    FEASIBILITY_TOLERANCE,
-    CandidateBounds,
-    Candidates,
-)
+from aerobat.optimization.branch_and_bound.candidates import CandidateBounds, Candidates
 from aerobat.optimization.branch_and_bound.dual_ascent import MIN_DIVISOR, DualDirections, dual_ascent
 from aerobat.optimization.branch_and_bound.least_distance import QPSolution
 
@@ -35,7 +31,6 @@ class DualSteps:
     slope: Array  # (q,)
     curvature: Array  # (q,)
     blocked: frozenset[int]  # those of the q candidates whose bounds further steps might raise
-    satisfied: Mask  # (q,) True where the node's solution already satisfies the candidate
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,8 +40,6 @@ class LowerBounds:
     candidates: Indices  # (q,)
     group: Indices  # (q,)
     value: Array  # (q,) lower bound of ½|y|² over all y of the node that also satisfy the candidate
-    # the steps that prove them; None where they are inherited from another node
-    steps: DualSteps | None = None
 
     def restricted(self, allowed: Mask, cutoff: float) -> LowerBounds:
         """Return the bounds of `allowed` (P,) candidates that are below `cutoff`, for descendant nodes."""
@@ -56,31 +49,6 @@ class LowerBounds:
     def covers_all_stages(self, groups: Sequence[int]) -> bool:
         """Tell if each of `groups` has a candidate. No other groups occur."""
         return len(set(self.group.tolist())) == len(groups)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _ActiveSet:
-    """The w active rows of a solution, and their products with the u rows that candidates use."""
-
-    rows: Array  # (w, n)
-    gram: Array  # (w, w)
-    inverse_gram: Array  # (w, w)
-    cross_gram: Array  # (w, u)
-    squares: Array  # (u,) squared norms of the candidates' rows, projected off the active rows
-    bound: Array  # (w, 1) the bound at which each row is active
-    is_equality: Mask  # (w,)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Violations:
-    """Violations of q candidates of k rows by a solution, and the resulting dual directions."""
-
-    row_index: Indices  # (k, q)
-    nearest: Array  # (k, q) the point within the bounds that is nearest to the solution's row values
-    violation: Array  # (k, q) distance to `nearest`, positive above the upper bound
-    direction: Array  # (k, q) of the rows' multipliers
-    coupling: Array  # (w, q) products of `direction` with the active rows
-    square: Array  # (q,) squared norm of `direction`
 
 
 class DualBounds:
@@ -106,7 +74,7 @@ class DualBounds:
 
     def single_bounds(
         self, solution: QPSolution, bounds: CandidateBounds, inherited: LowerBounds
-    ) -> LowerBounds:
+    ) -> tuple[LowerBounds, DualSteps]:
         """Return the lower bounds for the node of `solution` with any one of the inherited candidates added.
 
         The multiplier of each violated row of a candidate rises by the violation, divided by the squared norm
@@ -114,35 +82,54 @@ class DualBounds:
         objective −½|Mᵀλ|² − λᵀb at the resulting multipliers. They are dual feasible, so the bound is valid
         for any steps.
         """
-        active = self._active_set(solution)
-        violations = self._violations(solution, bounds, inherited, active)
-        rate = active.inverse_gram @ violations.coupling
-        slope = np.einsum("kq,kq->q", violations.violation, violations.direction)
-        curvature = violations.square - np.einsum("wq,wq->q", violations.coupling, rate)
+        active_rows = self._rows[solution.active]  # (w, n)
+        active_lower, active_upper = solution.lower[solution.active], solution.upper[solution.active]
+        is_equality = active_lower == active_upper
+        gram = active_rows @ active_rows.T
+        inverse_gram = np.asarray(np.linalg.inv(gram), dtype=np.float64)
+        cross_gram = self._cross_gram[solution.active]  # (w, u)
+        squares = self._squares - np.einsum("wu,wu->u", cross_gram, inverse_gram @ cross_gram)
+
+        candidates = inherited.candidates
+        width = self._candidates.widths[inherited.group].max(initial=0)
+        row_index = self._row_index[:width].take(candidates, axis=1)  # (k, q)
+        lower = bounds.lower[:width].take(candidates, axis=1)
+        upper = bounds.upper[:width].take(candidates, axis=1)
+        values = (self._used_rows @ solution.y).take(row_index)
+        nearest = np.minimum(np.maximum(values, lower), upper)
+        violation = values - nearest
+        direction = violation / np.maximum(squares, _MIN_SQUARE).take(row_index)
+        coupling = np.einsum("wkq,kq->wq", cross_gram.take(row_index, axis=1), direction)
+        grams = self._candidate_grams[:width, :width].take(candidates, axis=2)
+        square = np.einsum("abq,aq,bq->q", grams, direction, direction)
+
+        rate = inverse_gram @ coupling
+        slope = np.einsum("kq,kq->q", violation, direction)
+        curvature = square - np.einsum("wq,wq->q", coupling, rate)
         curvature = np.maximum(curvature, _MIN_SQUARE * slope + MIN_DIVISOR)
-        directions = DualDirections(rate, slope, curvature)
         multipliers, step, blocked = dual_ascent(
-            active.inverse_gram, solution.multipliers, active.is_equality, directions
+            inverse_gram, solution.multipliers, is_equality, DualDirections(rate, slope, curvature)
         )
-        linear = step * violations.coupling + active.bound
-        dual = -np.einsum("wq,wq->q", multipliers, 0.5 * (active.gram @ multipliers) + linear)
-        own_linear = np.einsum("kq,kq->q", violations.direction, violations.nearest)
-        dual -= step * (own_linear + (0.5 + _CANCELLATION) * step * violations.square)
+
+        active_bound = np.where(solution.multipliers > 0.0, active_upper, active_lower)[:, None]
+        linear = step * coupling + active_bound
+        dual = -np.einsum("wq,wq->q", multipliers, 0.5 * (gram @ multipliers) + linear)
+        own_linear = np.einsum("kq,kq->q", direction, nearest)
+        dual -= step * (own_linear + (0.5 + _CANCELLATION) * step * square)
         value = np.maximum(np.maximum(dual, inherited.value), solution.value)
         change = multipliers - solution.multipliers[:, None]
         rise = step * slope
         steps = DualSteps(
-            active_rows=active.rows,
+            active_rows=active_rows,
             multiplier_change=change,
-            fraction_lost=change / np.where(active.is_equality, -np.inf, -solution.multipliers)[:, None],
-            row_index=violations.row_index,
-            own_multipliers=step * violations.direction,
+            fraction_lost=change / np.where(is_equality, -np.inf, -solution.multipliers)[:, None],
+            row_index=row_index,
+            own_multipliers=step * direction,
             slope=rise,
             curvature=2.0 * np.maximum(rise - (dual - solution.value), 0.0),
             blocked=frozenset(blocked.tolist()),
-            satisfied=np.all(np.abs(violations.violation) <= FEASIBILITY_TOLERANCE, axis=0),
         )
-        return LowerBounds(inherited.candidates, inherited.group, value, steps)
+        return LowerBounds(candidates, inherited.group, value), steps
 
     def pairwise_bounds(
         self, solution: QPSolution, lower_bounds: LowerBounds, steps: DualSteps, some: Indices
@@ -176,43 +163,3 @@ class DualBounds:
         candidates = lower_bounds.candidates
         bounds[~self._candidates.compatible[candidates[some, None], candidates]] = np.inf
         return bounds
-
-    def _active_set(self, solution: QPSolution) -> _ActiveSet:
-        lower = solution.lower[solution.active]
-        upper = solution.upper[solution.active]
-        rows = self._rows[solution.active]
-        gram = rows @ rows.T
-        inverse_gram = np.asarray(np.linalg.inv(gram), dtype=np.float64)
-        cross_gram = self._cross_gram[solution.active]
-        squares = self._squares - np.einsum("wu,wu->u", cross_gram, inverse_gram @ cross_gram)
-        return _ActiveSet(
-            rows=rows,
-            gram=gram,
-            inverse_gram=inverse_gram,
-            cross_gram=cross_gram,
-            squares=np.maximum(squares, _MIN_SQUARE),
-            bound=np.where(solution.multipliers > 0.0, upper, lower)[:, None],
-            is_equality=lower == upper,
-        )
-
-    def _violations(
-        self, solution: QPSolution, bounds: CandidateBounds, inherited: LowerBounds, active: _ActiveSet
-    ) -> _Violations:
-        candidates = inherited.candidates
-        width = self._candidates.widths[inherited.group].max(initial=0)
-        row_index = self._row_index[:width].take(candidates, axis=1)
-        lower = bounds.lower[:width].take(candidates, axis=1)
-        upper = bounds.upper[:width].take(candidates, axis=1)
-        values = (self._used_rows @ solution.y).take(row_index)
-        nearest = np.minimum(np.maximum(values, lower), upper)
-        violation = values - nearest
-        direction = violation / active.squares.take(row_index)
-        grams = self._candidate_grams[:width, :width].take(candidates, axis=2)
-        return _Violations(
-            row_index=row_index,
-            nearest=nearest,
-            violation=violation,
-            direction=direction,
-            coupling=np.einsum("wkq,kq->wq", active.cross_gram.take(row_index, axis=1), direction),
-            square=np.einsum("abq,aq,bq->q", grams, direction, direction),
-        )

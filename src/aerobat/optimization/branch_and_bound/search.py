@@ -16,7 +16,7 @@ from time import perf_counter
 
 import numpy as np
 
-from aerobat.arrays import Array, Indices
+from aerobat.arrays import Array
 from aerobat.optimization.branch_and_bound.candidates import CandidateBounds, Candidates
 from aerobat.optimization.branch_and_bound.lazy_children import Branch, LazyChildren
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged, QPSolution
@@ -163,19 +163,15 @@ class BestFirstSearch:
             self._push(node.solution.value, node)
 
     def _children(self, node: _Node) -> LazyChildren | None:
-        """Return the node's children; None where its solution is complete and becomes the best."""
+        """Return the node's children; None where it is complete, and becomes the best solution."""
         if not node.pending:
             self.best = (node.solution, node.chosen)
             return None
-        lower_bounds = node.inherited
+        lower_bounds, steps = node.inherited, None
         # bounds are computed anew unless solving the few remaining QPs is cheaper
         if not node.chosen or len(node.pending) > 1 or len(lower_bounds.candidates) > _MAX_INHERITED:
-            lower_bounds = self._dual_bounds.single_bounds(node.solution, self._bounds, node.inherited)
-        complete = self._completed(node, lower_bounds)
-        if complete is not None:
-            self.best = (node.solution, complete)
-            return None
-        return LazyChildren(self._dual_bounds, node.solution, lower_bounds)
+            lower_bounds, steps = self._dual_bounds.single_bounds(node.solution, self._bounds, node.inherited)
+        return LazyChildren(self._dual_bounds, node.solution, lower_bounds, steps)
 
     def _child(self, node: _Node, lower_bounds: LowerBounds, branch: Branch) -> _Node | None:
         """Return one child of a node; None where it cannot improve on the best solution."""
@@ -188,28 +184,6 @@ class BestFirstSearch:
         lower, upper = self._tightened(node.solution.lower, node.solution.upper, branch.chosen)
         solution = self._solve(lower, upper, node.solution, branch.bound)
         return None if solution is None else _Node(solution, node.chosen + branch.chosen, pending, inherited)
-
-    def _completed(self, node: _Node, lower_bounds: LowerBounds) -> tuple[int, ...] | None:
-        """Return one candidate for each group that the node's solution already satisfies, or None."""
-        if lower_bounds.steps is None:
-            return None
-        satisfied = lower_bounds.candidates[lower_bounds.steps.satisfied]
-        if len(satisfied) < len(node.pending):
-            return None
-        return self._matched(node.chosen, node.pending, satisfied)
-
-    def _matched(
-        self, chosen: tuple[int, ...], pending: tuple[int, ...], satisfied: Indices
-    ) -> tuple[int, ...] | None:
-        """Return `chosen` with one compatible candidate of `satisfied` for each pending group, or None."""
-        if not pending:
-            return chosen
-        for candidate in satisfied[self._candidates.group[satisfied] == pending[0]]:
-            compatible = satisfied[self._candidates.compatible[candidate][satisfied]]
-            complete = self._matched((*chosen, int(candidate)), pending[1:], compatible)
-            if complete is not None:
-                return complete
-        return None
 
     def _tightened(self, lower: Array, upper: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
         lower = lower.copy()
