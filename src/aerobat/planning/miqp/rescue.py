@@ -16,7 +16,7 @@ from aerobat.optimization.deadline import out_of_time, processor, within_share, 
 from aerobat.planning.miqp.attempts import default_order
 from aerobat.planning.miqp.integrator import INPUT_NAMES, MAX_INTERVALS
 from aerobat.planning.planners import Planner, planner_class, planner_with_reserve
-from aerobat.planning.recorder import Progress, Recorder
+from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import FLYING_RESERVE, Plan
 from aerobat.planning.turns import priced_duration
 from aerobat.problem.problem import Problem
@@ -87,10 +87,10 @@ class Rescue:
         more = with_more_intervals(self.requested, self.problem, self.vehicle)
         said = f"the path of miqp with {self._intervals} intervals {fault}"
         longest = _priced(plan) if plan.certified else inf
-        faster = () if plan.certified else self._faster_through_gates()
-        fallbacks = chain(faster, [(others, f"by {FREE_KNOTS}")], more)
+        fallbacks = chain([(others, f"by {FREE_KNOTS}")], more)
         with within_time(SHORTENING_TIME, processor):
-            return self._first(fallbacks, said, longest) or plan
+            faster = None if plan.certified else self._faster_through_gates(said)
+            return faster or self._first(fallbacks, said, longest) or plan
 
     def _fault(self, plan: Plan) -> str:
         """Return what makes a plan poor, in words; nothing for a good one."""
@@ -128,6 +128,7 @@ class Rescue:
         fallbacks: Iterator[tuple[Planner, str]],
         failed: str,
         shorter_than: float = inf,
+        stricter: Problem | None = None,
     ) -> Plan | None:
         """Return the first certified plan of several planners that is short enough, or None.
 
@@ -135,23 +136,25 @@ class Rescue:
             fallbacks: Planners, each with words on how it plans.
             failed: Why fallbacks are tried, which the plan's `rescue` repeats.
             shorter_than: Upper bound of the plan's priced duration (`priced_duration`) [s].
+            stricter: A problem that is planned in place of the own one, by which the plan is judged.
         """
         for planner, how in fallbacks:
             with within_share(FALLBACK_FRACTION):
-                plan = self._planned(planner, how)
+                plan = self._planned(planner, how, stricter)
             kept = min(self.requested.reserve, getattr(planner, "reserve", self.requested.reserve))
             if plan is not None and plan.keeps(kept) and _priced(plan) < shorter_than:
                 attempts = (*self.recorder.attempts, *plan.attempts)
                 return replace(plan, attempts=attempts, rescue=f"{failed}; planned {how}")
         return None
 
-    def _planned(self, planner: Planner, how: str) -> Plan | None:
+    def _planned(self, planner: Planner, how: str, stricter: Problem | None = None) -> Plan | None:
         """Return the plan of one fallback; None where there is none, which is noted in this object."""
         if out_of_time():
             self.unanswered.append(how)
             return None
         try:
-            return planner.plan(self.problem, self.vehicle, self.recorder.progress)
+            found = planner.plan(stricter or self.problem, self.vehicle, self.recorder.progress)
+            return found if stricter is None else replace(found, problem=self.problem)
         except Infeasible as refusal:
             (self.unanswered if out_of_time() else self.failed).append(how)
             is_time_optimal = isinstance(planner, planner_class(TIME_OPTIMAL))
@@ -203,13 +206,18 @@ class Rescue:
         said = found.rescue if found.planner == name else f"{self._none_found}; planned by {name}"
         return replace(again, attempts=(*found.attempts, *again.attempts), rescue=said)
 
-    def _faster_through_gates(self) -> Iterator[tuple[Planner, str]]:
-        """Yield the requested planner with a faster passage, where a maneuver's gates can be passed faster.
+    def _faster_through_gates(self, failed: str) -> Plan | None:
+        """Return the certified plan that passes gates FASTER times as fast as asked at least, or None.
 
         A body that turns leaves a low gate's frame sooner so.
         """
-        if self.problem.gates and hasattr(self.problem.maneuver, "passage"):
-            yield _FasterThroughGates(replace(self.requested, rescue=False)), "faster through its gates"
+        maneuver: Any = self.problem.maneuver
+        if not (self.problem.gates and hasattr(maneuver, "passage")):
+            return None
+        speed = FASTER * max(maneuver.passage.speed, MIN_CROSSING_SPEED)
+        stricter = replace(maneuver, passage=replace(maneuver.passage, speed=speed))
+        fallbacks = iter([(replace(self.requested, rescue=False), "faster through its gates")])
+        return self._first(fallbacks, failed, stricter=replace(self.problem, maneuver=stricter))
 
     def _others(self) -> Iterator[tuple[Planner, str]]:
         """Yield the fallbacks that seldom succeed where the earlier ones fail."""
@@ -239,20 +247,3 @@ def with_more_intervals(requested: Any, problem: Problem, vehicle: Vehicle) -> I
         more.add(sequence.intervals_from(MANY_INTERVALS))
     for intervals in sorted(n for n in more if n <= MAX_INTERVALS):
         yield replace(requested, intervals=intervals, rescue=False), f"with {intervals} intervals"
-
-
-@dataclass(frozen=True)
-class _FasterThroughGates(Planner):
-    """A planner that passes gates FASTER times as fast as its problem asks at least."""
-
-    planner: Any
-
-    def plan(
-        self, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
-    ) -> Plan:
-        """Return the plan of the problem with a larger least speed in its gates."""
-        maneuver: Any = problem.maneuver
-        speed = FASTER * max(maneuver.passage.speed, MIN_CROSSING_SPEED)
-        faster = replace(maneuver, passage=replace(maneuver.passage, speed=speed))
-        found = self.planner.plan(replace(problem, maneuver=faster), vehicle, progress)
-        return cast(Plan, replace(found, problem=problem))
