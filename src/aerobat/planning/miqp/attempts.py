@@ -10,7 +10,6 @@ from aerobat.optimization import AssignmentResult, Solver, improved_in_windows
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.certified_solve import Judged, Solution, judge
 from aerobat.planning.courses import is_placed_in_windows
-from aerobat.planning.miqp.diagnosis import NOT_CONVERGED, OUT_OF_TIME
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.miqp.integrator import INPUT_NAMES
 from aerobat.planning.passages import place_stages
@@ -146,7 +145,7 @@ class Attempts:
 def _why_unsolved(answer: AssignmentResult) -> str:
     if answer.status == "infeasible":
         return "the program has no solution"
-    return OUT_OF_TIME if out_of_time() else NOT_CONVERGED
+    return "no solution was found in time" if out_of_time() else "the solver did not converge"
 
 
 def flyable_order(vehicle: Vehicle | None) -> int:

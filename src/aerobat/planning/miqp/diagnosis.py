@@ -19,8 +19,6 @@ from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.recorder import Attempt
 from aerobat.problem.stage import Stage
 
-OUT_OF_TIME = "no solution was found in time"
-NOT_CONVERGED = "the solver did not converge"
 GROUND = "environment.ground"
 MORE_INTERVALS = (1.3, 1.8, 2.5)  # factors tried on the number of intervals, or of stages if larger
 DIAGNOSIS_TIME = 1.0  # processor time [s] of all relaxed programs
