@@ -11,7 +11,8 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.optimization.assignment import AssignmentProgram, unit_rows
-from aerobat.optimization.result import AssignmentResult
+from aerobat.optimization.backends import solver
+from aerobat.optimization.result import AssignmentResult, verified
 
 StageSlot = tuple[int, int]  # (stage, slot), the key of a binary
 
@@ -58,13 +59,23 @@ class Variables:
 class ScaledProgram:
     """A program with unit rows and variables of order one, for solvers whose tolerances are absolute."""
 
+    original: AssignmentProgram
     program: AssignmentProgram
     unit: float  # unit of the variables
 
-    def unscaled(self, claim: AssignmentResult) -> AssignmentResult:
-        """Return a claim on the scaled program as a claim on the program itself."""
+    def result(self, claim: AssignmentResult) -> AssignmentResult:
+        """Return a claim on the scaled program as a verified result on the original one.
+
+        A solution can be verified by its residuals, but infeasibility cannot. Presolve and tolerances of
+        general solvers are sometimes wrong (SCIP 10 reports feasible flips as infeasible). So the exact
+        search confirms infeasibility. Where it finds a solution, its own result is returned.
+        """
         x = None if claim.x is None else self.unit * claim.x
-        return replace(claim, x=x, bound=self.unit**2 * claim.bound)
+        result = verified(self.original, replace(claim, x=x, bound=self.unit**2 * claim.bound))
+        if result.status != "infeasible":
+            return result
+        exact = solver("builtin").solve(self.original)
+        return result if exact.x is None else exact
 
 
 def scaled(program: AssignmentProgram) -> ScaledProgram:
@@ -92,7 +103,7 @@ def scaled(program: AssignmentProgram) -> ScaledProgram:
         gradient=None if program.gradient is None else program.gradient / unit,
         constant=program.constant / unit**2,
     )
-    return ScaledProgram(scaled_program, float(unit))
+    return ScaledProgram(program, scaled_program, float(unit))
 
 
 def build(model: Model, program: AssignmentProgram) -> Variables:

@@ -8,10 +8,9 @@ from typing import Any, ClassVar
 
 from aerobat.errors import AerobatError
 from aerobat.optimization import big_m
-from aerobat.optimization.adapters.confirmation import confirmed
 from aerobat.optimization.assignment import AssignmentProgram
 from aerobat.optimization.deadline import shorter
-from aerobat.optimization.result import AssignmentResult, Status, verified
+from aerobat.optimization.result import AssignmentResult, Status
 
 _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the licence
 
@@ -59,7 +58,7 @@ class Gurobi:
                     claim = _claim(gurobipy, model, scaling.program, start)
         except gurobipy.GurobiError as error:
             raise AerobatError(_message(error, program)) from None
-        return confirmed(program, verified(program, scaling.unscaled(claim)))
+        return scaling.result(claim)
 
 
 class _GurobiModel:

@@ -7,10 +7,9 @@ from math import inf
 from typing import Any, ClassVar
 
 from aerobat.optimization import big_m
-from aerobat.optimization.adapters.confirmation import confirmed
 from aerobat.optimization.assignment import AssignmentProgram
 from aerobat.optimization.deadline import shorter
-from aerobat.optimization.result import AssignmentResult, Status, verified
+from aerobat.optimization.result import AssignmentResult, Status
 
 _MEANING: dict[str, Status] = {"optimal": "optimal", "infeasible": "infeasible"}
 
@@ -45,7 +44,7 @@ class Scip:
             model.setParam("limits/nodes", node_limit)
         scaling = big_m.scaled(program)
         claim = _claim(pyscipopt, model, scaling.program)
-        return confirmed(program, verified(program, scaling.unscaled(claim)))
+        return scaling.result(claim)
 
 
 class _ScipModel:
