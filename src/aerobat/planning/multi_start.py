@@ -239,7 +239,7 @@ class MultiStart:
         self, refinement: Refinement, rough: Sequence[RefinedPath], best: _Found | None = None
     ) -> _Found | None:
         """Return the best of a known path and of the certified paths from rough ones, fastest rough first."""
-        starts, certified = tuple(sorted(map(_duration, rough))), [] if best is None else [best]
+        starts, certified = tuple(sorted(path.duration for path in rough)), [] if best is None else [best]
         with within_share(ROUGH_TIME):
             paths = self._with_more_segments(refinement, rough)
         for path in paths:
@@ -255,7 +255,7 @@ class MultiStart:
         """Return the rough paths from starts, fastest first, without those that rounds cannot repair."""
         found: list[RefinedPath] = []
         for path in batch:
-            known = min(map(_duration, found), default=inf)
+            known = min((each.duration for each in found), default=inf)
             rough = refinement.rough(path, self._least_segments, known)
             if refinement.is_promising(rough):
                 found.append(rough)
@@ -279,9 +279,9 @@ class MultiStart:
                     finer = refinement.finer(path, segments, known)
                     if refinement.is_promising(finer):
                         found.append(finer)
-                        known = min(known, _duration(finer))
+                        known = min(known, finer.duration)
             found.sort(key=lambda finer: self._priced(finer.path))
-            if not found or _duration(found[0]) > (1.0 - WORTHWHILE) * _duration(paths[0]):
+            if not found or found[0].duration > (1.0 - WORTHWHILE) * paths[0].duration:
                 return found
             paths = found
         return paths
@@ -350,9 +350,5 @@ def _varied(batch: Sequence[_Start]) -> Iterator[_Start]:
 
 def _distinct(paths: Sequence[RefinedPath]) -> list[RefinedPath]:
     """Return sorted paths without those that take nearly as long as the path before."""
-    before = [0.0, *map(_duration, paths)]
-    return [each for each, last in zip(paths, before, strict=False) if _duration(each) > (1.0 + SAME) * last]
-
-
-def _duration(path: RefinedPath) -> float:
-    return path.path.trajectory.duration
+    before = [0.0, *(path.duration for path in paths)]
+    return [each for each, last in zip(paths, before, strict=False) if each.duration > (1.0 + SAME) * last]

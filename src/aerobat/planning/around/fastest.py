@@ -36,11 +36,6 @@ class _Rough:
     refinement: Refinement
     path: RefinedPath
 
-    @property
-    def duration(self) -> float:
-        """The duration of the path [s]."""
-        return self.path.path.trajectory.duration
-
 
 def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -> FlownPath | None:
     """Return the fastest certified path of the first batch of guesses that leads to one, or None.
@@ -51,10 +46,12 @@ def fastest_around(refinement: Refinement, segments: int, count: int = ROUTES) -
         count: Number of routes, at most.
     """
     for batch, stretch in zip(guesses(refinement.task, count), cycle(QUICK_STRETCHES)):
-        quick = sorted(_quickly_refined(refinement, segments, batch, stretch), key=lambda each: each.duration)
+        quick = sorted(
+            _quickly_refined(refinement, segments, batch, stretch), key=lambda each: each.path.duration
+        )
         for k in range(0, len(quick), FOLLOWED):
             rough = _refined_roughly(quick[k : k + FOLLOWED], segments)
-            for found in sorted(rough, key=lambda each: each.duration):
+            for found in sorted(rough, key=lambda each: each.path.duration):
                 judged = found.refinement.finished(found.path)
                 if judged.feasible:
                     return FlownPath.of(found.refinement, judged)
@@ -97,7 +94,7 @@ def _refined_roughly(quick: Sequence[_Rough], segments: int) -> Iterator[_Rough]
         path = each.refinement.rough(each.path.path, count, shortest)
         if each.refinement.is_promising(path):
             yield _Rough(each.refinement, path)
-            shortest = min(shortest, path.path.trajectory.duration)
+            shortest = min(shortest, path.duration)
         if out_of_time():
             return
 

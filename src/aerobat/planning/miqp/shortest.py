@@ -55,14 +55,14 @@ def shortest(
     scan, rough = _Scan(attempts, refinement, scanned, least), list[RefinedPath]()
     starts = scan.starts()
     for number, (slots, guess) in enumerate(starts, 1):
-        path = refinement.rough(guess, segments, min(map(_duration, rough), default=inf))
+        path = refinement.rough(guess, segments, min((each.duration for each in rough), default=inf))
         if refinement.is_promising(path):
             scan.known.append(slots)
             rough.append(path)
         if len(rough) >= STARTS or number >= MAX_STARTS or out_of_time():
             break
     found: Judged[RefinedPath] | None = None
-    for path in sorted(rough, key=_duration):
+    for path in sorted(rough, key=lambda each: each.duration):
         judged = refinement.finished(path)
         if judged.feasible:
             found = _shortened(judged, scan, segments)
@@ -120,13 +120,9 @@ def _shorter(
     """Return the certified path refined from a start if it is shorter than a known one, else None."""
     refinement, longest = scan.refinement, inf if known is None else known.solution.duration
     path = refinement.rough(start, segments, longest)
-    goes_on = refinement.is_promising(path) and _duration(path) < longest
+    goes_on = refinement.is_promising(path) and path.duration < longest
     found = refinement.finished(path) if goes_on else path.certified
     return found if found and found.feasible and found.solution.duration < longest else None
-
-
-def _duration(path: RefinedPath) -> float:
-    return path.path.trajectory.duration
 
 
 @dataclass

@@ -119,6 +119,11 @@ class RefinedPath:
     certified: Judged[RefinedPath] | None = None  # the shortest certified path of the rough rounds up to here
 
     @property
+    def duration(self) -> float:
+        """The duration of the path [s]."""
+        return self.path.trajectory.duration
+
+    @property
     def placed(self) -> tuple[PlacedStage, ...]:
         """The path's stages, each in its segment."""
         path = self.path
@@ -225,15 +230,15 @@ class Refinement:
     def _redistribute_knots(self, found: RefinedPath, known: float) -> RefinedPath:
         """Redistribute the knots evenly between stages and solve again, as long as the duration falls."""
         for _ in range(REDISTRIBUTIONS):
-            duration = found.path.trajectory.duration
+            duration = found.duration
             if out_of_time() or not self.is_promising(found) or duration > (1.0 + DURATION_CUTOFF) * known:
                 break
             spread = knots_at_stages(found.path, found.path.trajectory.segments)
             again = self._rough(spread, duration, found.certified, found.multipliers)
-            if not self.is_promising(again) or again.path.trajectory.duration >= duration:
+            if not self.is_promising(again) or again.duration >= duration:
                 break
             found = again
-            if again.path.trajectory.duration > (1.0 - LITTLE_GAIN) * duration:
+            if again.duration > (1.0 - LITTLE_GAIN) * duration:
                 break
         return found
 
@@ -292,7 +297,7 @@ class Refinement:
         if loses_little or is_course(self.task.stages) or not is_clear(found.frames) or out_of_time():
             return found
         finer = self.finer(rough, min(2 * path.segments, MAX_SEGMENTS), duration)
-        if not self.is_promising(finer) or finer.path.trajectory.duration >= duration:
+        if not self.is_promising(finer) or finer.duration >= duration:
             return found
         judged = replace(self, adds_segments=False).finished(finer)
         is_better = judged.feasible and judged.solution.duration < duration and is_clear(judged.frames)

@@ -49,12 +49,6 @@ class StageValues:
         ]
         return np.concatenate([linear, balls, *rooms])
 
-    @property
-    def inequality_count(self) -> int:
-        """The number q of inequalities."""
-        rooms = sum(len(room.scale) for room in self._rooms)
-        return len(self._unequal.bounds) + len(self._balls) + rooms
-
     def equalities(self, derivatives: Array) -> Array:
         """Return the values of the equalities, (p,)."""
         return self._equal.values(derivatives)
