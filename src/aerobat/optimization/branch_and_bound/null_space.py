@@ -47,10 +47,6 @@ class ReducedBounds:
         """Return the cost where ½|y|² is `value`."""
         return self.unit**2 * (self.base_cost + value)
 
-    def value(self, cost: float) -> float:
-        """Return ½|y|² for a cost, at most UNBOUNDED: the inverse of `cost`."""
-        return min(cost / self.unit**2 - self.base_cost, UNBOUNDED)
-
 
 @dataclass(frozen=True, eq=False)
 class Block:
