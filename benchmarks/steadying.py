@@ -20,7 +20,10 @@ from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE
 from aerobat.studies.passing import steadied
 
 VEHICLES = ("agile-quad", "crazyflie", "agilicious", "hexarotor", "x500")
-MANEUVERS = ("flip-roll", "flip-pitch", "half-flip", "half-flip:75", "half-flip:60")  # :tilt [deg]
+MANEUVERS = (  # with :tilt [deg]
+    *("flip-roll", "flip-pitch", "half-flip", "half-flip:75", "half-flip:60", "half-flip:45", "half-flip:20"),
+    *("power-loop", "split-s", "immelmann", "matty-flip", "inverted-pass"),
+)
 FLIGHTS = 400
 
 
@@ -35,7 +38,11 @@ def main() -> None:
     for vehicle in asked.vehicles:
         for maneuver in asked.maneuvers:
             times = [time.process_time()]
-            first = ab.plan(problem_of(maneuver), planner, vehicle)
+            try:
+                first = ab.plan(problem_of(maneuver), planner, vehicle)
+            except ab.Infeasible:
+                print(f"{maneuver}, {vehicle}: no plan", flush=True)
+                continue
             times.append(time.process_time())
             found = steadied(first, planner, lab)
             times.append(time.process_time())

@@ -30,9 +30,10 @@ FIGURES: Mapping[int, Callable[[Callable[[str], None]], PaperFigure]] = {
 }
 INTRODUCTION = """# The paper's figures
 
-This page reproduces the figures of Lusk and Tordesillas, *Trajectory Optimization for Multirotors*. The command
-`python examples/paper_figures.py` plans and simulates the flights, and draws the figures. The text under each figure
-describes the paper's figure and compares it with ours. Figs. 1, 4 and 7 of the paper are photographs and a block diagram.
+This page reproduces the figures of Lusk and Tordesillas, *Trajectory Optimization for Multirotors*. The
+command `python examples/paper_figures.py` plans and simulates the flights, and draws the figures. The text
+under each figure describes the paper's figure and compares it with ours. Figs. 1, 4 and 7 of the paper are
+photographs and a block diagram.
 
 """
 

@@ -38,6 +38,6 @@ def _caption(here: Plan, printed: Plan) -> Caption:
         "a_y that each stage requires. The figure is a sketch without numbers.",
         "the same five stages, at the times and places that a solver finds: within the limits of the "
         f"hexarotor's rotors ({here.duration:.2f} s), and in the proven optimum of the printed program "
-        f"({printed.duration:.2f} s). As printed, a stage permits either sign of the thrust, and the order is free: "
-        f"{', '.join(stage.name for stage in order)}, where “315°” is met at 135°.",
+        f"({printed.duration:.2f} s). As printed, a stage permits either sign of the thrust, and the order "
+        f"is free: {', '.join(stage.name for stage in order)}, where “315°” is met at 135°.",
     )

@@ -114,8 +114,8 @@ def figure_10(begin: Callable[[str], None]) -> PaperFigure:
         "violated, yet the path is tracked, because the paper's simulation has no actuator limits: “on a "
         "real system, the tracking would not be as good since the actuators would saturate”.",
         f"{_times_text(_times(search, STOPPED_AFTER))}. Required rotor thrusts: {flown.plan.margin}. In "
-        f"this simulation the rotors saturate, {100 * flown.score.saturated_fraction:.0f} % of the time. The flight "
-        f"{flown.score.sentence}.",
+        f"this simulation the rotors saturate, {100 * flown.score.saturated_fraction:.0f} % of the time. The "
+        f"flight {flown.score.sentence}.",
     )
     return _tracking_figure(caption, flown)
 
@@ -145,10 +145,10 @@ def _path_caption(search: TimeSearch) -> Caption:
     return Caption(
         8,
         "A path of the alternative method",
-        "a path from (0, 0, 0) through a height of −2 m, with free x and y, to (6, 0, 0). A search delays both "
-        "times, from 0.5 and 2 s, until the actuator constraints hold. The search takes 12 iterations.",
-        f"polynomials of degree 9, and {len(search.iterations)} iterations. Only the last iteration keeps every "
-        "rotor within −0.2 to 18 N (the paper draws limits without numbers). The path crosses "
+        "a path from (0, 0, 0) through a height of −2 m, with free x and y, to (6, 0, 0). A search delays "
+        "both times, from 0.5 and 2 s, until the actuator constraints hold. The search takes 12 iterations.",
+        f"polynomials of degree 9, and {len(search.iterations)} iterations. Only the last iteration keeps "
+        "every rotor within −0.2 to 18 N (the paper draws limits without numbers). The path crosses "
         f"−2 m at x = {waypoint[0]:.2f} m, {100 * waypoint[0] / 6.0:.0f} % of the way.",
     )
 

@@ -374,7 +374,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed() -> None:
 @pytest.mark.process
 def test_the_main_job_needs_no_pyplot() -> None:
     probe = (
-        "import sys\nfrom aerobat.cli import main\nmain(['plan', 'line', '--json'])\n"
+        "import sys\nfrom aerobat.cli import main\nmain(['plan', 'line', '--reserve', '0', '--json'])\n"
         "print('matplotlib.pyplot' in sys.modules, file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
@@ -383,13 +383,13 @@ def test_the_main_job_needs_no_pyplot() -> None:
 
 @pytest.mark.process
 def test_a_command_imports_what_it_needs() -> None:
-    """To plan, no other command, no study, no sensors; of maneuvers and planners' workings its own."""
+    """To plan the fastest, no other command, no study, no sensors; of maneuvers and planners its own."""
     others = [
         "cli.commands.sweep", "studies.sweep", "viewer", "links", "simulation.conditions",
         "interchange.robots.description", "problem.maneuvers.course", "problem.maneuvers.waypoints",
     ]  # fmt: skip
     probe = (
-        "import sys\nfrom aerobat.cli import main\nmain(['plan', 'line', '--json'])\n"
+        "import sys\nfrom aerobat.cli import main\nmain(['plan', 'line', '--reserve', '0', '--json'])\n"
         f"print([m for m in {others} if 'aerobat.' + m in sys.modules], file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)

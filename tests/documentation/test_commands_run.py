@@ -41,7 +41,6 @@ ENDS = {  # of commands that do not end with 0, as the pages say
     "min-snap": 1,
     "two-flips": 1,
     "fast-half-flip": 1,
-    "--angle 45": 1,
     "--reserve 0": 1,
     "--max-speed 8": 1,
     "agile-qad": 2,

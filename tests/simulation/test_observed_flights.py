@@ -55,14 +55,14 @@ def test_an_outage_is_flown_by_the_imu_and_said_with_its_times(
     assert found.observer is not None
     assert found.observer.coasted
     assert found.observer.longest_without_pose_s == pytest.approx(duration, abs=0.03)
-    (said,) = (fact.said for fact in facts(found) if fact.label == "observer")
+    (said,) = (fact.words for fact in facts(found) if fact.label == "observer")
     assert f"no poses from {begin - 0.01:.2f}" in said
     assert "the IMU alone" in said
 
 
 def test_without_an_outage_nothing_is_said_of_one(line: ab.Plan) -> None:
     found = ab.score(ab.fly(line, conditions="lab", seed=1), line)
-    (said,) = (fact.said for fact in facts(found) if fact.label == "observer")
+    (said,) = (fact.words for fact in facts(found) if fact.label == "observer")
     assert "IMU" not in said
 
 

@@ -11,9 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
+from aerobat.planning.result import FLYING_RESERVE
 from aerobat.studies.passing import Passing, Round, tightening
 from aerobat.studies.passing.causes import main_failure_cause
 from aerobat.studies.passing.spread import with_more_thrust
+from aerobat.studies.passing.task import VARIANTS
 from aerobat.studies.passing.tightening import Tightening
 from aerobat.studies.share import Share
 
@@ -107,10 +109,37 @@ def test_a_plain_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened():
     tightening.training, tightening.proving = range(4), 10
     tightening._plain = lambda: (SimpleNamespace(plan="plain", share=1.0), None)
     tightening._planned = lambda steps, variant, problem, longest: SimpleNamespace(
-        round=SimpleNamespace(plan="tightened", share=1.0, problem=problem)
+        round=SimpleNamespace(plan="tightened", share=1.0, problem=problem), variant=variant
     )
     tightening._proven = lambda done, share, fresh: (done.plan, done.problem, fresh)
     assert tightening.passing() == ("tightened", "as it is", range(14, 24))
+
+
+def test_where_no_remaining_variant_has_a_plan_all_are_tried_again_without_the_added_thrust():
+    """Of a power loop, more thrust in its stages helped at first, and left no plan with more reserve."""
+    found = object.__new__(Tightening)
+    found.task = SimpleNamespace(is_likely_proof=lambda share: share)
+    found._variants, found._problem, found._narrower = VARIANTS[2:3], "more thrust", "as it is"
+    found._planned = lambda steps, variant, problem, longest: (
+        None
+        if problem == "more thrust" or variant == VARIANTS[0]
+        else SimpleNamespace(round=SimpleNamespace(plan=problem, share=True), variant=variant)
+    )
+    assert found._round(6).plan == "as it is"
+    assert found._variants == (VARIANTS[1],)
+
+
+@pytest.mark.slow
+def test_a_power_loop_is_proven_by_the_plan_that_commands_take():
+    """A freestyle quadrotor's was refused after a minute, though one of 14 % more time passes."""
+    lagging = ab.load_vehicle("agilicious")
+    lagging = replace(lagging, rotors=tuple(replace(rotor, lag=0.05) for rotor in lagging.rotors))
+    found = ab.plan_to_pass(
+        "power-loop", ab.Miqp(reserve=FLYING_RESERVE), lagging, probability=0.95, workers=1
+    )
+    assert found.before.fraction < 0.9
+    assert found.price < 0.2 * found.plain.duration
+    assert len(found.rounds) == 2
 
 
 @pytest.mark.slow

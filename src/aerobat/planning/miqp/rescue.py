@@ -118,9 +118,10 @@ class Rescue:
         said = ["not proven"]
         if self.failed:
             said.append(f"but none was found {', '.join(self.failed)}")
-        unanswered = [how for how in self.unanswered if how not in self.failed]
+        unanswered = [how for how in dict.fromkeys(self.unanswered) if how not in self.failed]
         if unanswered:
-            said.append(f"{RESCUE_TIME:g} s were too few to plan {', '.join(unanswered)}")
+            allowed = RESCUE_TIME + PROMISING_TIME * self.is_promising
+            said.append(f"{allowed:g} s were too few to plan {', '.join(unanswered)}")
         return ", ".join(said)
 
     def _first(

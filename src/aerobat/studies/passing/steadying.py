@@ -113,7 +113,7 @@ def steadied(
         progress=progress,
         flying=Pool(),
     )
-    return _steadier(task, plan, kept, may_grow=reserve == FLYING_RESERVE)
+    return steadier(task, plan, kept, may_grow=reserve == FLYING_RESERVE)[0]
 
 
 @dataclass(frozen=True)
@@ -133,8 +133,8 @@ class _Flown:
         return replace(self.plan, attempts=(*first.plan.attempts, *self.plan.attempts), rescue=why)
 
 
-def _steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> Plan:
-    """Return the plan, or the most valuable of others of which enough more flights succeed.
+def steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> tuple[Plan, float]:
+    """Return the most valuable of some plans of which more flights succeed, or the plan; and its reserve.
 
     Args:
         task: The flights, and the planner of further plans.
@@ -144,11 +144,11 @@ def _steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> 
     """
     scores = task.scores(plan, SELECTION_FLIGHTS[:FIRST_FLIGHTS])
     if passed(scores).fraction >= SUFFICIENT_SUCCESS:
-        return plan
+        return plan, reserve
     scores = joined([scores, task.scores(plan, SELECTION_FLIGHTS[FIRST_FLIGHTS:])])
     share = passed(scores)
     first = best = _Flown(plan, share, share.fraction)
-    found, deadline = plan, processor() + PLANNING_TIME
+    found, kept, deadline = plan, reserve, processor() + PLANNING_TIME
     narrower = with_narrower_gates(plan.problem, task.vehicle, scores)
     stronger = with_more_thrust(narrower, task.vehicle, plan, scores, SUFFICIENT_SUCCESS)
     too_long: list[_Tightening] = []  # whose plans are not worth their duration
@@ -171,8 +171,9 @@ def _steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> 
             flown = _Flown(other, share, share.fraction - price)
             gain = MIN_GAIN if price > 0.0 else 0.0
             if flown.value > best.value and share.fraction > first.share.fraction + gain:
-                best, found = flown, flown.explained(first, each.described(reserve))
-    return found
+                best, kept = flown, reserve + each.reserve
+                found = flown.explained(first, each.described(reserve))
+    return found, kept
 
 
 def _tightenings(problem: Problem, may_grow: bool, may_push: bool) -> list[_Tightening]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 
@@ -16,6 +16,7 @@ from aerobat.studies.flights import passed
 from aerobat.studies.passing.causes import main_failure_cause
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, tube_series, with_more_thrust, with_narrower_gates
+from aerobat.studies.passing.steadying import steadier
 from aerobat.studies.passing.task import VARIANTS, PassingTask, Variant
 from aerobat.studies.share import Share, percent
 
@@ -54,11 +55,12 @@ class Tightening:
     def passing(self) -> Passing:
         """Return the plan that passes, with its proof. Raises Infeasible where there is none."""
         plain, scores = self._plain()
-        self._problem = self.task.problem
+        self._narrower = self._problem = self.task.problem
         steps, done = 0, plain
         if not self.task.is_likely_proof(plain.share):
-            self._problem = with_narrower_gates(self.task.problem, self.task.vehicle, scores)
-            steps, done = self._smallest()
+            self._narrower = with_narrower_gates(self.task.problem, self.task.vehicle, scores)
+            self._problem = self._narrower
+            steps, done = self._steadied() or self._smallest()
         for attempt in range(PROOFS):
             fresh = self._fresh(attempt)
             share = self.task.share(done.plan, fresh)
@@ -81,6 +83,15 @@ class Tightening:
         scores = self.task.training(found, self.training)
         return self._noted(Round(self._least, found, passed(scores))), scores
 
+    def _steadied(self) -> tuple[int, Round] | None:
+        """Return the steps of reserve and the round of the plan that commands take; None if too few pass."""
+        plain = self.rounds[0].plan
+        found, reserve = steadier(self.task, plain, self._least, may_grow=True)
+        if found is plain:
+            return None
+        done = self._noted(Round(reserve, found, passed(self.task.training(found, self.training))))
+        return (self._steps(done), done) if self.task.is_likely_proof(done.share) else None
+
     def _smallest(self) -> tuple[int, Round]:
         """Return the fewest steps of reserve with nearly enough passing training flights, and the round."""
         low, high, steps = -1, MAX_STEPS + 1, 0  # the fewest steps known without a plan
@@ -96,7 +107,11 @@ class Tightening:
         best = max(self.rounds, key=_fraction)
         if best.share.fraction < self.task.probability:
             raise self._unreachable(best, self.training)
-        return round((best.reserve - self._least) / STEP), best
+        return self._steps(best), best
+
+    def _steps(self, done: Round) -> int:
+        """Return the steps of reserve of a round."""
+        return round((done.reserve - self._least) / STEP)
 
     def _refined(self, low: int, high: int, best: Round) -> tuple[int, Round]:
         """Return the fewest sufficient steps between too few and enough, by bisection."""
@@ -115,22 +130,33 @@ class Tightening:
         Variants are tried until one has enough passing flights; later rounds try that variant alone.
         Otherwise the best variants remain for the next round, and the best plan is also planned with more
         thrust in gates that flights pass off their attitude. The added thrust stays if more flights pass with
-        it.
+        it. Where no remaining variant has a plan, all are tried again, without the added thrust.
         """
+        tried = self._tried(steps, self._variants) or self._tried_again(steps)
+        if not tried:
+            return None
+        if self.task.is_likely_proof(tried[-1].round.share):
+            self._variants = (tried[-1].variant,)
+            return tried[-1].round
+        tried.sort(key=lambda each: _fraction(each.round), reverse=True)
+        self._variants = tuple(each.variant for each in tried[:KEPT_VARIANTS])
+        return self._with_more_thrust(steps, tried[0])
+
+    def _tried_again(self, steps: int) -> list[_Flown]:
+        self._problem = self._narrower
+        return self._tried(steps, VARIANTS)
+
+    def _tried(self, steps: int, variants: Sequence[Variant]) -> list[_Flown]:
+        """Return the plans of variants that are not much longer than the others, up to a sufficient one."""
         tried: list[_Flown] = []
-        for variant in self._variants:
+        for variant in variants:
             longest = ROUND_DURATION_RATIO * min((each.round.plan.duration for each in tried), default=inf)
             found = self._planned(steps, variant, self._problem, longest)
             if found is not None:
                 tried.append(found)
-            if found is not None and self.task.is_likely_proof(found.round.share):
-                self._variants = (variant,)
-                return found.round
-        if not tried:
-            return None
-        tried.sort(key=lambda each: _fraction(each.round), reverse=True)
-        self._variants = tuple(each.variant for each in tried[:KEPT_VARIANTS])
-        return self._with_more_thrust(steps, tried[0])
+                if self.task.is_likely_proof(found.round.share):
+                    break
+        return tried
 
     def _with_more_thrust(self, steps: int, best: _Flown) -> Round:
         """Return the round planned again with more thrust in gates if more flights pass, else the round."""
