@@ -29,15 +29,14 @@ from aerobat.studies.workers import Pool
 MAX_LAG_ANGLE = radians(5.0)  # [rad] turned within the rotors' lag, above which flights may be too late
 SELECTION_FLIGHTS = range(10**6, 10**6 + 200)  # flights that select the plan; other flights judge it
 FIRST_FLIGHTS = 50  # of these: where enough of them succeed, the plan is kept
-# fraction of these flights, less the price of the duration, with which no further plan is tried; most plans
-# with as many successes are proven for 95 %
-SUFFICIENT_SUCCESS = 0.975
+SUFFICIENT_SUCCESS = 0.975  # fraction of these flights: most plans with as many successes are proven for 95 %
+CERTAIN_SUCCESS = 0.985  # likewise, less the price of the duration, with which no further plan is tried
 MIN_GAIN = 0.02  # fraction of these flights that must succeed beyond the first plan's for a longer plan
 # price of a duration e times as long, as a fraction of these flights: of a plan 10 % longer, 5 of 100 flights
 # more must succeed
 DURATION_PRICE = 0.5
-# [s] processor time limit of all these plans, most of which take 0.3 to 1; each may take half of what is left
-PLANNING_TIME = 4.0
+PLANNING_TIME = 6.0  # [s] processor time limit of all these plans, most of which take 0.3 to 3
+PLAN_FRACTION = 0.6  # fraction of the time that is left for one of them
 LEAST_TIME = 0.5  # [s] of which no plan is begun with less
 
 
@@ -64,6 +63,7 @@ class _Tightening:
 # In the order of trial. Lower body rates cost flips through gates hardly any time, and more thrust keeps
 # their attitude; of figures without gates more reserve costs the least time (benchmarks/steadying.py).
 _TIGHTENINGS = (
+    _Tightening(1.0),
     *(_Tightening(rate, thrust=thrust) for rate in (0.65, 0.5) for thrust in (False, True)),
     *(_Tightening(1.0, reserve, thrust) for reserve in (0.1, 0.2) for thrust in (False, True)),
     *(_Tightening(0.8, reserve) for reserve in (0.0, 0.1)),
@@ -147,6 +147,8 @@ def steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> t
         return plan, reserve
     scores = joined([scores, task.scores(plan, SELECTION_FLIGHTS[FIRST_FLIGHTS:])])
     share = passed(scores)
+    if share.fraction >= SUFFICIENT_SUCCESS:
+        return plan, reserve
     first = best = _Flown(plan, share, share.fraction)
     found, kept, deadline = plan, reserve, processor() + PLANNING_TIME
     narrower = with_narrower_gates(plan.problem, task.vehicle, scores)
@@ -154,13 +156,13 @@ def steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> t
     too_long: list[_Tightening] = []  # whose plans are not worth their duration
     for each in _tightenings(plan.problem, may_grow, stronger != narrower):
         left = deadline - processor()
-        if best.value >= SUFFICIENT_SUCCESS or left <= LEAST_TIME:
+        if best.value >= CERTAIN_SUCCESS or left <= LEAST_TIME:
             break
         if any(each.contains(other) for other in too_long):
             continue
         problem, variant = stronger if each.thrust else narrower, Variant(each.rate, True)
         try:
-            other = task.tightened(plan, reserve + each.reserve, variant, problem, 0.5 * left)
+            other = task.tightened(plan, reserve + each.reserve, variant, problem, PLAN_FRACTION * left)
         except (Infeasible, SpecError):  # no plan, or gates too narrow for one
             continue
         price = DURATION_PRICE * log(other.duration / plan.duration)
