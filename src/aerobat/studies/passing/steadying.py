@@ -117,14 +117,14 @@ def steadied(
 
 
 @dataclass(frozen=True)
-class _Flown:
+class _Candidate:
     """A plan, and the share of its flights that succeed."""
 
     plan: Plan
     share: Share
     value: float  # fraction of the flights that succeed, less the price of the duration
 
-    def explained(self, first: _Flown, how: str) -> Plan:
+    def explained(self, first: _Candidate, how: str) -> Plan:
         """Return the plan with its relation to the first plan as its `rescue`."""
         why = (
             f"goes on from {first.plan.planner}'s {first.plan.duration:.3f} s{how}: {self.share.count} of "
@@ -149,7 +149,7 @@ def steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> t
     share = passed(scores)
     if share.fraction >= SUFFICIENT_SUCCESS:
         return plan, reserve
-    first = best = _Flown(plan, share, share.fraction)
+    first = best = _Candidate(plan, share, share.fraction)
     found, kept, deadline = plan, reserve, processor() + PLANNING_TIME
     narrower = with_narrower_gates(plan.problem, task.vehicle, scores)
     stronger = with_more_thrust(narrower, task.vehicle, plan, scores, SUFFICIENT_SUCCESS)
@@ -170,7 +170,7 @@ def steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> t
             too_long.append(each)
         elif other.certified and other.flies:
             share = passed(task.scores(other, SELECTION_FLIGHTS))
-            flown = _Flown(other, share, share.fraction - price)
+            flown = _Candidate(other, share, share.fraction - price)
             gain = MIN_GAIN if price > 0.0 else 0.0
             if flown.value > best.value and share.fraction > first.share.fraction + gain:
                 best, kept = flown, reserve + each.reserve
