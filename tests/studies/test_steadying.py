@@ -1,4 +1,4 @@
-"""Plans that turn slower or push harder in gates: about as fast, and more of their flights succeed."""
+"""Plans that turn slower, keep more reserve or push harder in gates: more of their flights succeed."""
 
 from __future__ import annotations
 

@@ -196,7 +196,7 @@ def _plan_made(record: RunRecord, planner: Planner, explain: bool) -> Plan:
 
 
 def _steadied(found: Plan, record: RunRecord, planner: Planner, progress: Callable[[Attempt], None]) -> Plan:
-    """Return the plan, or one as fast with which more flights succeed under the run's or lab conditions."""
+    """The plan, or a better one of which more flights succeed under the run's conditions, or a lab's."""
     from aerobat.studies.passing import steadied
 
     flight = record.flight

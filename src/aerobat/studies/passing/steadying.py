@@ -122,13 +122,20 @@ class _Candidate:
 
     plan: Plan
     share: Share
-    value: float  # fraction of the flights that succeed, less the price of the duration
+    tightening: _Tightening  # what is asked of it, beyond the first plan
+    price: float = 0.0  # of its duration, as a fraction of the flights
 
-    def explained(self, first: _Candidate, how: str) -> Plan:
-        """Return the plan with its relation to the first plan as its `rescue`."""
+    @property
+    def value(self) -> float:
+        """The fraction of the flights that succeed, less the price of the duration."""
+        return self.share.fraction - self.price
+
+    def explained(self, first: _Candidate, reserve: float) -> Plan:
+        """Return the plan with its relation to the first plan, which keeps a reserve, as its `rescue`."""
         why = (
-            f"goes on from {first.plan.planner}'s {first.plan.duration:.3f} s{how}: {self.share.count} of "
-            f"{self.share.of} flights succeed instead of {first.share.count}"
+            f"goes on from {first.plan.planner}'s {first.plan.duration:.3f} s"
+            f"{self.tightening.described(reserve)}: {self.share.count} of {self.share.of} flights succeed "
+            f"instead of {first.share.count}"
         )
         return replace(self.plan, attempts=(*first.plan.attempts, *self.plan.attempts), rescue=why)
 
@@ -149,8 +156,8 @@ def steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> t
     share = passed(scores)
     if share.fraction >= SUFFICIENT_SUCCESS:
         return plan, reserve
-    first = best = _Candidate(plan, share, share.fraction)
-    found, kept, deadline = plan, reserve, processor() + PLANNING_TIME
+    first = best = _Candidate(plan, share, _Tightening(1.0))
+    deadline = processor() + PLANNING_TIME
     narrower = with_narrower_gates(plan.problem, task.vehicle, scores)
     stronger = with_more_thrust(narrower, task.vehicle, plan, scores, SUFFICIENT_SUCCESS)
     too_long: list[_Tightening] = []  # whose plans are not worth their duration
@@ -169,13 +176,13 @@ def steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> t
         if 1.0 - price <= best.value:
             too_long.append(each)
         elif other.certified and other.flies:
-            share = passed(task.scores(other, SELECTION_FLIGHTS))
-            flown = _Candidate(other, share, share.fraction - price)
-            gain = MIN_GAIN if price > 0.0 else 0.0
-            if flown.value > best.value and share.fraction > first.share.fraction + gain:
-                best, kept = flown, reserve + each.reserve
-                found = flown.explained(first, each.described(reserve))
-    return found, kept
+            flown = _Candidate(other, passed(task.scores(other, SELECTION_FLIGHTS)), each, price)
+            least = first.share.fraction + (MIN_GAIN if price > 0.0 else 0.0)
+            if flown.value > best.value and flown.share.fraction > least:
+                best = flown
+    if best is first:
+        return plan, reserve
+    return best.explained(first, reserve), reserve + best.tightening.reserve
 
 
 def _tightenings(problem: Problem, may_grow: bool, may_push: bool) -> list[_Tightening]:

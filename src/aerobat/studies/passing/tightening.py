@@ -55,12 +55,10 @@ class Tightening:
     def passing(self) -> Passing:
         """Return the plan that passes, with its proof. Raises Infeasible where there is none."""
         plain, scores = self._plain()
-        self._narrower = self._problem = self.task.problem
-        steps, done = 0, plain
-        if not self.task.is_likely_proof(plain.share):
-            self._narrower = with_narrower_gates(self.task.problem, self.task.vehicle, scores)
-            self._problem = self._narrower
-            steps, done = self._steadied() or self._smallest()
+        passes, problem = self.task.is_likely_proof(plain.share), self.task.problem
+        self._narrower = problem if passes else with_narrower_gates(problem, self.task.vehicle, scores)
+        self._problem = self._narrower
+        steps, done = (0, plain) if passes else self._steadied() or self._smallest()
         for attempt in range(PROOFS):
             fresh = self._fresh(attempt)
             share = self.task.share(done.plan, fresh)
@@ -132,7 +130,10 @@ class Tightening:
         thrust in gates that flights pass off their attitude. The added thrust stays if more flights pass with
         it. Where no remaining variant has a plan, all are tried again, without the added thrust.
         """
-        tried = self._tried(steps, self._variants) or self._tried_again(steps)
+        tried = self._tried(steps, self._variants)
+        if not tried:
+            self._problem = self._narrower
+            tried = self._tried(steps, VARIANTS)
         if not tried:
             return None
         if self.task.is_likely_proof(tried[-1].round.share):
@@ -141,10 +142,6 @@ class Tightening:
         tried.sort(key=lambda each: _fraction(each.round), reverse=True)
         self._variants = tuple(each.variant for each in tried[:KEPT_VARIANTS])
         return self._with_more_thrust(steps, tried[0])
-
-    def _tried_again(self, steps: int) -> list[_Flown]:
-        self._problem = self._narrower
-        return self._tried(steps, VARIANTS)
 
     def _tried(self, steps: int, variants: Sequence[Variant]) -> list[_Flown]:
         """Return the plans of variants that are not much longer than the others, up to a sufficient one."""
