@@ -13,11 +13,10 @@ from aerobat.errors import Infeasible
 from aerobat.planning import FreeKnots, MinSnap, Miqp, Planner, TimeOptimal, plan
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.miqp import rescue
-from aerobat.planning.recorder import Recorder
+from aerobat.planning.result import FLYING_RESERVE
 from aerobat.problem import GatePassage, Limits, Line, load_problem, tilted_gate
 from aerobat.studies.feasibility import min_requirements
 from aerobat.vehicle import Vehicle, load_vehicle
-from places import CASES
 
 QUAD = load_vehicle("agile-quad")
 LINE = replace(load_problem("line"), gates=(tilted_gate((5.0, 0.0, 0.0)),))
@@ -139,11 +138,10 @@ def test_a_stage_that_asks_more_tilt_than_the_limit_allows_is_refused_as_proven(
 
 
 @pytest.mark.slow
-def test_a_reserve_is_kept_by_free_knots_before_it_is_given_up() -> None:
-    """In drag that slows a dive, from a plan that keeps none."""
-    draggy = load_vehicle(str(CASES / "draggy-vehicle.toml"))
-    plain = plan("split-s", Miqp(), draggy)
-    assert not plain.keeps(0.15)
-    found = rescue.Rescue(Miqp(reserve=0.15), plain.problem, draggy, Recorder(None))._with_reserve(plain)
-    assert found.keeps(0.15)
-    assert "planned by free-knots" in found.rescue
+def test_half_of_a_reserve_is_kept_before_it_is_given_up() -> None:
+    """A weak vehicle's barrel roll was planned without any, and none of its flights under `lab` succeeded."""
+    weak = load_vehicle("x500")
+    found = plan("barrel-roll", None, weak)
+    assert "planned with half of the reserve" in found.rescue
+    assert found.keeps(0.5 * FLYING_RESERVE)
+    assert not found.keeps(FLYING_RESERVE)

@@ -22,7 +22,6 @@ from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
-from aerobat.planning.miqp.rescue import with_more_intervals
 from aerobat.planning.polynomial.starts import SLOWER_PACES, closed_forms, starts
 from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
@@ -131,9 +130,9 @@ class MultiStart:
         task, guess = self._task, replace(self.guess, reserve=0.0)
         if best.path.duration < SUSPICIOUS * least_duration(task.problem, task.vehicle):
             return best
-        more = with_more_intervals(guess, task.problem, task.vehicle)
+        more = guess.with_more_intervals(task.problem, task.vehicle)
         with within_time(RAISING_TIME, processor):
-            for planner in chain([guess], (planner for planner, _ in more)):
+            for planner in chain([guess], more):
                 with suppress(Infeasible):
                     start = WarmStart.of(planner.plan(task.problem, task.vehicle), task.stages)
                     found = self._finished(self.refinement, self._at_reserve(start), best)
@@ -218,8 +217,7 @@ class MultiStart:
     def _of_more(self, guess: Miqp) -> Iterator[_Start]:
         """Yield starts from mixed-integer plans with more intervals; none for closed courses."""
         task = self._task
-        planners = () if task.stages.closed else with_more_intervals(guess, task.problem, task.vehicle)
-        for planner, _ in planners:
+        for planner in () if task.stages.closed else guess.with_more_intervals(task.problem, task.vehicle):
             try:
                 with within_time(MORE_TIME, processor):
                     plan = planner.plan(task.problem, task.vehicle)

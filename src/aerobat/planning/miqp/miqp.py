@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from math import sqrt
@@ -20,7 +21,7 @@ from aerobat.planning.certified_solve import Judged
 from aerobat.planning.miqp.attempts import COURSE_SCAN_NODES, Attempts, Placement, default_order
 from aerobat.planning.miqp.diagnosis import leg_without_room, why_infeasible
 from aerobat.planning.miqp.formulation import Formulation
-from aerobat.planning.miqp.integrator import IntegratorChain, Intervals, Order
+from aerobat.planning.miqp.integrator import MAX_INTERVALS, IntegratorChain, Intervals, Order
 from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.miqp.shortest import shortest
 from aerobat.planning.planners import KeptClearance, Planner, Reserve, clearance_option, option, planner
@@ -37,6 +38,9 @@ from aerobat.problem.stage import StageSequence
 from aerobat.vehicle import Vehicle
 
 INTERVALS = 20  # the paper's
+MORE_INTERVALS = (1.3, 2.0)  # factors on the number of intervals where that number leads to no plan
+MIN_STAGE_INTERVALS = 2  # least intervals a stage: with fewer, the path of a course has no freedom
+MANY_INTERVALS = 40  # tried too if larger: a narrow window near an end needs intervals on both its sides
 
 
 @planner("miqp")
@@ -109,6 +113,16 @@ class Miqp(Planner):
     def intervals_for(self, stages: StageSequence) -> int:
         """Return the number N of intervals for these stages."""
         return stages.intervals_from(INTERVALS) if self.intervals is None else self.intervals
+
+    def with_more_intervals(self, problem: Problem, vehicle: Vehicle) -> Iterator[Miqp]:
+        """Yield this planner with more intervals and without fallbacks, fewest intervals first."""
+        sequence = problem.stages(vehicle.max_specific_thrust)
+        first, least = self.intervals_for(sequence), MIN_STAGE_INTERVALS * len(sequence.stages)
+        more = {sequence.intervals_from(max(round(factor * first), least)) for factor in MORE_INTERVALS}
+        if max(more) * MORE_INTERVALS[0] < MANY_INTERVALS:
+            more.add(sequence.intervals_from(MANY_INTERVALS))
+        for intervals in sorted(n for n in more if n <= MAX_INTERVALS):
+            yield replace(self, intervals=intervals, rescue=False)
 
     def _planned(self, problem: Problem, vehicle: Vehicle | None, recorder: Recorder) -> Plan:
         order = default_order(problem, vehicle) if self.order is None else self.order

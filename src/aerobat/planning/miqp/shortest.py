@@ -10,13 +10,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
 
-from aerobat.errors import Infeasible
 from aerobat.optimization.deadline import out_of_time
-from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.certified_solve import Judged
-from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.attempts import Attempts, Placement
-from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.refinement.refine import RefinedPath, Refinement
 from aerobat.planning.refinement.violation import ConstraintViolation
 from aerobat.planning.warm_start import WarmStart
@@ -67,8 +63,7 @@ def shortest(
         if judged.feasible:
             found = _shortened(judged, scan, segments)
             break
-    found = found or _from_flown(scan, starts, segments)
-    return _from_closed_form(found, scan, segments) or scan.certified()
+    return found or _from_flown(scan, starts, segments) or scan.certified()
 
 
 def _from_flown(
@@ -79,22 +74,7 @@ def _from_flown(
         pass
     if scan.flown is None or out_of_time():
         return None
-    return _shorter(scan, scan.attempts.path(scan.flown), segments, None)
-
-
-def _from_closed_form(
-    known: Judged[RefinedPath] | None, scan: _Scan, segments: int
-) -> Judged[RefinedPath] | None:
-    """Return the known path, or a shorter one from min-snap's closed form where it is slow or missing."""
-    task = scan.refinement.task
-    is_slow = known is None or known.solution.duration > SUSPICIOUS * scan.least
-    if not (is_slow and task.problem.maneuver.through_points) or is_course(task.stages) or out_of_time():
-        return known
-    try:
-        start = WarmStart.of(MinSnap().plan(task.problem, task.vehicle), task.stages)
-    except Infeasible:
-        return known
-    return _shorter(scan, start, segments, known) or known
+    return _shorter(scan, scan.attempts.path(scan.flown), segments)
 
 
 def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judged[RefinedPath]:
@@ -115,7 +95,7 @@ def _shortened(judged: Judged[RefinedPath], scan: _Scan, segments: int) -> Judge
 
 
 def _shorter(
-    scan: _Scan, start: WarmStart, segments: int, known: Judged[RefinedPath] | None
+    scan: _Scan, start: WarmStart, segments: int, known: Judged[RefinedPath] | None = None
 ) -> Judged[RefinedPath] | None:
     """Return the certified path refined from a start if it is shorter than a known one, else None."""
     refinement, longest = scan.refinement, inf if known is None else known.solution.duration

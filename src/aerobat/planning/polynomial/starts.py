@@ -10,7 +10,6 @@ from aerobat.errors import Infeasible
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
-from aerobat.planning.miqp.rescue import with_more_intervals
 from aerobat.planning.planners import Planner
 from aerobat.planning.polynomial.flying_lap import flying_lap
 from aerobat.planning.polynomial.knots import start_along_normals
@@ -65,7 +64,7 @@ def _without_rotors(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, Warm
     except Infeasible as infeasible:
         refusal = infeasible
     found = False
-    for finer, _ in with_more_intervals(guess, problem, task.vehicle):
+    for finer in guess.with_more_intervals(problem, task.vehicle):
         with suppress(Infeasible):
             yield None, WarmStart.of(finer.plan(problem), task.stages)
             found = True
