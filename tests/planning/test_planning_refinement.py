@@ -13,7 +13,6 @@ from aerobat.optimization import solver
 from aerobat.planning import GridSearch, Miqp, Plan, plan, planner_class
 from aerobat.planning.evidence import Evidence
 from aerobat.planning.miqp.miqp import formulate
-from aerobat.planning.miqp.rescue import with_more_intervals
 from aerobat.planning.miqp.shortest import COARSE_GROWTH
 from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE
 from aerobat.planning.task import Task
@@ -21,6 +20,7 @@ from aerobat.planning.turns import extra_turns
 from aerobat.problem import (
     Condition,
     CustomManeuver,
+    Limits,
     Problem,
     Quantity,
     Stage,
@@ -212,8 +212,16 @@ def test_what_more_intervals_lead_to_is_a_start_of_every_planner(name: str, quad
 def test_no_more_intervals_are_tried_than_may_be_asked_for(
     asked: int, more: list[int], quad: Vehicle
 ) -> None:
-    others = with_more_intervals(Miqp(intervals=asked), load_problem("flip-roll"), quad)
-    assert [planner.intervals for planner, _ in others if isinstance(planner, Miqp)] == more
+    others = Miqp(intervals=asked).with_more_intervals(load_problem("flip-roll"), quad)
+    assert [planner.intervals for planner in others] == more
+
+
+def test_a_limit_on_the_jerk_is_met_at_the_ends_where_the_thrust_may_jump(quad: Vehicle) -> None:
+    """Limits were not tightened near the ends, as if these fixed the jerk; no refined path was certified."""
+    line = replace(load_problem("line"), limits=Limits(jerk=40.0))
+    found = plan(line, Miqp(rescue=False), quad)
+    assert found.certified
+    assert found.duration < 2.1  # 2.68 s once, by the program's own path
 
 
 def test_a_stage_that_excludes_itself_is_named(quad: Vehicle) -> None:

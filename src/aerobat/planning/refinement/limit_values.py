@@ -79,14 +79,17 @@ class LimitValues:
         )
 
     @cached_property
-    def of_path(self) -> Mask:
-        """The mask of the limits' constraints that are linear in the path's derivatives, (c,)."""
-        return self.at_ends & (np.arange(len(self.sides)) < len(self._held))
-
-    @cached_property
     def at_ends(self) -> Mask:
-        """The mask of the constraints that the fixed derivatives decide at the path's ends, (c,)."""
-        return np.array([limit.quantity.is_of_path for limit, _ in self.sides], dtype=bool)
+        """The masks of the constraints that the fixed derivatives decide at start and goal, (2, c).
+
+        The jerk is not fixed there, so limits on it are not decided. A closed course has no ends.
+        """
+        quantities = [limit.quantity for limit, _ in self.sides]
+        fixed = [state.asked.tolist() for state in self.task.problem.ends.values()]
+        masks = [
+            [each.is_of_path and {*each.derivatives} <= {*known} for each in quantities] for known in fixed
+        ]
+        return np.array(masks or np.zeros((2, len(quantities))), dtype=bool)
 
     @cached_property
     def reserve(self) -> Array:
@@ -188,7 +191,7 @@ class LimitValues:
     @cached_property
     def linear(self) -> Mask:
         """The mask, without clearances, of the constraints that are linear in the path's derivatives."""
-        return self.of_path[: len(self._held)]
+        return np.array([limit.quantity.is_of_path for limit, _ in self._held], dtype=bool)
 
     @cached_property
     def path(self) -> Array:

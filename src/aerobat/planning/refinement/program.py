@@ -98,7 +98,8 @@ class RefinementProgram:
         Constraints that the fixed ends decide are left out there. Planes count only near obstacles.
         """
         enforced = np.ones((*self.fractions.shape, len(self.limits.sides)), dtype=bool)
-        enforced[0, 0, self.limits.at_ends] = enforced[-1, -1, self.limits.at_ends] = self._is_closed
+        at_start, at_goal = self.limits.at_ends
+        enforced[0, 0, at_start] = enforced[-1, -1, at_goal] = False
         planes = self.near.planes
         if planes is not None:
             near = np.isfinite(planes.offsets).reshape(*enforced.shape[:2], -1)
@@ -107,15 +108,15 @@ class RefinementProgram:
 
     @cached_property
     def weights(self) -> Array:
-        """Factor on every constraint, (S, p, c): larger on constraints of the path close to the fixed ends.
+        """Factor on every constraint, (S, p, c): larger close to the ends on limits that these decide.
 
         So the back-off relative to these limits vanishes at the ends, which may lie on limits of the path.
         """
-        weights = np.where(self.enforced, 1.0, 0.0)
-        ends = () if self._is_closed else ((0, self.fractions[0]), (-1, 1.0 - self.fractions[-1]))
-        for segment, inward in ends:
+        weights, held = np.where(self.enforced, 1.0, 0.0), len(self.limits.linear)
+        ends = (0, self.fractions[0]), (-1, 1.0 - self.fractions[-1])
+        for decided, (segment, inward) in zip(self.limits.at_ends[:, :held], ends, strict=True):
             faded = np.maximum(np.minimum(inward / FADED, 1.0) ** FADING, LEAST_FADED)
-            weights[segment, :, self.limits.of_path] /= faded
+            weights[segment, :, np.flatnonzero(decided)] /= faded
         return weights
 
     @cached_property

@@ -44,8 +44,8 @@ class ConstraintViolation:
         values = limits.values(derivatives, limits.frames(times.ravel(), derivatives))
         values += limits.reserve
         values = values.reshape(trajectory.segments, places, -1)
-        if not limits.task.stages.closed:
-            values[0, 0, limits.at_ends] = values[-1, -1, limits.at_ends] = -1.0
+        at_start, at_goal = limits.at_ends
+        values[0, 0, at_start] = values[-1, -1, at_goal] = -1.0
         segment, place, side = np.unravel_index(int(np.argmax(values)), values.shape)
         inside = np.flatnonzero((fractions > INWARD) & (fractions < 1.0 - INWARD))
         peaks = fractions[inside[np.argmax(values[:, inside].max(axis=2), axis=1)]]
