@@ -1,5 +1,7 @@
 """The closed-form planner: the paper's Section V-D as printed, and what it does on other problems."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,8 @@ from aerobat.problem import (
     tilted_gate,
 )
 from aerobat.states import STANDARD_GRAVITY
+from aerobat.trajectory import Trajectory
+from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.vehicle import load_vehicle
 from shared_plans import closed_form
 
@@ -125,3 +129,25 @@ def test_a_gate_is_passed_as_fast_as_its_passage_asks() -> None:
     passing = found.trajectory.evaluate(found.stages[0].time, 1)
     assert passing @ gate.normal >= GatePassage().speed - 1e-6
     assert found.certified
+
+
+def test_the_drag_at_waypoints_that_fix_positions_alone_costs_no_closed_form(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Three for each waypoint and attempt made three hundred waypoints take minutes."""
+    solved: list[int] = []
+
+    def counted(fixed: Any, *settings: Any) -> Trajectory:
+        solved.append(len(fixed))
+        return minimum_effort(fixed, *settings)
+
+    monkeypatch.setattr("aerobat.planning.polynomial.min_snap.minimum_effort", counted)
+    waypoints = tuple(Waypoint(position=(2.0 * k, (-1.0) ** k, 1.5)) for k in range(1, 6))
+    problem = Problem(
+        name="row",
+        start=at_rest((0.0, 0.0, 1.5)),
+        goal=at_rest((12.0, 0.0, 1.5)),
+        maneuver=Waypoints(waypoints),
+    )
+    found = plan(problem, MinSnap(), load_vehicle("agilicious"))
+    assert solved == [7] * len(found.attempts)

@@ -60,6 +60,17 @@ def fixed_at_knots(task: Task, order: int, velocities: Array) -> Array:
     return fixed
 
 
+def stages_with_drag(task: Task) -> list[int]:
+    """Return the numbers of the stages whose fixed derivatives may depend on velocities through the drag."""
+    if task.balance.drag == 0.0:
+        return []
+    return [
+        number
+        for number, stage in enumerate(task.stages.stages)
+        if stage.attitude is not None or any(c.quantity is not Quantity.POSITION for c in stage.conditions)
+    ]
+
+
 def first_times(problem: Problem, fixed: Array, max_specific_thrust: float) -> Array:
     """Return initial durations between knots [s], (K - 1,): the problem's own, or a guess from distances."""
     if problem.maneuver.first_times is not None:

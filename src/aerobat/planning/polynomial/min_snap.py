@@ -19,6 +19,7 @@ from aerobat.planning.planners import Planner, option, planner
 from aerobat.planning.polynomial.knots import (
     first_times,
     fixed_at_knots,
+    stages_with_drag,
     violated_stage,
     without_speed_bounds,
 )
@@ -203,7 +204,8 @@ class _Planning:
         """Return the closed form through stages with drag consistent with its own velocities there.
 
         Velocities at the stages are an affine function v ↦ M v + c of the velocities used for drag. M is
-        found column by column, then v = M v + c is solved.
+        found column by column, then v = M v + c is solved. Columns of stages that fix only positions are
+        zero: their closed form does not depend on the drag.
         """
         stages, heading = len(task.stages.stages), task.problem.heading.start
 
@@ -212,13 +214,13 @@ class _Planning:
             return minimum_effort(fixed, durations, self.config.rule, heading)
 
         trajectory = with_drag_of(np.zeros((stages, 3)))
-        if task.balance.drag == 0.0 or not stages:
+        columns = [3 * k + axis for k in stages_with_drag(task) for axis in range(3)]
+        if not columns:
             return trajectory
-        there = trajectory.knots[1:-1]
+        there, one = trajectory.knots[1:-1], np.eye(3 * stages)
         constant = trajectory.evaluate(there, 1).ravel()
-        columns = [
-            with_drag_of(unit.reshape(stages, 3)).evaluate(there, 1).ravel() - constant
-            for unit in np.eye(3 * stages)
-        ]
-        own = np.linalg.solve(np.eye(3 * stages) - np.array(columns).T, constant)
-        return with_drag_of(np.asarray(own).reshape(stages, 3))
+        own = np.zeros_like(one)
+        for column in columns:
+            unit = one[column].reshape(stages, 3)
+            own[:, column] = with_drag_of(unit).evaluate(there, 1).ravel() - constant
+        return with_drag_of(np.asarray(np.linalg.solve(one - own, constant)).reshape(stages, 3))
