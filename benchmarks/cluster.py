@@ -1,9 +1,10 @@
 """Flights on a cluster: the same bits as in one process, and the processor time that sharing them takes.
 
 Starts a Dask scheduler and three worker processes on this machine, and flies half-flip under `lab` in this
-process, in three processes, and on the cluster, where one worker is killed in mid-run the second time. The
-floor is an overhead of 5 % of the processor's time at 10^5 flights, of the cluster over as many processes of
-this machine: those share its cores and caches as the workers do. Each kind flies a little first, so that
+process, in three forks of it, in three processes that share no memory with it, and on the cluster, where one
+worker is killed in mid-run the second time. The floor is an overhead of 5 % of the processor's time at 10^5
+flights, of the cluster over as many processes of this machine: those share its cores and caches as the
+workers do. Each kind flies a little first, so that
 imports and compilations are not counted; of several rounds, the least time of each kind counts. What the
 idle cluster takes (its heartbeats) is measured first, and taken off. Linux only: processor times are read
 from /proc.
@@ -13,11 +14,13 @@ Usage: python benchmarks/cluster.py [runs] [rounds]
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -36,12 +39,18 @@ def main() -> None:
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 3
     plan = ab.plan("half-flip", vehicle="agile-quad")
     options = {"threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
-    with distributed.LocalCluster(n_workers=WORKERS, **options) as cluster:
+    apart = ProcessPoolExecutor(WORKERS, multiprocessing.get_context("spawn"))
+    with apart, distributed.LocalCluster(n_workers=WORKERS, **options) as cluster:
         address = cluster.scheduler_address.replace("tcp://", "dask://")
-        alike = f"{WORKERS} processes"
-        kinds = {"one process": 1, alike: WORKERS, f"{WORKERS} Dask workers": address}
+        alike = f"{WORKERS} forks"
+        kinds: dict[str, dict[str, Any]] = {
+            "one process": {"workers": 1},
+            alike: {"workers": WORKERS},
+            f"{WORKERS} processes that share no memory": {"executor": apart},
+            f"{WORKERS} Dask workers": {"workers": address},
+        }
         for at_work in kinds.values():
-            ab.sweep(plan, "lab", 2000, workers=at_work)
+            ab.sweep(plan, "lab", 4000, **at_work)
         began = processor_time()
         time.sleep(IDLE)
         idle = (processor_time() - began) / IDLE
@@ -50,10 +59,10 @@ def main() -> None:
         for number in range(rounds):  # in turns: other work on this machine slows all of them down alike
             found = []
             for kind, at_work in kinds.items():
-                swept, took = timed(plan, runs, number, idle, workers=at_work)
+                swept, took = timed(plan, runs, number, idle, **at_work)
                 spent[kind].append(took)
                 found.append(swept)
-            assert found[0] == found[1] == found[2], "other bits"
+            assert all(swept == found[0] for swept in found), "other bits"
         for kind, took in spent.items():
             report(kind, runs, took, spent[alike])
         with killing(next(iter(cluster.workers.values())).pid) as progress:

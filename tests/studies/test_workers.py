@@ -238,3 +238,23 @@ def test_without_dask_the_command_is_named_that_installs_it(monkeypatch: pytest.
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(BackendMissing, match=r'pip install "aerobat\[cluster\]"'):
         ab.sweep(hop(), SPREAD, 1, workers="dask://127.0.0.1:9")
+
+
+def test_what_parts_share_is_packed_once_for_all_of_them() -> None:
+    packed: list[int] = []
+    shared = workers._Shared(_Counted(packed))
+    for _ in range(3):
+        pickle.dumps(shared)
+        assert shared.__dask_tokenize__() == shared.__reduce__()[1]
+    assert len(packed) == 1
+
+
+class _Counted:
+    """A task that counts how often it is packed."""
+
+    def __init__(self, packed: list[int]) -> None:
+        self.packed = packed
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        self.packed.append(1)
+        return list, ()

@@ -232,14 +232,18 @@ class _Shared:
     task: Any
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _unpacked, (self._packed, imported_plugins(), _versions())
+        return _unpacked, self._packed
+
+    def __dask_tokenize__(self) -> Any:  # Dask would walk through the whole task for each group of parts
+        return self._packed
 
     @cached_property
-    def _packed(self) -> bytes:
+    def _packed(self) -> tuple[bytes, tuple[str, ...], tuple[tuple[str, str], ...]]:
+        """The arguments of `_unpacked`."""
         packed = pickle.dumps(self.task)
         if b"__main__" in packed and "cloudpickle" in sys.modules:  # other machines do not have that script
             packed = sys.modules["cloudpickle"].dumps(self.task)
-        return packed
+        return packed, imported_plugins(), _versions()
 
 
 @lru_cache(maxsize=1)
