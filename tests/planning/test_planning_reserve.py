@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,8 +13,11 @@ from aerobat.limits.limit import effective_reserve
 from aerobat.planning import FreeKnots, Miqp, Planner, TimeOptimal
 from aerobat.planning.miqp.rescue import Rescue
 from aerobat.planning.recorder import Recorder
+from aerobat.planning.result import FLYING_RESERVE
 from aerobat.planning.rotor_margin import reserve_shortfalls, rotor_findings
+from aerobat.planning.task import Task
 from aerobat.problem import load_problem
+from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import load_vehicle
 
 
@@ -100,3 +104,17 @@ def test_of_a_small_room_a_reserve_keeps_a_part_that_grows_and_never_all() -> No
     assert parts == sorted(parts)
     assert parts[0] == 0.0
     assert parts[-1] < 0.15
+
+
+@pytest.mark.parametrize("idle", [0.0, 0.02, 0.3, 0.5, 0.75, 0.95])
+def test_a_reserve_leaves_rotors_the_room_to_hover_whatever_their_idle_thrust(idle: float) -> None:
+    """With 75 %, the default reserve reached beyond hover thrust, so that no plan kept it."""
+    vehicle = load_vehicle("agile-quad")
+    hover = vehicle.mass * STANDARD_GRAVITY / len(vehicle.rotors)
+    rotors = tuple(replace(rotor, min_thrust=idle * hover) for rotor in vehicle.rotors)
+    task = Task.of(load_problem("line"), replace(vehicle, rotors=rotors))
+    for limit in task.limits:
+        if limit.rotor is not None:
+            lower, upper = limit.reserves(FLYING_RESERVE)
+            assert idle * hover + lower * limit.size < hover
+            assert upper == FLYING_RESERVE
