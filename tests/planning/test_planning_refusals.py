@@ -137,6 +137,13 @@ def test_a_stage_that_asks_more_tilt_than_the_limit_allows_is_refused_as_proven(
     assert contradiction(replace(steep, limits=Limits(max_tilt=radians(89.7))), QUAD) is None
 
 
+def test_a_refused_tilt_names_the_attitude_and_what_frees_it() -> None:
+    found = contradiction(replace(load_problem("half-flip"), limits=Limits(max_tilt=radians(88.93))), QUAD)
+    assert found is not None
+    assert "asks 90° of tilt, at least 89.5° within its tolerance" in found.sentence
+    assert found.sentence.endswith("set limits.max_tilt to 90° or more, or ask 88.9° at most")
+
+
 @pytest.mark.slow
 def test_half_of_a_reserve_is_kept_before_it_is_given_up() -> None:
     """A weak vehicle's barrel roll was planned without any, and none of its flights under `lab` succeeded."""

@@ -7,6 +7,7 @@ contradiction may still have no plan.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from aerobat.flatness import force_balance
 from aerobat.limits.box import FIELDS, field_with_value
 from aerobat.optimization import AssignmentProgram, solver
-from aerobat.problem.condition import Condition, LinearBound, Quantity
+from aerobat.problem.condition import Attitude, Condition, LinearBound, Quantity
 from aerobat.problem.limits import Limits
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
@@ -45,22 +46,29 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
         bounds = [c.bound(balance) for c in _linear(stage)]
         if bounds and not is_possible(bounds, problem.path_limits):
             return _contradiction(stage, bounds, problem.path_limits)
-        tilt, most = _least_tilt(stage), problem.limits.max_tilt
-        if tilt > most + ROUNDING:
-            sentence = (
-                f"the stage '{stage.name}' asks {np.degrees(tilt):.3g}° of tilt at least, more than "
-                f"limits.max_tilt ({np.degrees(most):.3g}°) allows at whatever time; ask less or widen that"
-            )
-            return Contradiction(stage.name, ("limits.max_tilt",), sentence)
+        if stage.attitude is not None:
+            tilt, tolerance = _tilt(stage.attitude), stage.attitude.tolerance
+            if tilt - tolerance > problem.limits.max_tilt + ROUNDING:
+                sentence = _tilt_sentence(stage.name, tilt, tolerance, problem.limits.max_tilt)
+                return Contradiction(stage.name, ("limits.max_tilt",), sentence)
     return None
 
 
-def _least_tilt(stage: Stage) -> float:
-    """Return the least tilt that a stage's attitude allows [rad]."""
-    attitude = stage.attitude
-    if attitude is None:
-        return 0.0
-    return float(np.arccos(np.clip(attitude.up[2], -1.0, 1.0))) - attitude.tolerance
+def _tilt(attitude: Attitude) -> float:
+    """Return the tilt of an attitude without its tolerance [rad]."""
+    return float(np.arccos(np.clip(attitude.up[2], -1.0, 1.0)))
+
+
+def _tilt_sentence(stage: str, tilt: float, tolerance: float, most: float) -> str:
+    """Return the sentence about a stage whose tilt, less its tolerance, exceeds the largest tilt [rad]."""
+    asked, spared, limit = np.degrees((tilt, tolerance, most)).tolist()
+    within = f", at least {asked - spared:.3g}° within its tolerance," if spared > 0.0 else ","
+    # a limit at the edge of the tolerance leaves a plan no room: both remedies leave the whole of it
+    remedy = f"set limits.max_tilt to {math.ceil(10.0 * asked - ROUNDING) / 10.0:g}° or more"
+    return (
+        f"the stage '{stage}' asks {asked:.3g}° of tilt{within} more than limits.max_tilt ({limit:.3g}°) "
+        f"allows at whatever time; {remedy}, or ask {math.floor(10.0 * limit + ROUNDING) / 10.0:g}° at most"
+    )
 
 
 def _linear(stage: Stage) -> list[Condition]:
