@@ -53,6 +53,7 @@ class KnotData(NamedTuple):
     fixed: Array  # the part T^m fixed_m of Z, which the ends fix
     ratios: Array  # τ, (S,)
     durations: Array  # [s], (S,)
+    origin: Array  # [m] of the positions in Z, world, (3,)
 
     def scaled(self, places: Array) -> Array:
         """Return T^-k B, (S, 6 p, 10), for places from `basis`, (S, p, 6, 10) or (p, 6, 10)."""
@@ -61,8 +62,13 @@ class KnotData(NamedTuple):
 
     def derivatives(self, places: Array) -> Array:
         """Return the derivatives of position at places, (S, p, 6, 3)."""
-        found = self.scaled(places) @ self.values
-        return np.asarray(found.reshape(len(found), -1, DERIVATIVES, 3))
+        return self.motion_of(self.scaled(places))
+
+    def motion_of(self, scaled: Array) -> Array:
+        """Return the derivatives of position, (S, p, 6, 3), for `scaled` places."""
+        found = (scaled @ self.values).reshape(len(scaled), -1, DERIVATIVES, 3)
+        found[:, :, 0] += self.origin
+        return np.asarray(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,6 +191,7 @@ class Spline:
         """Return the path that variables (n,) give."""
         data = self.data(x)
         coefficients = TO_COEFFICIENTS @ data.values
+        coefficients[:, 0] += self._origin
         return Trajectory(data.durations, coefficients, self.task.problem.heading.start)
 
     def data(self, x: Array) -> KnotData:
@@ -194,12 +201,14 @@ class Spline:
         durations = ratios * np.exp(local[:, -1])
         fixed = (durations[:, None] ** ORDERS)[..., None] * self._fixed_data
         moved = (self._arranged[1] @ local[:, None, :-2, None])[..., 0]
-        return KnotData((ratios[:, None] ** ORDERS)[..., None] * moved + fixed, fixed, ratios, durations)
+        return KnotData(
+            (ratios[:, None] ** ORDERS)[..., None] * moved + fixed, fixed, ratios, durations, self._origin
+        )
 
     def motion(self, data: KnotData, places: Array) -> Motion:
         """Return the derivatives at places, as `KnotData.derivatives` does, with their Jacobian."""
         segments, scaled = self.segments, data.scaled(places)
-        derivatives = (scaled @ data.values).reshape(segments, -1, DERIVATIVES, 3)
+        derivatives = data.motion_of(scaled)
         effect = (data.ratios[:, None] ** ORDERS)[..., None, None] * self._arranged[1]
         by_durations = np.stack([ORDERS[:, None] * each for each in (data.values, data.fixed)], axis=-1)
         moved = np.concatenate([effect, by_durations], axis=-1)
@@ -240,6 +249,14 @@ class Spline:
         return np.array([length * perm(DEGREE, k) for k in range(END_ORDER)])
 
     @cached_property
+    def _origin(self) -> Array:
+        """The whole kilometres [m] nearest to the start of the path, (3,).
+
+        High derivatives are differences of positions: in coordinates of UTM they would be lost in rounding.
+        """
+        return np.asarray(np.round(self.initial.evaluate(0.0), -3))
+
+    @cached_property
     def _ends(self) -> Array:
         """The derivatives of the path at the start, at both ends of all segments, (S, 10, 3).
 
@@ -249,6 +266,7 @@ class Spline:
         for before, after, shared in self._joints:
             met = (ends[after, 0, :shared] + ends[before, 1, :shared]) / 2.0
             ends[after, 0, :shared] = ends[before, 1, :shared] = met
+        ends[:, :, 0] -= self._origin
         return np.asarray(ends.reshape(self.segments, 2 * END_ORDER, 3))
 
     @property
@@ -268,7 +286,7 @@ class Spline:
         drag = lateral_drag(self.task.vehicle)
         for segment, first, state in self._end_states:
             for order in state.asked:
-                fixed[segment, first + order] = state.derivatives(JERK)[order]
+                fixed[segment, first + order] = state.derivatives(JERK)[order] - (order == 0) * self._origin
             if state.leaves_attitude_free:
                 continue
             along = self._thrust_direction(state)
