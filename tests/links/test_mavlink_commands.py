@@ -205,6 +205,18 @@ def test_bad_input_ends_in_a_sentence_and_flies_nothing(
     assert words in err
 
 
+def test_an_interrupt_while_a_flight_is_prepared_ends_as_any_other(plan: Path, monkeypatch, capsys) -> None:
+    """Nothing was sent by then, and there is nothing to report."""
+
+    def interrupted(*arguments: object, **settings: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("aerobat.links.mavlink.client.Client", interrupted)
+    code, out, err = run(capsys, "link", "mavlink", str(plan), "--connect", f"udp:127.0.0.1:{free_port()}")
+    assert code == 130, err
+    assert not out
+
+
 def test_a_port_that_is_taken_is_told(capsys) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as taken:
         taken.bind(("127.0.0.1", 0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,7 +50,7 @@ def mavlink(plan: Path, options: MavlinkOptions = MavlinkOptions()) -> ExitCode:
     offset = _origin(found) if options.origin is None else np.array(options.origin)
     require_flyable(found, offset, options.vehicle)
     connection = connect(options.connect, listen=False, system=SYSTEM, component=COMPONENT, baud=options.baud)
-    try:
+    with closing(connection):
         client = Client(
             found,
             connection,
@@ -61,14 +62,13 @@ def mavlink(plan: Path, options: MavlinkOptions = MavlinkOptions()) -> ExitCode:
             say=say,
             announcement=str(recoveries(found, ground=-offset[2])),
         )
-        run(client, WallClock(options.speed))
-    except KeyboardInterrupt:
-        if client.mission.phase is not Phase.READY:
-            _print(client.report(), options.json)
-            raise KeyboardInterrupt(REPORTED) from None
-        raise
-    finally:
-        connection.close()
+        try:
+            run(client, WallClock(options.speed))
+        except KeyboardInterrupt:
+            if client.mission.phase is not Phase.READY:
+                _print(client.report(), options.json)
+                raise KeyboardInterrupt(REPORTED) from None
+            raise
     report = client.report()
     _print(report, options.json)
     return ExitCode.WELL if report.is_success else ExitCode.NOT_WELL
