@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ from aerobat.links.ros.crazyswarm import SERVICES
 from aerobat.links.ros.crazyswarm_server import CrazyswarmServer
 from aerobat.links.routes import rest_to_rest
 from aerobat.links.stream import SetpointStream
+from command_lines import run
+from mavlink_sky import Wire
 from ros_sky import BEGAN, Graph, Ros
 
 MOON = ab.Environment(gravity=1.62)
@@ -89,3 +92,85 @@ def test_an_uploaded_trajectory_leans_by_the_gravity_around_the_vehicle(
     asked /= np.linalg.norm(asked, axis=1, keepdims=True)
     assert asked[:, 2].min() < 0.7  # 45° and more
     np.testing.assert_allclose(leaning, asked, atol=0.01)
+
+
+@pytest.fixture
+def windy_moon(tmp_path: Path) -> Path:
+    """A problem's file, whose environment is neither the Earth's nor calm."""
+    windy = replace(MOON, wind=np.array([0.5, 0.0, 0.0]))
+    ends = ab.at_rest((0.0, 0.0, 1.0)), ab.at_rest((2.0, 0.0, 1.0))
+    path = tmp_path / "windy-moon.toml"
+    ab.write_problem(ab.Problem("windy-moon", *ends, environment=windy), path)
+    return path
+
+
+@pytest.fixture
+def simulated(monkeypatch: pytest.MonkeyPatch) -> list[ab.Environment]:
+    """The environments in which commands simulate a vehicle; no ROS is needed, and no port taken."""
+    found: list[ab.Environment] = []
+    begin = SimulatedVehicle.__init__
+
+    def noted(self: SimulatedVehicle, vehicle: ab.Vehicle, environment: ab.Environment) -> None:
+        begin(self, vehicle, environment)
+        found.append(environment)
+
+    wire = Wire(1, 1)
+    wire.other = Wire(2, 1)
+    monkeypatch.setattr(SimulatedVehicle, "__init__", noted)
+    monkeypatch.setattr("aerobat.links.mavlink.connection.connect", lambda *_, **__: wire)
+    monkeypatch.setattr("aerobat.cli.commands.ros._joined", lambda *_: Ros(Graph(2)))
+    monkeypatch.setattr("aerobat.cli.commands.ros.run", lambda *_: None)
+    return found
+
+
+VEHICLES = pytest.mark.parametrize("command", ["ros-vehicle", "mavlink-vehicle"])
+
+
+@VEHICLES
+@pytest.mark.parametrize("source", ["problem", "plan"])
+def test_a_vehicle_is_simulated_in_the_environment_of_the_problem_or_plan_that_is_named(
+    command: str,
+    source: str,
+    windy_moon: Path,
+    simulated: list[ab.Environment],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    problem, named = ab.load_problem(str(windy_moon)), windy_moon
+    if source == "plan":
+        named = windy_moon.with_suffix(".plan")
+        path = rest_to_rest(problem.start.position, problem.goal.position)
+        ab.Plan(problem=problem, trajectory=path, planner="by hand", status="").save(named)
+    code, _, err = run(capsys, "link", command, "--for", 0.01, "--environment", named)
+    assert code == 0, err
+    assert simulated == [problem.environment]
+
+
+@VEHICLES
+def test_a_vehicle_is_simulated_on_earth_in_still_air_where_no_environment_is_named(
+    command: str, simulated: list[ab.Environment], capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, _, err = run(capsys, "link", command, "--for", 0.01)
+    assert code == 0, err
+    assert simulated == [ab.Environment()]
+
+
+@VEHICLES
+@pytest.mark.parametrize(
+    ("named", "words"), [("flip-rool", "did you mean 'flip-roll'"), ("path.csv", "alone")]
+)
+def test_an_environment_that_is_none_is_refused_in_a_sentence(
+    command: str,
+    named: str,
+    words: str,
+    tmp_path: Path,
+    simulated: list[ab.Environment],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ab.write_csv(rest_to_rest(np.zeros(3), np.ones(3)), "path.csv")
+    code, _, err = run(capsys, "link", command, "--for", 0.01, "--environment", named)
+    assert code == 2
+    assert words in err
+    assert err.count("\n") == 1
+    assert not simulated

@@ -51,6 +51,15 @@ class EndOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SimulatedVehicleOptions(EndOptions):
+    """Options of a simulated vehicle."""
+
+    environment: Annotated[str | None, Parameter(group=trials)] = None
+    """The problem whose gravity and wind the vehicle is simulated in: a name that `aerobat show` lists, a
+    TOML file, a .plan file or a run's folder. Default: the Earth's gravity and still air."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class RosNodeOptions(EndOptions):
     """Options of a ROS node."""
 
@@ -107,7 +116,7 @@ class MavlinkOptions(MissionOptions, RunOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MavlinkVehicleOptions(EndOptions):
+class MavlinkVehicleOptions(SimulatedVehicleOptions):
     """Options of a simulated vehicle for MAVLink clients."""
 
     dialect: Annotated[Literal["px4", "ardupilot"], Parameter(group=linking)] = "px4"
@@ -169,7 +178,7 @@ class RosOptions(MissionOptions, RosNodeOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RosVehicleOptions(RosNodeOptions):
+class RosVehicleOptions(RosNodeOptions, SimulatedVehicleOptions):
     """Options of a simulated vehicle that is a ROS node."""
 
     rate: Annotated[float, Parameter(group=linking, validator=validators.Number(gte=20, lte=250))] = 100.0

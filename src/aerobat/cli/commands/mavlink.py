@@ -12,9 +12,8 @@ from aerobat.arrays import Array
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.interrupts import REPORTED
 from aerobat.cli.link_options import MavlinkOptions, MavlinkVehicleOptions
-from aerobat.cli.runs.saved_plans import named_vehicle, whole_plan
+from aerobat.cli.runs.saved_plans import named_environment, named_vehicle, whole_plan
 from aerobat.cli.terminal import print_json, say
-from aerobat.environment import Environment
 from aerobat.planning import Plan
 from aerobat.reporting.plain_data import plain, to_json
 from aerobat.simulation.autopilot import recoveries
@@ -89,7 +88,7 @@ def mavlink_vehicle(
     vehicle
         A name that `aerobat show` lists, or a vehicle's TOML file.
     """
-    found = named_vehicle(vehicle)
+    found, environment = named_vehicle(vehicle), named_environment(options.environment)
     from aerobat.links.autopilot.vehicle import SimulatedVehicle
     from aerobat.links.clock import WallClock
     from aerobat.links.mavlink.connection import LossyConnection, connect
@@ -97,7 +96,7 @@ def mavlink_vehicle(
     from aerobat.links.mavlink.front_end import SYSTEM, FrontEnd
 
     connection = connect(options.listen, listen=True, system=SYSTEM)
-    simulated = SimulatedVehicle(found, Environment())
+    simulated = SimulatedVehicle(found, environment)
     clock = WallClock(options.speed)
     if options.loss or options.delay:
         connection = LossyConnection(

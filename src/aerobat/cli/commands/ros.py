@@ -10,9 +10,8 @@ from typing import Literal
 
 from aerobat import so3
 from aerobat.cli.link_options import RosOptions, RosVehicleOptions
-from aerobat.cli.runs.saved_plans import named_vehicle
+from aerobat.cli.runs.saved_plans import named_environment, named_vehicle
 from aerobat.cli.terminal import say
-from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.betaflight.board import board_at
@@ -101,11 +100,11 @@ def ros_vehicle(
     vehicle
         A name that `aerobat show` lists, or a vehicle's TOML file.
     """
-    found = named_vehicle(vehicle)
+    found, environment = named_vehicle(vehicle), named_environment(options.environment)
     clock = None if options.speed is None else PacedClock(options.speed)
     middleware = _joined("aerobat_vehicle", options.generation, clock)
     try:
-        simulated, crazyflie = SimulatedVehicle(found, Environment()), _crazyflie(options.goal)
+        simulated, crazyflie = SimulatedVehicle(found, environment), _crazyflie(options.goal)
         topics = {"goal": options.goal, "odometry": options.odometry}
         node = (
             CrazyswarmServer(_ros2(middleware), simulated, crazyflie, rate=options.rate, clock=clock, say=say)

@@ -17,7 +17,7 @@ from aerobat.interchange import read_plan, read_rows
 from aerobat.interchange.read import plan_file
 from aerobat.interchange.robots import SUFFIXES
 from aerobat.planning import Plan
-from aerobat.problem import EndState, Heading, Problem, problem_names
+from aerobat.problem import EndState, Heading, Problem, load_problem, problem_names
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
 
@@ -56,6 +56,16 @@ def whole_plan(path: Path, remedy: str) -> Plan:
     if not isinstance(found, Plan):
         raise SpecError(f"{path} holds a path alone; {remedy}")
     return found
+
+
+def named_environment(name: str | None) -> Environment:
+    """Return the environment of a problem or a saved plan; the standard one where none is named."""
+    if name is None:
+        return Environment()
+    path = plan_source(name)
+    if path is None:
+        return load_problem(name).environment
+    return whole_plan(path, "name a problem or a .plan file, which have an environment").problem.environment
 
 
 def read_source(path: Path, rate: float) -> tuple[Plan | Trajectory, list[str]]:
