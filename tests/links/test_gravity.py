@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,15 @@ from aerobat.links.goals import Observed, PathPiece
 from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.ros.crazyswarm import SERVICES
 from aerobat.links.ros.crazyswarm_server import CrazyswarmServer
+from aerobat.links.ros.maneuver_node import ManeuverNode
 from aerobat.links.routes import rest_to_rest
 from aerobat.links.stream import SetpointStream
 from command_lines import run
 from mavlink_sky import Wire
-from ros_sky import BEGAN, Graph, Ros
+from ros_sky import BEGAN, AtOnce, Graph, Ros
 
 MOON = ab.Environment(gravity=1.62)
+QUAD = ab.load_vehicle("agile-quad")
 NAME = "/cf231"
 
 
@@ -121,6 +124,49 @@ def simulated(monkeypatch: pytest.MonkeyPatch) -> list[ab.Environment]:
     monkeypatch.setattr("aerobat.cli.commands.ros._joined", lambda *_: Ros(Graph(2)))
     monkeypatch.setattr("aerobat.cli.commands.ros.run", lambda *_: None)
     return found
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> list[ManeuverNode]:
+    """The nodes that `aerobat link ros` starts, which end at once and need no ROS and no second process."""
+    found: list[ManeuverNode] = []
+    monkeypatch.setattr("aerobat.cli.commands.ros._joined", lambda *_, **__: Ros(Graph(2)))
+    monkeypatch.setattr("aerobat.cli.commands.ros.processes", lambda *_, **__: nullcontext(AtOnce()))
+    monkeypatch.setattr("aerobat.cli.commands.ros._rehearse", lambda *_: None)
+    monkeypatch.setattr("aerobat.cli.commands.ros.run", lambda node, *_: found.append(node))
+    return found
+
+
+def test_all_maneuvers_of_a_node_and_its_board_have_the_gravity_of_the_problems_that_are_named(
+    windy_moon: Path,
+    started: list[ManeuverNode],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The paper's maneuvers, too, which every node offers."""
+    flown: list[ab.Environment] = []
+    monkeypatch.setattr("aerobat.cli.commands.ros.board_at", lambda *given: flown.append(given[2]))
+    code, _, err = run(capsys, "link", "ros", windy_moon)
+    assert code == 0, err
+    (node,) = started
+    assert {problem.environment.gravity for problem, _ in node._maneuvers.values()} == {MOON.gravity}
+    assert node.commander._gravity == MOON.gravity
+    assert [environment.gravity for environment in flown] == [MOON.gravity]
+
+
+def test_maneuvers_of_different_gravities_are_refused_before_ros_is_joined(
+    windy_moon: Path, started: list[ManeuverNode], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the node, and by its command."""
+    moon, earth = ab.load_problem(str(windy_moon)), ab.load_problem("line")
+    planner = ab.Miqp()
+    with pytest.raises(ab.SpecError, match=r"'line' has 9\.81 m/s² and 'windy-moon' has 1\.62 m/s²"):
+        ManeuverNode(Ros(Graph(2)), QUAD, {"line": (earth, planner), "moon": (moon, planner)}, AtOnce())
+    code, _, err = run(capsys, "link", "ros", "power-loop", windy_moon)
+    assert code == 2
+    assert "a vehicle flies in one gravity" in err
+    assert err.count("\n") == 1
+    assert not started
 
 
 VEHICLES = pytest.mark.parametrize("command", ["ros-vehicle", "mavlink-vehicle"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import Literal
@@ -12,6 +13,7 @@ from aerobat import so3
 from aerobat.cli.link_options import RosOptions, RosVehicleOptions
 from aerobat.cli.runs.saved_plans import named_environment, named_vehicle
 from aerobat.cli.terminal import say
+from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.betaflight.board import board_at
@@ -19,7 +21,7 @@ from aerobat.links.ros.crazyswarm import PREFIX, Crazyflie, Ros2
 from aerobat.links.ros.crazyswarm_server import CrazyswarmServer
 from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings, Tick
 from aerobat.links.ros.middleware import Middleware, PacedClock
-from aerobat.links.ros.preparation import MANEUVERS, ManeuverRequest, prepare
+from aerobat.links.ros.preparation import MANEUVERS, ManeuverRequest, prepare, shared_gravity
 from aerobat.links.ros.run import run
 from aerobat.links.ros.topics import RVIZ
 from aerobat.links.ros.vehicle_node import VehicleNode
@@ -43,7 +45,8 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
     Parameters
     ----------
     problems
-        Names that `aerobat show` lists, or problems' TOML files, to be services too, of their names.
+        Names that `aerobat show` lists, or problems' TOML files, to be services too, of their names. They
+        have one gravity, in which the paper's maneuvers are planned, too.
     """
     vehicle, crazyflie = named_vehicle(options.vehicle), _crazyflie(options.goal)
     if options.onboard and not crazyflie:
@@ -58,12 +61,12 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
         odometry=f"{crazyflie}/odom" if crazyflie else options.odometry,
         mission=options.mission,
     )
-    services = {**MANEUVERS, **{_service(name): name for name in problems}}
-    maneuvers = {}
-    for service, name in services.items():
-        problem = load_problem(name)
-        maneuvers[service] = problem, _planner(problem, vehicle, options)
-    environment = next(iter(maneuvers.values()))[0].environment
+    named = {_service(name): load_problem(name) for name in problems}
+    environment = Environment(gravity=shared_gravity(named.values()))
+    maneuvers = {
+        service: (problem, _planner(problem, vehicle, options))
+        for service, problem in {**_paper_maneuvers(environment.gravity), **named}.items()
+    }
     board = board_at(options.goal, vehicle, environment, 1.0 / options.rate)
     middleware = _joined("aerobat", options.generation, sim_time=options.sim_time)
     take: Callable[[Tick], None] | None = None
@@ -163,6 +166,15 @@ def _ros2(middleware: Middleware) -> Ros2:
     if not isinstance(middleware, RclpyMiddleware):
         raise SpecError("crazyswarm2 is a server of ROS 2; leave --ros 1 out")
     return middleware
+
+
+def _paper_maneuvers(gravity: float) -> dict[str, Problem]:
+    """The problems of the paper's services, under the gravity [m/s²] that the vehicle flies in."""
+    problems = {service: load_problem(name) for service, name in MANEUVERS.items()}
+    return {
+        service: replace(problem, environment=replace(problem.environment, gravity=gravity))
+        for service, problem in problems.items()
+    }
 
 
 def _service(name: str) -> str:

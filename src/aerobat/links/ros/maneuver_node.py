@@ -20,7 +20,7 @@ from aerobat.links.rehearsal import rehearse
 from aerobat.links.report import LinkReport, link_report
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Answer, Middleware
-from aerobat.links.ros.preparation import ManeuverRequest, Prepared, prepare
+from aerobat.links.ros.preparation import ManeuverRequest, Prepared, prepare, shared_gravity
 from aerobat.links.routes import Route
 from aerobat.planning import Planner
 from aerobat.problem import Problem
@@ -80,11 +80,13 @@ class ManeuverNode:
             settings: of the node.
             say: receives sentences about the progress.
             take: flies the vehicle instead of the topic of goals; called at every tick.
+
+        Raises SpecError for maneuvers of different gravities.
         """
         self.origin = ros.time()  # [ns]
         self._ros = ros
         self.settings = settings
-        gravity = next(iter(maneuvers.values()))[0].environment.gravity
+        gravity = shared_gravity(problem for problem, _ in maneuvers.values())
         rehearse(vehicle, gravity)
         self.commander = Commander(vehicle, gravity, 1.0 / settings.rate, say)
         self._vehicle, self._maneuvers, self._executor = vehicle, maneuvers, executor

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.environment import Environment
 from aerobat.errors import AerobatError, Infeasible, SpecError
 from aerobat.interchange.exports.crazyflie import Pieces, fitted_pieces
 from aerobat.links.mission import require_flyable
@@ -49,6 +51,18 @@ class Prepared:
     stream: SetpointStream
     announcement: str
     pieces: Pieces | None = None  # for a Crazyflie that flies them by itself, from the plan's origin
+
+
+def shared_gravity(problems: Iterable[Problem]) -> float:
+    """Return the gravity of problems [m/s²]; without problems, the Earth's.
+
+    Raises SpecError where they differ: routes, hovers and a board's thrusts are computed for one gravity.
+    """
+    names = {problem.environment.gravity: problem.name for problem in problems}
+    if len(names) > 1:
+        found = " and ".join(f"'{name}' has {gravity:g} m/s²" for gravity, name in names.items())
+        raise SpecError(f"a vehicle flies in one gravity, but {found}; name problems of one gravity")
+    return next(iter(names), Environment().gravity)
 
 
 def prepare(request: ManeuverRequest) -> Prepared | str:
