@@ -419,6 +419,16 @@ def test_a_copter_takes_off_by_an_order_and_one_that_does_not_is_told_to_land() 
     assert not sky.vehicle.armed
 
 
+def test_a_copter_whose_take_off_is_given_up_is_told_to_hover_and_reported() -> None:
+    sky = Sky(speaks=ARDUPILOT)
+    sky.run(lambda: sky.client.stage is ClientStage.TAKING_OFF)
+    sky.run_for(0.5)
+    sky.client.abort(sky.clock.now(), "interrupted")
+    sky.run(lambda: sky.vehicle.mode is Mode.HOLD, limit=0.5)
+    assert sky.client.mission.phase is Phase.ABORTED
+    assert str(sky.client.report()) == "aborted: interrupted; hovering after the abort"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [True, False])
 def test_a_vehicle_that_may_have_been_armed_unheard_is_told_to_land_before_it_is_refused(lost: bool) -> None:

@@ -123,8 +123,8 @@ class Client:
         getattr(self, f"_while_{self.stage.name.lower()}")()
 
     def abort(self, now: float, reason: str) -> None:
-        """Abort the flight: the vehicle is ordered to hover, then to land."""
-        if self.stage is ClientStage.FLYING:
+        """Abort the flight: a vehicle that may be in the air is ordered to hover, then to land."""
+        if self.stage in (ClientStage.ARMING, ClientStage.TAKING_OFF, ClientStage.FLYING):
             self._now = now
             self.mission.abort(now, reason)
             self._recover()
