@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import heapq
 import os
 import socket
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, partial
 from importlib.util import find_spec
-from itertools import count
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
@@ -197,9 +196,8 @@ class LossyConnection:
         self._clock = clock
         self._loss, self._delay = loss, delay
         self._random = np.random.default_rng(seed)
-        self._order = count()
-        self._coming: list[tuple[float, int, MavlinkMessage]] = []
-        self._going: list[tuple[float, int, MavlinkMessage]] = []
+        self._coming: deque[tuple[float, MavlinkMessage]] = deque()  # [s] when each is due
+        self._going: deque[tuple[float, MavlinkMessage]] = deque()
 
     def receive(self) -> list[MavlinkMessage]:
         """See `Connection.receive`; also sends messages whose delay is over."""
@@ -217,12 +215,12 @@ class LossyConnection:
         """See `Connection.close`."""
         self._connection.close()
 
-    def _keep(self, queue: list[tuple[float, int, MavlinkMessage]], message: MavlinkMessage) -> None:
+    def _keep(self, queue: deque[tuple[float, MavlinkMessage]], message: MavlinkMessage) -> None:
         if self._random.random() >= self._loss:
-            heapq.heappush(queue, (self._clock.now() + self._delay, next(self._order), message))
+            queue.append((self._clock.now() + self._delay, message))
 
-    def _due(self, queue: list[tuple[float, int, MavlinkMessage]]) -> list[MavlinkMessage]:
+    def _due(self, queue: deque[tuple[float, MavlinkMessage]]) -> list[MavlinkMessage]:
         due = []
         while queue and queue[0][0] <= self._clock.now():
-            due.append(heapq.heappop(queue)[2])
+            due.append(queue.popleft()[1])
         return due
