@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from math import inf
 from typing import Protocol
 
 
@@ -30,3 +32,13 @@ class WallClock:
     def sleep_until(self, instant: float) -> None:
         """See `Clock.sleep_until`."""
         time.sleep(max(instant - self.now(), 0.0) / self._speed)
+
+
+def ticks(clock: Clock, rate: float, end: float = inf) -> Iterator[float]:
+    """Yield the time [s] of each tick, `rate` a second, until `end` [s]; missed ticks are not made up for."""
+    due, period = clock.now(), 1.0 / rate
+    while due < end:
+        clock.sleep_until(due)
+        now = clock.now()
+        yield now
+        due = max(due + period, now)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import closing
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -90,7 +91,7 @@ def mavlink_vehicle(
     """
     found, environment = named_vehicle(vehicle), named_environment(options.environment)
     from aerobat.links.autopilot.vehicle import SimulatedVehicle
-    from aerobat.links.clock import WallClock
+    from aerobat.links.clock import WallClock, ticks
     from aerobat.links.mavlink.connection import LossyConnection, connect
     from aerobat.links.mavlink.dialects import DIALECTS
     from aerobat.links.mavlink.front_end import SYSTEM, FrontEnd
@@ -104,13 +105,9 @@ def mavlink_vehicle(
         )
     front_end = FrontEnd(simulated, connection, say, DIALECTS[options.dialect])
     say(f"{found.name} listens on {options.listen}")
-    end = float("inf") if options.seconds is None else options.seconds
-    try:
-        while clock.now() < end:
-            front_end.tick(clock.now())
-            clock.sleep_until(clock.now() + 1.0 / _RATE)
-    finally:
-        connection.close()
+    with closing(connection):
+        for now in ticks(clock, _RATE, options.seconds or inf):
+            front_end.tick(now)
 
 
 def _print(report: LinkReport, in_json: bool) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.links.clock import Clock
+from aerobat.links.clock import Clock, ticks
 from aerobat.links.goals import Mode, Observed, PositionGoal, yaw_of
 from aerobat.links.mavlink.autopilot_link import AutopilotLink
 from aerobat.links.mavlink.connection import Connection
@@ -347,17 +347,15 @@ class Client:
 
 def run(client: Client, clock: Clock) -> None:
     """Tick a client until it is done. On Ctrl-C, order the vehicle to hover first."""
-    due, period = clock.now(), 1.0 / client.settings.rate
     try:
-        while not client.done:
-            clock.sleep_until(due)
-            now = clock.now()
+        for now in ticks(clock, client.settings.rate):
             client.tick(now)
-            due = max(due + period, now)
+            if client.done:
+                return
     except KeyboardInterrupt:
-        until = clock.now() + 1.0
         client.abort(clock.now(), "interrupted")
-        while clock.now() < until and client.stage is ClientStage.RECOVERING:
-            client.tick(clock.now())
-            clock.sleep_until(clock.now() + period)
+        for now in ticks(clock, client.settings.rate, clock.now() + 1.0):
+            if client.stage is not ClientStage.RECOVERING:
+                break
+            client.tick(now)
         raise
