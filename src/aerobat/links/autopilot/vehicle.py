@@ -10,6 +10,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.kernels.control_loops import ReferencePoint
+from aerobat.kernels.rigid_body import Body
 from aerobat.links.autopilot.live_body import LiveBody
 from aerobat.links.autopilot.references import AttitudeReference, PathReference, PointReference
 from aerobat.links.goals import AttitudeGoal, Mode, PathPiece, PositionGoal
@@ -58,6 +59,11 @@ class SimulatedVehicle:
     def state(self) -> BodyState:
         """The true state, (·,)."""
         return self._body.state
+
+    @property
+    def body(self) -> Body:
+        """The true state in plain numbers."""
+        return Body(*(tuple(part.tolist()) for part in vars(self.state).values()))
 
     @property
     def hover_fraction(self) -> float:

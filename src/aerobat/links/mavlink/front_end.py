@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import degrees, isfinite, isnan, nan, pi
+from dataclasses import dataclass
+from math import degrees, inf, isfinite, nan, pi
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,16 @@ _IGNORED_POSITION, _IGNORED_VELOCITY, _IGNORED_ACCELERATION, _IGNORED_YAW = 7, 5
 _IGNORED_RATES, _IGNORED_ATTITUDE = 7, 128
 
 
+@dataclass
+class _Stream:
+    """A message that is sent at an interval; with an infinite one, on request only."""
+
+    name: str
+    fields: Callable[[], Sequence[Any]]
+    interval: float  # [s]
+    due: float  # [s] when it is sent next
+
+
 class FrontEnd:
     """The messages of a simulated vehicle: streams that it sends, and orders that it accepts."""
 
@@ -42,16 +53,14 @@ class FrontEnd:
         self._guided = False  # in ArduPilot's mode GUIDED, in which it holds without set-points
         self._say = say
         self._connection = connection
-        self._began = vehicle.time
         self.parameters = {
             self.dialect.hover_thrust: vehicle.hover_fraction,
             _TAKEOFF_HEIGHT: 2.5,  # [m] PX4's default, until a client sets it
             self.dialect.silence: POINT_TIMEOUT,
             **{name: float(setting.bits) for name, setting in self.dialect.settings.items()},
         }
-        # by the message's number: its name, its fields, and the interval [s], NaN until a client requests it
-        self._streams: dict[int, tuple[str, Callable[[], Sequence[Any]], float]] = {
-            message_class(name).id: (name, fields, interval)
+        self._streams = {  # by the message's number
+            message_class(name).id: _Stream(name, fields, interval, due=0.0 if isfinite(interval) else inf)
             for name, fields, interval in (
                 ("heartbeat", self._heartbeat, 0.5),
                 ("sys_status", self._sys_status, 1.0),
@@ -61,13 +70,9 @@ class FrontEnd:
                 ("local_position_ned", self._local_position, 0.02),
                 ("attitude_quaternion", self._attitude, 0.02),
                 ("global_position_int", self._global_position, 0.02),
-                ("odometry", self._odometry, nan),
+                ("odometry", self._odometry, inf),
             )
         }
-        self._due = {
-            identity: nan if isnan(interval) else self._began
-            for identity, (_, _, interval) in self._streams.items()
-        }  # [s]
 
     def tick(self, now: float) -> None:
         """Advance to this time [s], process received messages, and send due ones."""
@@ -82,10 +87,10 @@ class FrontEnd:
             self._say(sentence)
             self._send("statustext", 4, sentence.encode()[:50])
         self.vehicle.notices.clear()
-        for identity, (name, fields, interval) in self._streams.items():
-            if self._due[identity] <= now + 1e-9:
-                self._send(name, *fields())
-                self._due[identity] = max(self._due[identity] + interval, now)
+        for stream in self._streams.values():
+            if stream.due <= now + 1e-9:
+                self._send(stream.name, *stream.fields())
+                stream.due = max(stream.due + stream.interval, now)
 
     def _send(self, name: str, *fields: Any) -> None:
         self._connection.send(message_class(name)(*fields))
@@ -94,11 +99,11 @@ class FrontEnd:
 
     @property
     def _milliseconds(self) -> int:
-        return round(1e3 * (self.vehicle.time - self._began))
+        return round(1e3 * self.vehicle.time)
 
     @property
     def _microseconds(self) -> int:
-        return round(1e6 * (self.vehicle.time - self._began))
+        return round(1e6 * self.vehicle.time)
 
     def _heartbeat(self) -> Sequence[Any]:
         armed = ARMED if self.vehicle.armed else 0
@@ -128,48 +133,39 @@ class FrontEnd:
         return latitude, longitude, round(1e3 * altitude), 0.0, 0.0, 0.0, upright, 0.0, 0.0, 0.0
 
     def _gps(self) -> Sequence[Any]:
-        latitude, longitude, altitude = to_global(self._position)
+        latitude, longitude, altitude = to_global(self.vehicle.body.position)
         return self._microseconds, 3, latitude, longitude, round(1e3 * altitude), 100, 100, 0, 0, 12
 
     def _local_position(self) -> Sequence[Any]:
-        return self._milliseconds, *swap_world(self._position), *swap_world(self._velocity)
+        body = self.vehicle.body
+        return self._milliseconds, *swap_world(body.position), *swap_world(body.velocity)
 
     def _attitude(self) -> Sequence[Any]:
-        state = self.vehicle.state
-        q = swap_attitude(tuple(state.q_world_body.tolist()))
-        return self._milliseconds, *q, *swap_body(tuple(state.omega_body.tolist()))
+        body = self.vehicle.body
+        return self._milliseconds, *swap_attitude(body.q_world_body), *swap_body(body.omega_body)
 
     def _global_position(self) -> Sequence[Any]:
-        latitude, longitude, altitude = to_global(self._position)
-        velocity = (round(100 * v) for v in swap_world(self._velocity))
-        heights = round(1e3 * altitude), round(1e3 * self._position[2])
+        body = self.vehicle.body
+        latitude, longitude, altitude = to_global(body.position)
+        velocity = (round(100 * v) for v in swap_world(body.velocity))
+        heights = round(1e3 * altitude), round(1e3 * body.position[2])
         return self._milliseconds, latitude, longitude, *heights, *velocity, self._heading
 
     def _odometry(self) -> Sequence[Any]:
-        state = self.vehicle.state
+        state, body = self.vehicle.state, self.vehicle.body
         velocity = so3.unrotate(state.q_world_body, state.velocity)
         unknown = (nan, *(0.0,) * 20)
         return (
             self._microseconds,
             1,
             12,
-            *swap_world(self._position),
-            swap_attitude(tuple(state.q_world_body.tolist())),
+            *swap_world(body.position),
+            swap_attitude(body.q_world_body),
             *swap_body(tuple(velocity.tolist())),
-            *swap_body(tuple(state.omega_body.tolist())),
+            *swap_body(body.omega_body),
             unknown,
             unknown,
         )
-
-    @property
-    def _position(self) -> tuple[float, float, float]:
-        x, y, z = self.vehicle.state.position.tolist()
-        return x, y, z
-
-    @property
-    def _velocity(self) -> tuple[float, float, float]:
-        x, y, z = self.vehicle.state.velocity.tolist()
-        return x, y, z
 
     @property
     def _heading(self) -> int:
@@ -180,7 +176,7 @@ class FrontEnd:
 
     def _take_timesync(self, message: MavlinkMessage) -> None:
         if message.tc1 == 0:
-            self._send("timesync", round(1e9 * (self.vehicle.time - self._began)), message.ts1)
+            self._send("timesync", round(1e9 * self.vehicle.time), message.ts1)
 
     def _take_param_request_read(self, message: MavlinkMessage) -> None:
         self._send_parameter(str(message.param_id))
@@ -266,10 +262,10 @@ class FrontEnd:
     def _set_interval(self, identity: int, microseconds: float) -> bool:
         if identity not in self._streams:
             return False
-        name, fields, _ = self._streams[identity]
-        interval = nan if microseconds < 0 else max(1e-6 * microseconds, 0.004)
-        self._streams[identity] = name, fields, interval
-        self._due[identity] = self.vehicle.time if microseconds >= 0 else nan
+        stream = self._streams[identity]
+        stream.interval = stream.due = inf
+        if microseconds >= 0:
+            stream.interval, stream.due = max(1e-6 * microseconds, 0.004), self.vehicle.time
         return True
 
     def _send_requested(self, identity: int) -> bool:
@@ -282,8 +278,8 @@ class FrontEnd:
             return True
         if identity not in self._streams:
             return False
-        name, fields, _ = self._streams[identity]
-        self._send(name, *fields())
+        stream = self._streams[identity]
+        self._send(stream.name, *stream.fields())
         return True
 
     def _take_set_position_target_local_ned(self, message: MavlinkMessage) -> None:
