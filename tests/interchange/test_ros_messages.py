@@ -175,6 +175,9 @@ def test_the_shipped_rviz_configurations_show_what_is_published(generation: str)
         (("link", "ros-vehicle", "--ros", "1"), "ROS 1 needs rospy"),
         (("link", "ros-vehicle", "--speed", "0.5"), "ROS 2 needs rclpy"),
         (("link", "ros", "flip-rool"), "did you mean 'flip-roll'"),
+        (("link", "ros", "land.toml"), "/aerobat/land is the node's own; give land.toml another name"),
+        (("link", "ros", "3d.toml"), "/aerobat/3d does not begin with a letter; give 3d.toml another name"),
+        (("link", "ros", "power-loop", "power_loop.toml"), "/aerobat/power_loop is that of power-loop"),
         (("link", "ros", "--vehicle", "agile-quda"), "agile-quad"),
         (("link", "ros", "--reserve", "0.7"), "reserve"),
         (("link", "ros", "--rate", "1000"), "rate"),
@@ -182,8 +185,15 @@ def test_the_shipped_rviz_configurations_show_what_is_published(generation: str)
     ],
 )
 def test_what_is_missing_or_wrong_is_said_in_a_sentence(
-    arguments: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]
+    arguments: tuple[str, ...],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("land.toml", "3d.toml", "power_loop.toml"):
+        ab.write_problem("line", name)
     with pytest.raises(SystemExit) as stopped:
         cli.main(arguments)
     assert stopped.value.code == 2

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from math import inf
@@ -19,7 +20,7 @@ from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.betaflight.board import board_at
 from aerobat.links.ros.crazyswarm import PREFIX, Crazyflie, Ros2
 from aerobat.links.ros.crazyswarm_server import CrazyswarmServer
-from aerobat.links.ros.maneuver_node import ManeuverNode, NodeSettings, Tick
+from aerobat.links.ros.maneuver_node import OWN_SERVICES, ManeuverNode, NodeSettings, Tick
 from aerobat.links.ros.middleware import Middleware, PacedClock
 from aerobat.links.ros.preparation import MANEUVERS, ManeuverRequest, prepare, shared_gravity
 from aerobat.links.ros.run import run
@@ -61,7 +62,7 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
         odometry=f"{crazyflie}/odom" if crazyflie else options.odometry,
         mission=options.mission,
     )
-    named = {_service(name): load_problem(name) for name in problems}
+    named = {service: load_problem(name) for service, name in _services(problems).items()}
     environment = Environment(gravity=shared_gravity(named.values()))
     maneuvers = {
         service: (problem, _planner(problem, vehicle, options))
@@ -177,8 +178,22 @@ def _paper_maneuvers(gravity: float) -> dict[str, Problem]:
     }
 
 
-def _service(name: str) -> str:
-    return "".join(sign if sign.isalnum() else "_" for sign in Path(name).stem)
+def _services(problems: Sequence[str]) -> dict[str, str]:
+    """The problems by the services that fly them. Raises SpecError for a service that there cannot be."""
+    found: dict[str, str] = {}
+    for name in dict.fromkeys(problems):
+        service = re.sub("[^A-Za-z0-9]", "_", Path(name).stem)
+        fault = None
+        if service in OWN_SERVICES:
+            fault = "is the node's own"
+        elif not service[:1].isalpha():
+            fault = "does not begin with a letter"
+        elif service in found:
+            fault = f"is that of {found[service]}"
+        if fault is not None:
+            raise SpecError(f"the service /aerobat/{service} {fault}; give {name} another name")
+        found[service] = name
+    return found
 
 
 def _planner(problem: Problem, vehicle: Vehicle, options: RosOptions) -> Planner:

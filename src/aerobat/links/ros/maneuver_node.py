@@ -26,6 +26,7 @@ from aerobat.planning import Planner
 from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
 
+OWN_SERVICES = ("takeoff", "hold", "land")  # besides those of maneuvers
 _MAX_AHEAD = 0.1  # [s] largest lead of another machine's clock
 
 
