@@ -17,7 +17,7 @@ from aerobat.errors import BackendMissing, SpecError
 from aerobat.links.betaflight import process
 from aerobat.links.betaflight.msp import flags_of, request, response
 from aerobat.links.betaflight.packets import MOTORS, Sticks, state_packet
-from aerobat.links.betaflight.settings import betaflight_settings, rotor_order, stick_rate
+from aerobat.links.betaflight.settings import betaflight_settings, board_rate, rotor_order
 from aerobat.simulation.flight_controller import Sensed
 from refusals import complaint
 from suites import examples
@@ -94,15 +94,17 @@ def test_what_the_firmware_cannot_fly_is_refused_in_a_sentence() -> None:
     assert "quadrotors in X" in complaint(lambda: rotor_order(ab.load_vehicle("hexarotor")))
     one_wide = (replace(QUAD.rotors[0], position_body=[0.2, 0.106, 0.0]), *QUAD.rotors[1:])
     assert "quadrotors in X" in complaint(lambda: rotor_order(replace(QUAD, rotors=one_wide)))
-    assert "lower max_body_rate" in complaint(lambda: stick_rate(40.0))
+    assert "lower max_body_rate" in complaint(lambda: board_rate(QUAD, 40.0))
     rotors = tuple(replace(rotor, lag=0.1) for rotor in QUAD.rotors)
     slow = replace(QUAD, inertia=np.array([0.02, 0.02, 0.03]), rotors=rotors)
     assert "too slow for Betaflight's gains" in complaint(lambda: betaflight_settings(slow, 20.0))
 
 
 def test_sticks_reach_beyond_the_reference_and_no_further_than_the_gyro() -> None:
-    assert 180.0 / pi * stick_rate(10.0) == pytest.approx(1090.0)
-    assert 180.0 / pi * stick_rate(34.0) == pytest.approx(1990.0)
+    slow = replace(QUAD, max_body_rate=1.0)
+    assert 180.0 / pi * board_rate(replace(QUAD, max_body_rate=10.0)) == pytest.approx(1090.0)
+    assert 180.0 / pi * board_rate(slow, 10.0) == pytest.approx(1090.0)
+    assert 180.0 / pi * board_rate(slow, 34.0) == pytest.approx(1990.0)
 
 
 def test_frames_of_the_serial_protocol_are_read_however_they_arrive() -> None:

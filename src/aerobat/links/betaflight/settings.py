@@ -46,20 +46,6 @@ _SIMULATED = {
 }  # fmt: skip
 
 
-def stick_rate(peak: float) -> float:
-    """Return the rate at a stick's end [rad/s] for references of at most `peak` [rad/s] about any axis.
-
-    Raises SpecError for rates beyond the firmware's gyro range.
-    """
-    if (fastest := 180.0 / pi * peak) > GYRO_LIMIT:
-        raise SpecError(
-            f"autopilot: the path turns at {fastest:.0f}°/s, and Betaflight knows rates up to "
-            f"{GYRO_LIMIT:.0f}°/s; plan it with a lower max_body_rate of the vehicle"
-        )
-    wanted = max(fastest + 180.0 / pi * _CORRECTION, _MIN_RATE)
-    return pi / 180.0 * min(_RATE_STEP * ceil(wanted / _RATE_STEP), _RATE_STEP * int(GYRO_LIMIT / _RATE_STEP))
-
-
 def board_rate(vehicle: Vehicle, peak: float = 0.0) -> float:
     """Return the rate at a stick's end [rad/s] of a vehicle's board, for any plan within its limits.
 
@@ -69,7 +55,14 @@ def board_rate(vehicle: Vehicle, peak: float = 0.0) -> float:
 
     Raises SpecError for rates beyond the firmware's gyro range.
     """
-    return stick_rate(max(peak, min(vehicle.max_body_rate, pi / 180.0 * GYRO_LIMIT)))
+    fastest = 180.0 / pi * max(peak, min(vehicle.max_body_rate, pi / 180.0 * GYRO_LIMIT))
+    if fastest > GYRO_LIMIT:
+        raise SpecError(
+            f"autopilot: the path turns at {fastest:.0f}°/s, and Betaflight knows rates up to "
+            f"{GYRO_LIMIT:.0f}°/s; plan it with a lower max_body_rate of the vehicle"
+        )
+    wanted = max(fastest + 180.0 / pi * _CORRECTION, _MIN_RATE)
+    return pi / 180.0 * min(_RATE_STEP * ceil(wanted / _RATE_STEP), _RATE_STEP * int(GYRO_LIMIT / _RATE_STEP))
 
 
 def throttle_of(vehicle: Vehicle, thrust: float) -> float:
