@@ -20,6 +20,7 @@ from aerobat.links.goals import PathPiece
 from aerobat.links.ros.maneuver_node import Tick
 from aerobat.links.ros.middleware import Middleware
 from aerobat.links.ros.preparation import Prepared
+from aerobat.links.routes import Route
 
 PREFIX = "crazyswarm2:"  # prefix of a goal that is a Crazyflie's name
 FULL_STATE = "crazyflie_interfaces/msg/FullState"
@@ -59,28 +60,27 @@ class Crazyflie:
     def take(self, tick: Tick) -> None:
         """Send due orders: a service call when a route begins, the goal's full state in a maneuver."""
         enters, self._doing = tick.doing is not self._doing, tick.doing
-        own = tick.flown is not None and tick.flown.pieces is not None
-        if tick.route is None and tick.doing is Doing.NOTHING:
+        uploaded = None if tick.flown is None or tick.flown.pieces is None else tick.flown
+        if tick.doing is Doing.NOTHING:
             if enters and self._streams:  # in the air: the firmware stops rotors when full states end
                 self._order("go_to", relative=True, duration=self._duration(_MIN_DURATION))
         elif tick.route is not None and tick.doing is not Doing.BRAKING:
             if enters:
-                self._go(tick)
-        elif own and tick.flown is not None and tick.is_flown:
+                self._go(tick, tick.route)
+        elif uploaded is not None and tick.is_flown:
             if not self._flies:
                 start = {"trajectory_id": _TRAJECTORY, "timescale": 1.0}
                 self._order("start_trajectory", **start, reversed=False, relative=False)
             self._flies = True
         elif tick.piece is not None:
-            if enters and own and tick.flown is not None:
-                self._upload(tick.flown)
+            if enters and uploaded is not None:
+                self._upload(uploaded)
             self._flies, self._streams = False, True
             self._publish(self._full_state(tick.piece, tick.stamp))
 
-    def _go(self, tick: Tick) -> None:
+    def _go(self, tick: Tick, route: Route) -> None:
         """Order the route that begins."""
-        assert tick.route is not None, "it is on a route"
-        end, remaining = tick.route.end, tick.route.began + tick.route.path.duration - tick.now
+        end, remaining = route.end, route.began + route.path.duration - tick.now
         duration = self._duration(max(remaining, _MIN_DURATION))
         if tick.doing is Doing.CLIMBING:
             self._order("takeoff", height=float(end[2]), duration=duration)
@@ -88,7 +88,7 @@ class Crazyflie:
             self._order("land", height=tick.ground, duration=duration)
         else:
             goal = self._messages.vector("Point", end)
-            self._order("go_to", relative=False, goal=goal, yaw=tick.route.yaw, duration=duration)
+            self._order("go_to", relative=False, goal=goal, yaw=route.yaw, duration=duration)
 
     def _order(self, service: str, **given: Any) -> None:
         """Request a route by the firmware, in place of full states."""
