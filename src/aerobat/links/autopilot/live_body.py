@@ -32,19 +32,30 @@ class LiveBody:
     def __init__(self, vehicle: Vehicle, environment: Environment) -> None:
         vehicle.require_hover(environment.gravity)
         self._idle = tuple(np.array([least]) for least in vehicle.min_thrusts)
-        self.state = _at_rest(np.zeros(2), 0.0)  # the true state, (·,)
-        setup = autopilot_setup(_one(self.state), vehicle, environment)
+        setup = autopilot_setup(_at_rest(np.zeros(2), 0.0), vehicle, environment)
         _, model, _ = setup.parameters.own
         self._gains: tuple[Gains, Gains] = first_numbers((model.tracking.gains, model.upright))
-        first = first_row(autopilot_inputs(_hovering(environment.gravity), False))
+        zero = np.zeros((1, 3))
+        hovering = point_reference(zero, zero, zero, zero, 0.0, environment.gravity)
+        first = first_row(autopilot_inputs(hovering, False))
         self._loop = setup.compile_for(choose("auto", 1, _MAX_TICKS), first, log_row)
         self._carry: Tree = self._loop.init(first)
         self.stop_rotors()
 
+    @property
+    def body(self) -> Body:
+        """The true state in plain numbers."""
+        body: Body = first_numbers(self._carry[2].body)
+        return body
+
+    @property
+    def state(self) -> BodyState:
+        """The true state, (·,)."""
+        return BodyState(*(np.concatenate(leaves) for leaves in self._carry[2].body))
+
     def fly(self, references: ReferencePoint, by_attitude: bool, upright: bool) -> None:
         """Simulate a tick for each of the references, leaves (T,); see `autopilot_inputs`."""
         self._carry, _ = self._loop.scan(self._carry, autopilot_inputs(references, by_attitude, upright))
-        self.state = BodyState(*(np.concatenate(leaves) for leaves in self._carry[2].body))
 
     def restart_position_loop(self, references: ReferencePoint, upright: bool) -> None:
         """Restart the outer loop towards the first of the references, without its previous state.
@@ -60,9 +71,9 @@ class LiveBody:
     def stand(self) -> None:
         """Put the vehicle at rest on the ground below it; the rotors keep their thrusts."""
         state = self.state
-        self.state = _at_rest(state.position[:2], yaw_of(state.q_world_body))
+        standing = _at_rest(state.position[:2], yaw_of(state.q_world_body))
         observer, controller, motion = self._carry
-        self._carry = (observer, controller, VehicleState(_one(self.state), motion.thrusts))
+        self._carry = (observer, controller, VehicleState(standing, motion.thrusts))
 
     def stop_rotors(self) -> None:
         """Set all rotors to their minimum thrust, in the plant and in the controller's model."""
@@ -72,16 +83,7 @@ class LiveBody:
         self._carry = (observer, stopped, VehicleState(motion.body, self._idle))
 
 
-def _at_rest(place: Array, yaw: float) -> BodyState:
-    q = np.array([cos(yaw / 2), 0.0, 0.0, sin(yaw / 2)])
-    return BodyState(np.array([*place, 0.0]), np.zeros(3), q, np.zeros(3))
-
-
-def _one(state: BodyState) -> Body:
-    """Return a state with leaves (1,)."""
-    return bodies(BodyState(*(part[None] for part in vars(state).values())))
-
-
-def _hovering(gravity: float) -> ReferencePoint:
-    zero = np.zeros((1, 3))
-    return point_reference(zero, zero, zero, zero, 0.0, gravity)
+def _at_rest(place: Array, yaw: float) -> Body:
+    """Return the state at rest on the ground at a place [m], (2,), and a yaw [rad]; leaves (1,)."""
+    q = np.array([[cos(yaw / 2), 0.0, 0.0, sin(yaw / 2)]])
+    return bodies(BodyState(np.array([[*place, 0.0]]), np.zeros((1, 3)), q, np.zeros((1, 3))))

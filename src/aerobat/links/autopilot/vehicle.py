@@ -63,7 +63,7 @@ class SimulatedVehicle:
     @property
     def body(self) -> Body:
         """The true state in plain numbers."""
-        return Body(*(tuple(part.tolist()) for part in vars(self.state).values()))
+        return self._body.body
 
     @property
     def hover_fraction(self) -> float:
