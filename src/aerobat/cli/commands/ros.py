@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -69,13 +70,15 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
         for service, problem in {**_paper_maneuvers(environment.gravity), **named}.items()
     }
     board = board_at(options.goal, vehicle, environment, 1.0 / options.rate)
-    middleware = _joined("aerobat", options.generation, sim_time=options.sim_time)
     take: Callable[[Tick], None] | None = None
-    try:
+    with (
+        nullcontext() if board is None else closing(board),
+        closing(_joined("aerobat", options.generation, sim_time=options.sim_time)) as middleware,
+    ):
         if crazyflie:
             take = Crazyflie(_ros2(middleware), crazyflie).take
         elif board is not None:
-            take = lambda tick: board.take(*tick[:3])  # noqa: E731 - what a board needs of it
+            take = lambda tick: board.take(tick.piece, tick.observed, tick.now)  # noqa: E731
         # two, so that none of them is this one
         with processes(2, forked=False) as executor:
             _rehearse(executor, vehicle, maneuvers, settings)
@@ -83,10 +86,6 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
             say(f"flies {vehicle.name}: /aerobat/ takeoff, {', '.join(maneuvers)}, hold, land")
             say(f"to look: {RVIZ[options.generation]}")
             run(node, middleware, options.rate, options.seconds or inf)
-    finally:
-        if board is not None:
-            board.close()
-        middleware.close()
 
 
 def ros_vehicle(
@@ -106,8 +105,7 @@ def ros_vehicle(
     """
     found, environment = named_vehicle(vehicle), named_environment(options.environment)
     clock = None if options.speed is None else PacedClock(options.speed)
-    middleware = _joined("aerobat_vehicle", options.generation, clock)
-    try:
+    with closing(_joined("aerobat_vehicle", options.generation, clock)) as middleware:
         simulated, crazyflie = SimulatedVehicle(found, environment), _crazyflie(options.goal)
         topics = {"goal": options.goal, "odometry": options.odometry}
         node = (
@@ -117,8 +115,6 @@ def ros_vehicle(
         )
         say(f"{found.name} stands on the ground, and obeys {options.goal}")
         run(node, middleware, _VEHICLE_RATE, options.seconds or inf)
-    finally:
-        middleware.close()
 
 
 def _rehearse(
