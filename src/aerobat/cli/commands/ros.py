@@ -69,7 +69,10 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
         service: (problem, _planner(problem, vehicle, options))
         for service, problem in {**_paper_maneuvers(environment.gravity), **named}.items()
     }
+    _require_topics(settings.odometry)
     board = board_at(options.goal, vehicle, environment, 1.0 / options.rate)
+    if board is None and not crazyflie:
+        _require_topics(settings.goal)
     take: Callable[[Tick], None] | None = None
     with (
         nullcontext() if board is None else closing(board),
@@ -105,9 +108,10 @@ def ros_vehicle(
     """
     found, environment = named_vehicle(vehicle), named_environment(options.environment)
     clock = None if options.speed is None else PacedClock(options.speed)
+    crazyflie, topics = _crazyflie(options.goal), {"goal": options.goal, "odometry": options.odometry}
+    _require_topics(*((f"{crazyflie}/odom",) if crazyflie else topics.values()))
     with closing(_joined("aerobat_vehicle", options.generation, clock)) as middleware:
-        simulated, crazyflie = SimulatedVehicle(found, environment), _crazyflie(options.goal)
-        topics = {"goal": options.goal, "odometry": options.odometry}
+        simulated = SimulatedVehicle(found, environment)
         node = (
             CrazyswarmServer(_ros2(middleware), simulated, crazyflie, rate=options.rate, clock=clock, say=say)
             if crazyflie
@@ -149,6 +153,14 @@ def _joined(
     from aerobat.links.ros.rospy_middleware import RospyMiddleware
 
     return RospyMiddleware(name, clock)
+
+
+def _require_topics(*names: str) -> None:
+    """Raise SpecError for a name that no topic of ROS has."""
+    token = r"[A-Za-z_{][A-Za-z0-9_{}]*"  # with substitutions of ROS 2, as {node}
+    for name in names:
+        if not re.fullmatch(rf"~?/?{token}(/{token})*", name):
+            raise SpecError(f"'{name}' is no topic of ROS; give letters, digits and _, as in /aerobat/goal")
 
 
 def _crazyflie(goal: str) -> str:
