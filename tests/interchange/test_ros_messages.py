@@ -186,6 +186,7 @@ def test_the_shipped_rviz_configurations_show_what_is_published(generation: str)
         (("link", "ros", "--vehicle", "agile-quda"), "agile-quad"),
         (("link", "ros", "--reserve", "0.7"), "reserve"),
         (("link", "ros", "--rate", "1000"), "rate"),
+        (("link", "ros", "--ros", "1", "--goal", "crazyswarm2:/cf231"), "crazyswarm2 is a server of ROS 2"),
         (("link", "ros", "--ros", "1", "--sim-time"), "--sim-time is for --ros 2"),
     ],
 )

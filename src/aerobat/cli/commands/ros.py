@@ -9,10 +9,10 @@ from contextlib import closing, nullcontext
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, cast
 
 from aerobat import so3
-from aerobat.cli.link_options import RosOptions, RosVehicleOptions
+from aerobat.cli.link_options import RosNodeOptions, RosOptions, RosVehicleOptions
 from aerobat.cli.runs.saved_plans import named_environment, named_vehicle
 from aerobat.cli.terminal import say
 from aerobat.environment import Environment
@@ -50,7 +50,7 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
         Names that `aerobat show` lists, or problems' TOML files, to be services too, of their names. They
         have one gravity, in which the paper's maneuvers are planned, too.
     """
-    vehicle, crazyflie = named_vehicle(options.vehicle), _crazyflie(options.goal)
+    vehicle, crazyflie = named_vehicle(options.vehicle), _crazyflie(options)
     if options.onboard and not crazyflie:
         raise SpecError("--onboard is for a Crazyflie; give --goal crazyswarm2:/NAME, or leave it out")
     settings = NodeSettings(
@@ -79,7 +79,7 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
         closing(_joined("aerobat", options.generation, sim_time=options.sim_time)) as middleware,
     ):
         if crazyflie:
-            take = Crazyflie(_ros2(middleware), crazyflie).take
+            take = Crazyflie(cast(Ros2, middleware), crazyflie).take
         elif board is not None:
             take = lambda tick: board.take(tick.piece, tick.observed, tick.now)  # noqa: E731
         # two, so that none of them is this one
@@ -108,15 +108,17 @@ def ros_vehicle(
     """
     found, environment = named_vehicle(vehicle), named_environment(options.environment)
     clock = None if options.speed is None else PacedClock(options.speed)
-    crazyflie, topics = _crazyflie(options.goal), {"goal": options.goal, "odometry": options.odometry}
-    _require_topics(*((f"{crazyflie}/odom",) if crazyflie else topics.values()))
+    crazyflie = _crazyflie(options)
+    _require_topics(*((f"{crazyflie}/odom",) if crazyflie else (options.goal, options.odometry)))
     with closing(_joined("aerobat_vehicle", options.generation, clock)) as middleware:
         simulated = SimulatedVehicle(found, environment)
-        node = (
-            CrazyswarmServer(_ros2(middleware), simulated, crazyflie, rate=options.rate, clock=clock, say=say)
-            if crazyflie
-            else VehicleNode(middleware, simulated, **topics, rate=options.rate, clock=clock, say=say)
-        )
+        settings: dict[str, Any] = {"rate": options.rate, "clock": clock, "say": say}
+        if crazyflie:
+            node: VehicleNode = CrazyswarmServer(cast(Ros2, middleware), simulated, crazyflie, **settings)
+        else:
+            node = VehicleNode(
+                middleware, simulated, goal=options.goal, odometry=options.odometry, **settings
+            )
         say(f"{found.name} stands on the ground, and obeys {options.goal}")
         run(node, middleware, _VEHICLE_RATE, options.seconds or inf)
 
@@ -163,18 +165,13 @@ def _require_topics(*names: str) -> None:
             raise SpecError(f"'{name}' is no topic of ROS; give letters, digits and _, as in /aerobat/goal")
 
 
-def _crazyflie(goal: str) -> str:
+def _crazyflie(options: RosNodeOptions) -> str:
     """The name of a Crazyflie behind crazyswarm2's server that is a node's goal, else nothing."""
-    return goal.removeprefix(PREFIX) if goal.startswith(PREFIX) else ""
-
-
-def _ros2(middleware: Middleware) -> Ros2:
-    """The same, if it is of ROS 2. Raises SpecError otherwise."""
-    from aerobat.links.ros.rclpy_middleware import RclpyMiddleware
-
-    if not isinstance(middleware, RclpyMiddleware):
+    if not options.goal.startswith(PREFIX):
+        return ""
+    if options.generation == "1":
         raise SpecError("crazyswarm2 is a server of ROS 2; leave --ros 1 out")
-    return middleware
+    return options.goal.removeprefix(PREFIX)
 
 
 def _paper_maneuvers(gravity: float) -> dict[str, Problem]:
