@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from concurrent.futures import Future
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
@@ -19,7 +20,7 @@ from aerobat.links.mission import MissionSettings
 from aerobat.links.ros import topics
 from aerobat.links.ros.maneuver_node import NodeSettings
 from places import SUPPORT
-from ros_sky import Sky, aloft, at_the_flips_begin
+from ros_sky import AtOnce, Reply, Sky, aloft, at_the_flips_begin
 
 MORE = 0.02  # [m] that a flight by topics may be off more than one in process
 
@@ -75,6 +76,27 @@ def test_what_has_no_plan_is_answered_with_the_reason_and_the_vehicle_hovers_on(
     assert "asks 45 m/s² inverted, agile-quad gives 32" in reply.sentence
     sky.run_for(1.0)
     assert sky.hovers
+
+
+class Planning(AtOnce):
+    """Never has a plan."""
+
+    def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        return Future()
+
+
+@pytest.mark.parametrize("service", ["hold", "land"])
+def test_a_vehicle_obeys_while_a_maneuver_is_planned_which_is_then_given_up(service: str) -> None:
+    sky = aloft()
+    sky.node._executor = Planning()
+    asked = Reply()
+    sky.graph.services["/aerobat/flip"](asked)
+    assert "a maneuver is being planned; wait for it" in sky.call("line").sentence
+    assert asked.success is None
+    assert sky.call(service).success
+    assert asked.success is False
+    assert asked.sentence == f"the maneuver is given up: {service} was called"
+    sky.run(lambda: sky.stands if service == "land" else sky.node.commander.doing is Doing.HOVERING)
 
 
 @pytest.mark.slow

@@ -184,26 +184,35 @@ class ManeuverNode:
     def _take_request(self, obey: Callable[[Answer], None], answer: Answer) -> None:
         """Execute a request, or answer with the reason why not."""
         try:
-            if self._planning is not None:
-                raise SpecError("a maneuver is being planned; wait for it")
             obey(answer)
         except SpecError as error:
             answer(False, str(error))
 
     def _take_off(self, answer: Answer) -> None:
         self.commander.take_off(self._now, self.settings.takeoff_height)
+        self._give_up_planning("takeoff was called")
         answer(True, f"climbing by {self.settings.takeoff_height:g} m")
 
     def _hold(self, answer: Answer) -> None:
+        self._give_up_planning("hold was called")
         self.commander.hover(self._now)
         answer(True, str(Doing.BRAKING))
 
     def _land(self, answer: Answer) -> None:
+        self._give_up_planning("land was called")
         self.commander.land(self._now)
         answer(True, str(Doing.LANDING))
 
+    def _give_up_planning(self, reason: str) -> None:
+        """Answer the request of a maneuver that is being planned, if there is one: it will not begin."""
+        if self._planning is not None:
+            (_, waiting), self._planning = self._planning, None
+            waiting(False, f"the maneuver is given up: {reason}")
+
     def _plan(self, name: str, answer: Answer) -> None:
         """Have a maneuver planned from where the vehicle hovers."""
+        if self._planning is not None:
+            raise SpecError("a maneuver is being planned; wait for it")
         observed = self.commander.require_hover(self._now)
         problem, planner = self._maneuvers[name]
         request = ManeuverRequest(
