@@ -144,6 +144,18 @@ def test_an_interrupted_map_goes_on_where_it_stopped(tmp_path: Path) -> None:
         ab.feasibility_map("line", over, planner="min-snap", workers=1, keep=kept, progress=interrupt)
     whole = ab.feasibility_map("line", over, planner="min-snap", workers=1)
     assert ab.feasibility_map("line", over, planner="min-snap", keep=kept, executor=Interrupted(1)) == whole
+    # all is kept by now: nothing is planned any more, and the kept cells count as progress
+    told: list[tuple[int, int]] = []
+    again = ab.feasibility_map(
+        "line",
+        over,
+        planner="min-snap",
+        keep=kept,
+        executor=Interrupted(0),
+        progress=lambda done, planned: told.append((done, planned)),
+    )
+    assert again == whole
+    assert told == [(1, 1), (2, 1), (3, 2), (4, 2)]
     with pytest.raises(ab.SpecError, match=r"keeps cells of another map \(planner\); remove it"):
         ab.feasibility_map("line", over, planner="free-knots", workers=1, keep=kept)
     for file in kept.glob("*.npz"):

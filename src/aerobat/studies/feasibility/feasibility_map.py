@@ -235,15 +235,25 @@ def feasibility_map(
     task = ProbedTask(scenario, fields, time_limit, range(flights), seed)
     places = list(product(*(axis.values for axis in axes)))
     kept = KeptParts.of(keep, ("cells", "map"), lambda: _inputs_summary(axes, task))
-    known = {place: Cell.of(place, kept.read(_name(place))) for place in places}
-    cells = {place: cell for place, cell in known.items() if cell is not None}
-    missing = [place for place in places if place not in cells]
+    cells: dict[tuple[float, ...], Cell] = {}
+    planned = 0
+
+    def take(values: tuple[float, ...], cell: Cell) -> None:
+        nonlocal planned
+        cells[values] = cell
+        planned += cell.is_planned
+        if progress is not None:
+            progress(len(cells), planned)
+
+    for values in places:
+        known = Cell.of(values, kept.read(_name(values)))
+        if known is not None:
+            take(values, known)
+    missing = [values for values in places if values not in cells]
     with pool(workers, executor, len(missing)) as planning:
         for values, cell in planning.results(_cell, task, missing):
-            cells[values] = cell
             kept.write(_name(values), cell.arrays)
-            if progress is not None:
-                progress(len(cells), sum(cell.is_planned for cell in cells.values()))
+            take(values, cell)
     axes = tuple(replace(axis, unit=field.unit) for axis, field in zip(axes, fields, strict=True))
     found = tuple(cells[values] for values in places)
     return FeasibilityMap(scenario.problem, scenario.vehicle, axes, found)
