@@ -18,7 +18,7 @@ from aerobat.interchange import column_groups, read_csv, read_rows, write_column
 from aerobat.interchange.columns import ALL
 from aerobat.planning import Miqp, Plan
 from aerobat.simulation import load_flight
-from aerobat.trajectory import Trajectory
+from aerobat.trajectory import Trajectory, save_trajectory
 from command_lines import code, without_pictures
 from shared_plans import shared_plan
 from suites import examples
@@ -193,6 +193,22 @@ def test_options_and_paths_that_do_not_fit_are_refused(
     Path("wild.csv").write_text("t,x,y,z\n0,0,0,1\n1,1,0,1e30\n2,1,0,1\n3,1,0,1\n4,1,0,1\n")
     assert code("fly", *arguments) == 2
     assert capsys.readouterr().err.count("\n") == 1
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("command", ["check", "fly"])
+@pytest.mark.parametrize("file", ["kept/line.plan", "kept", "path.npz"])
+def test_a_rate_of_rows_is_refused_of_files_without_rows(
+    command: str, file: str, tmp_path: Path, monkeypatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    without_pictures(monkeypatch)
+    Path("kept").mkdir()
+    plan = shared_plan("line")
+    plan.save("kept/line.plan")
+    save_trajectory(plan.trajectory, "path.npz")
+    assert code(command, file, "--rate", "50") == 2
+    assert "--rate is for a CSV file, not for " in capsys.readouterr().err
     assert not Path("out").exists()
 
 

@@ -35,8 +35,8 @@ class CheckOptions(VehicleOptions):
     """The heading at the start in degrees, carried along the path without spin. Default: the plan's
     own, of a CSV file that of its first attitude, or 0."""
 
-    rate: Annotated[float, Parameter(group=limiting, validator=POSITIVE)] = 100.0
-    """Rows a second of a CSV file without times."""
+    rate: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
+    """Rows a second of a CSV file without times. Default: 100."""
 
     max_speed: Annotated[float | None, Parameter(group=limiting, validator=POSITIVE)] = None
     """The greatest speed allowed, m/s."""

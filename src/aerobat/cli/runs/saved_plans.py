@@ -22,6 +22,7 @@ from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle, implausibilities, load_vehicle
 
 MADE_BY = "file"  # instead of a planner's name
+USUAL_RATE = 100.0  # [1/s] of the rows of a CSV file without times
 
 
 def plan_source(name: str) -> Path | None:
@@ -39,12 +40,11 @@ def read_saved_plan(path: Path, options: PlanningOptions) -> Plan:
     for flag in ("--planner", "--paper", "--angle", *offered_options()):
         if is_given(getattr(options, option_name(flag), None)):
             raise SpecError(f"{flag} plans anew, but {path} is a plan; leave it out, or name a problem")
-    found, facts = read_source(path, options.rate or 100.0)
+    found, facts = read_source(path, options.rate)
     if isinstance(found, Trajectory):
         return _plan_of_path(path, found, facts, options)
-    for name in ("rate", "heading"):
-        if is_given(getattr(options, name)):
-            raise SpecError(f"--{name} is for a CSV file, but {path} is a whole plan; leave it out")
+    if options.heading is not None:
+        raise SpecError(f"--heading is for a CSV file, but {path} is a whole plan; leave it out")
     if options.vehicle is not None or found.vehicle is None:
         return found.for_vehicle(named_vehicle(options.vehicle or default_vehicle()))
     return found
@@ -68,14 +68,17 @@ def named_environment(name: str | None) -> Environment:
     return whole_plan(path, "name a problem or a .plan file, which have an environment").problem.environment
 
 
-def read_source(path: Path, rate: float) -> tuple[Plan | Trajectory, list[str]]:
+def read_source(path: Path, rate: float | None) -> tuple[Plan | Trajectory, list[str]]:
     """Return the plan or path in a file or folder, and what reading a CSV file assumed, in words.
 
     Args:
         path: The file or folder.
-        rate: Rows a second [1/s] of a CSV file without times.
+        rate: Rows a second [1/s] of a CSV file without times, None for 100. Other files take none.
     """
     path = plan_file(path)
+    if rate is not None and path.suffix in (".plan", ".npz"):
+        raise SpecError(f"--rate is for a CSV file, not for {path}; leave it out")
+    rate = USUAL_RATE if rate is None else rate
     if path.suffix != ".csv":
         return read_plan(path, rate), []
     rows = read_rows(path, rate)
