@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange import column_groups, read_csv, read_rows, write_columns, write_csv
-from aerobat.interchange.columns import ALL
+from aerobat.interchange.columns import ALL, PAPER
 from aerobat.planning import Miqp, Plan
 from aerobat.simulation import load_flight
 from aerobat.trajectory import Trajectory, save_trajectory
@@ -194,6 +194,20 @@ def test_options_and_paths_that_do_not_fit_are_refused(
     assert code("fly", *arguments) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("columns", [ALL, PAPER])
+def test_a_rate_is_asked_to_be_higher_only_where_the_rows_have_no_times(
+    columns: tuple[str, ...], line: Plan, tmp_path: Path
+) -> None:
+    timed, bare = tmp_path / "timed.csv", tmp_path / "bare.csv"
+    write_columns(line, timed, columns)
+    assert read_csv(timed, 1e-9).duration == line.duration  # the file's own times count, whatever the rate
+    rows = [text.split(",") for text in timed.read_text().splitlines()]
+    parts = slice(12) if columns == PAPER else slice(1, None)
+    bare.write_text("".join(",".join(row[parts]) + "\n" for row in rows))
+    with pytest.raises(SpecError, match=r"bare\.csv: rate is too low: \d+ rows at 1e-09 a second last more"):
+        read_csv(bare, 1e-9)
 
 
 @pytest.mark.parametrize("command", ["check", "fly"])

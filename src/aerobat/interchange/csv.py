@@ -21,11 +21,11 @@ from aerobat.interchange.rows import (
     number_table,
     require_numbers,
     rows_of_columns,
+    times_at_rate,
 )
 from aerobat.interchange.tables import csv_text
 from aerobat.storage import read_whole, write_whole
 from aerobat.trajectory import Carrier, Trajectory, as_trajectory
-from aerobat.trajectory.piecewise import MAX_DURATION
 
 CSV_COLUMNS = 12
 MAX_CSV = 2**27  # bytes: an hour and a half at 100 Hz
@@ -62,8 +62,6 @@ def read_csv(path: PathName, rate: Positive = 100.0) -> Trajectory:
 def read_rows(path: PathName, rate: Positive = 100.0) -> PathRows:
     """Return the rows of which `read_csv` makes a trajectory. Raises SpecError as `read_csv` does."""
     text = _text(Path(path))
-    if not text.count("\n") / rate <= MAX_DURATION:
-        raise SpecError(f"rate must make it {MAX_DURATION:g} s at most, got {rate:g} rows a second")
     try:
         rows = rows_of_columns(text, rate) if has_header(text) else _bare_rows(text, rate)
         _ = rows.trajectory
@@ -76,7 +74,7 @@ def _bare_rows(text: str, rate: float) -> PathRows:
     require_numbers(text)
     expected = f"a path's have {CSV_COLUMNS}, or {CSV_COLUMNS + 1} with a time"
     rows = number_table(text, 1, (CSV_COLUMNS, CSV_COLUMNS + 1), expected)
-    times = rows[:, CSV_COLUMNS] if rows.shape[1] > CSV_COLUMNS else np.arange(len(rows)) / rate
+    times = rows[:, CSV_COLUMNS] if rows.shape[1] > CSV_COLUMNS else times_at_rate(len(rows), rate)
     steps = np.diff(times)
     if times[0] != 0 or not (steps > 0).all():
         line = 1 if times[0] != 0 else 2 + int(np.argmax(steps <= 0))

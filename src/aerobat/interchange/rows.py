@@ -16,6 +16,7 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
+from aerobat.trajectory.piecewise import MAX_DURATION
 from aerobat.trajectory.polynomial import hermite
 
 NAMES: Mapping[str, tuple[str, ...]] = {  # of columns, by groups
@@ -194,7 +195,7 @@ def rows_of_columns(text: str, rate: float) -> PathRows:
     """
     columns = named_columns(text, NAMES["position"], "a path needs x, y and z [m], and t [s]")
     rows = len(columns["x"])
-    times = columns["t"] if "t" in columns else np.arange(rows) / rate
+    times = columns["t"] if "t" in columns else times_at_rate(rows, rate)
     steps = np.diff(times)
     if not (steps > 0).all():
         raise SpecError(f"line {3 + int(np.argmin(steps > 0))}: times, the column t, must rise")
@@ -203,6 +204,15 @@ def rows_of_columns(text: str, rate: float) -> PathRows:
         if all(name in columns for name in NAMES[group]):
             knots[:, derivative] = np.stack([columns[name] for name in NAMES[group]], axis=1)
     return PathRows(knots, steps, _first_attitude(columns), tuple(_unused(columns)))
+
+
+def times_at_rate(rows: int, rate: float) -> Array:
+    """Return the times [s] of rows at a rate [1/s]. Raises SpecError where they last too long for a path."""
+    if not rows / rate <= MAX_DURATION:
+        raise SpecError(
+            f"rate is too low: {rows} rows at {rate:g} a second last more than {MAX_DURATION:g} s; raise it"
+        )
+    return np.arange(rows) / rate
 
 
 def _unused(columns: Mapping[str, Array]) -> Iterator[str]:
