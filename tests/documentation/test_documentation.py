@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import aerobat as ab
+from aerobat.reporting.report import PAGE
 from places import ROOT, TESTS
 
 GENERATED = ROOT / "docs" / "generated"  # by a build of the site
@@ -117,6 +118,26 @@ def test_links_lead_somewhere(page: Path) -> None:
         if heading:
             headings = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)
             assert heading in map(anchor, headings), link
+
+
+def labels_of_reports() -> set[str]:
+    """The labels of lines in the facts of plans, flights and runs, as their source gives them."""
+    found = set()
+    for module in ("report", "plans", "flights"):
+        source = (ROOT / "src" / "aerobat" / "reporting" / f"{module}.py").read_text(encoding="utf-8")
+        for call in (each for each in ast.walk(ast.parse(source)) if isinstance(each, ast.Call)):
+            place = {"line": 0, "Fact": 2}.get(getattr(call.func, "id", ""), len(call.args))
+            if place < len(call.args) and isinstance(call.args[place], ast.Constant):
+                found.add(call.args[place].value)
+    return found - {"", "plan", "findings", "flights"}  # a heading, and tables
+
+
+def test_the_page_of_reports_explains_every_line_of_theirs() -> None:
+    found = labels_of_reports()
+    assert {"margin", "flyability", "rescue", "limited by", "position error", "conditions"} <= found
+    rows = re.findall(r"^\| (.*?) \|", (ROOT / PAGE).read_text(encoding="utf-8"), re.MULTILINE)
+    explained = {label for row in rows for label in re.findall(r"`([^`]+)`", row)}
+    assert found <= explained
 
 
 def test_tests_that_pages_name_as_evidence_are_there() -> None:

@@ -12,27 +12,7 @@ from aerobat.simulation.outcome import counted
 from aerobat.studies.share import Trials
 from aerobat.vehicle import implausibilities
 
-PAGES = {  # that explain the lines of a report, by their labels
-    "docs/theory.md": (
-        "planner",
-        "search",
-        "starts",
-        "cost",
-        "nodes",
-        "stages",
-        "laps",
-        "rotors",
-        "saturated",
-    ),
-    "docs/how-to/certificate.md": ("limited by", "not proven", "proof"),
-    "docs/theory.md#13-what-is-possible": ("duration", "possible"),
-    "docs/sweeps.md": ("margin", "flyability", "conditions", "tolerance", "tube"),
-    "docs/vehicles.md#the-way-back-from-every-instant": ("recovery",),
-    "docs/courses.md": ("gate", "gates", "waypoints", "lap times"),
-    "docs/how-to/inspect.md": ("flight", "position error", "attitude error"),
-    "docs/how-to/controllers.md": ("controller",),
-    "docs/how-to/plants.md": ("plant",),
-}
+PAGE = "docs/report.md"  # explains every line of a report, and its words
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +47,7 @@ def _(report: Report) -> Iterator[Fact]:
         yield Fact("flight", Facts((*facts(report.score), *known)), "flight")
     if trials is not None:
         yield _of_trials(trials)
-    for page, labels in PAGES.items():
-        yield line("", f"{page}: {', '.join(labels)}")
+    yield line("", f"{PAGE} explains every line")
 
 
 def _of_trials(trials: Trials) -> Fact:
