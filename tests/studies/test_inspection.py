@@ -77,6 +77,12 @@ def with_its_battery_moved(plan: ab.Plan, seed: int) -> ab.Flight:
     return ab.fly(plan, replace(plan.vehicle, rotors=moved), nominal=plan.vehicle)
 
 
+def with_more_inertia(plan: ab.Plan, seed: int) -> ab.Flight:
+    assert plan.vehicle is not None
+    heavy = replace(plan.vehicle, inertia=(1.25 + 0.25 * seed) * plan.vehicle.inertia)
+    return ab.fly(plan, heavy, nominal=plan.vehicle)
+
+
 def with_weak_gains(plan: ab.Plan, seed: int) -> ab.Flight:
     frequency = (12.0, 14.0, 16.0)[seed % 3]
     weak = ab.Controller(attitude_frequency=frequency, moment_feedforward=False)
@@ -92,6 +98,7 @@ PLANTED: dict[str, Callable[[ab.Plan, int], ab.Flight]] = {
     "lag": with_slow_rotors,
     "thrust": with_an_empty_battery,
     "balance": with_its_battery_moved,
+    "inertia": with_more_inertia,
     "gains": with_weak_gains,
 }
 

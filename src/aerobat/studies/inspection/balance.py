@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from aerobat import so3
+from aerobat.arrays import Array
 from aerobat.simulation import Flight
+from aerobat.studies.inspection.disturbances import between_rows
 from aerobat.studies.inspection.result import Fault
 from aerobat.vehicle import Vehicle
 
@@ -21,11 +23,9 @@ _MIN_EXPLAINED = (
 
 def balance_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
     """Return the offset of the centre of mass that a log shows, None where it shows none."""
-    omega, thrusts = (0.5 * (each[1:] + each[:-1]) for each in (flight.omega_body, flight.thrusts))
-    turned = np.diff(flight.omega_body, axis=0) / np.diff(flight.times)[:, None] @ vehicle.inertia
-    moment = turned + so3.cross(omega, omega @ vehicle.inertia)
-    roll, pitch, _ = (moment - thrusts @ vehicle.allocation[1:].T).T
-    missing, collective = np.stack([pitch, -roll]), thrusts.sum(axis=1)
+    needed, given = moments_between_rows(flight, vehicle)
+    roll, pitch, _ = (needed - given).T
+    missing, collective = np.stack([pitch, -roll]), between_rows(flight.thrusts).sum(axis=1)
     place = missing @ collective / np.sum(collective**2)
     rest = np.sum((missing - place[:, None] * collective) ** 2)
     arm = max(np.hypot(*rotor.position_body[:2]) for rotor in vehicle.rotors)
@@ -33,3 +33,11 @@ def balance_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
         return None
     ahead, left = (1e3 * each for each in place)
     return Fault("balance", f"the centre of mass is off by {ahead:.1f} mm in x and {left:.1f} mm in y")
+
+
+def moments_between_rows(flight: Flight, vehicle: Vehicle) -> tuple[Array, Array]:
+    """Return the moments [N·m] that turn the planned inertia as logged, and the rotors', (T − 1, 3)."""
+    omega = between_rows(flight.omega_body)
+    turned = np.diff(flight.omega_body, axis=0) / np.diff(flight.times)[:, None] @ vehicle.inertia
+    needed = turned + so3.cross(omega, omega @ vehicle.inertia)
+    return needed, between_rows(flight.thrusts) @ vehicle.allocation[1:].T

@@ -54,7 +54,7 @@ class PositionLoop:
 
     def feedback(self, times: Array, error: Array, rate: Array) -> Array:
         """Return the feedback [m/s²] to errors [m] and their rates [m/s], (T, 3)."""
-        steps = np.diff(times)[:, None] * _between(error)
+        steps = np.diff(times)[:, None] * between_rows(error)
         integral = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
         return -(self.position * error + self.velocity * rate + self.integral * integral)
 
@@ -95,9 +95,9 @@ def disturbances(flight: Flight, vehicle: Vehicle, loop: PositionLoop) -> Distur
     off = flight.velocity - flight.setpoint_velocity
     moved = np.diff(off, axis=0) / np.diff(flight.times)[:, None]
     return Disturbances(
-        observer=_between(seen - true),
-        vehicle=moved - _between(lift),
-        missing=_between(lift - seen),
+        observer=between_rows(seen - true),
+        vehicle=moved - between_rows(lift),
+        missing=between_rows(lift - seen),
         kinds=_kinds(flight, vehicle, loop.recovery),
     )
 
@@ -172,5 +172,6 @@ def _infeasible_setpoints(flight: Flight, vehicle: Vehicle) -> Array:
     return np.asarray(outside.any(axis=-1))
 
 
-def _between(values: Array) -> Array:
+def between_rows(values: Array) -> Array:
+    """Return the means of values in successive rows, (T − 1, ...)."""
     return np.asarray(0.5 * (values[1:] + values[:-1]))

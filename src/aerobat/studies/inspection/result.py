@@ -58,6 +58,10 @@ CAUSES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "a centre of mass other than planned for, or rotors that pull unevenly",
             "balance the vehicle, or set `centre_of_mass`, and plan and configure anew",
         ),
+        "inertia": (
+            "an inertia other than planned for",
+            "measure it, as with a bifilar pendulum, set `inertia`, and plan and configure anew",
+        ),
     }
 )
 UNOBSERVED = (  # of a log without the observer's state, in place of a delay
@@ -68,7 +72,7 @@ UNOBSERVED = (  # of a log without the observer's state, in place of a delay
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of a flight controller's inner loop or of rotors, which a log shows, whatever its effect."""
+    """A fault of a flight controller's inner loop, of rotors or of the body, which a log shows."""
 
     cause: str  # a key of CAUSES
     evidence: str  # a sentence with its numbers
@@ -111,7 +115,7 @@ class Inspection:
     saturated: float  # [-] fraction of rows with a saturated rotor
     observed: bool  # false where the log lacks the observer's state
     alignment: Alignment
-    fault: Fault | None = None  # of the inner loop or of rotors, whatever its effect
+    fault: Fault | None = None  # of the inner loop, of rotors or of the body, whatever its effect
 
     def __post_init__(self) -> None:
         """Write-protect the arrays."""
