@@ -30,7 +30,7 @@ class StoredTypes:
     store: Any  # of types, a Typestore of `rosbags`
 
     def __call__(self, kind: str, /, **given: Any) -> Any:
-        """See `Make.__call__`."""
+        """Return a message of a kind; fields that are not given are zero, empty or false."""
         fields = dict(self.store.fielddefs[kind][1])
         return self.store.types[kind](
             **{name: given[name] if name in given else self._blank(node) for name, node in fields.items()}
@@ -71,23 +71,22 @@ ros2_bag = partial(_bag, "ros2")
 mcap = partial(_bag, "mcap")
 
 
-def _write_ros1(store: Any, messages: Sequence[Stamped], path: Path) -> Mapping[str, bytes]:
+def _write_ros1(store: Any, messages: Sequence[Stamped], path: Path) -> tuple[bytes, ...]:
     from rosbags.rosbag1 import Writer
 
     with Writer(path) as bag:
         _fill(bag, store, store.serialize_ros1, messages)
-    return {f"{NAME}.bag": path.read_bytes()}
+    return (path.read_bytes(),)
 
 
-def _write_ros2(container: str, store: Any, messages: Sequence[Stamped], path: Path) -> Mapping[str, bytes]:
+def _write_ros2(container: str, store: Any, messages: Sequence[Stamped], path: Path) -> tuple[bytes, ...]:
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     plugin = StoragePlugin.MCAP if container == "mcap" else StoragePlugin.SQLITE3
     with Writer(path, version=Writer.VERSION_LATEST, storage_plugin=plugin) as bag:
         _fill(bag, store, store.serialize_cdr, messages)
-    if container == "mcap":
-        return {f"{NAME}.mcap": (path / f"{NAME}.mcap").read_bytes()}
-    return {name: (path / name).read_bytes() for name in ROS2_BAG}
+    names = (f"{NAME}.mcap",) if container == "mcap" else ROS2_BAG
+    return tuple((path / name).read_bytes() for name in names)
 
 
 def _fill(bag: Any, store: Any, serialize: Callable[[Any, str], Any], messages: Sequence[Stamped]) -> None:

@@ -33,7 +33,7 @@ Pieces: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.void]]"  # of the type P
 def crazyflie_pieces(plan: Plan, rate: float) -> Content:
     """Return the pieces as bytes and as CSV, see `fitted_pieces`; there are no rows, so `rate` is ignored."""
     pieces, loss = fitted_pieces(plan)
-    return Content(dict(zip(PIECES, (pieces.tobytes(), _csv(pieces)), strict=True)), loss)
+    return Content((pieces.tobytes(), _csv(pieces)), loss)
 
 
 def fitted_pieces(plan: Plan) -> tuple[Pieces, Loss]:

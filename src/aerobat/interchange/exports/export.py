@@ -35,7 +35,7 @@ class Format:
 def _table(plan: Plan, rate: float) -> Content:
     """Return all columns, as in a run's plan.csv. The plan between rows is lost."""
     rows = ExportRows.of(reference(plan, rate=rate))
-    return Content({"plan.csv": columns_text(plan, ALL, rate).encode()}, rows.loss(plan))
+    return Content((columns_text(plan, ALL, rate).encode(),), rows.loss(plan))
 
 
 FORMATS: Mapping[str, Format] = {
@@ -94,12 +94,12 @@ def export(plan: Plan, path: PathName, to: str, rate: Positive | None = None) ->
     _require_place(target, to, form)
     content = form.content(plan, rate or form.rate or 0.0)
     if form.suffix:
-        (made,) = content.files.values()
+        (made,) = content.files
         write_whole(target, made)
         return Export(to, (target,), content.loss)
     with whole_folder(target, form.files.__contains__) as folder:
-        for name in form.files:
-            (folder / name).write_bytes(content.files[name])
+        for name, made in zip(form.files, content.files, strict=True):
+            (folder / name).write_bytes(made)
     return Export(to, tuple(target / name for name in form.files), content.loss)
 
 

@@ -70,7 +70,7 @@ def blender_scene(plan: Plan, rate: float) -> Content:
     scene.animate(vehicle, times, {"translation": _y_up(position), "rotation": rotation})
     rows = ExportRows(found.times, position.astype(float), None, so3.normalize(q))
     loss = replace(rows.loss(plan), obstacles=flattened(plan))
-    return Content({f"{plan.problem.name}.glb": scene.binary(plan.problem.name)}, loss)
+    return Content((scene.binary(plan.problem.name),), loss)
 
 
 @dataclass

@@ -8,7 +8,6 @@ Between two of these, their difference is bounded by the angle that they turn.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import degrees, factorial
 
@@ -65,9 +64,9 @@ class Loss:
 
 @dataclass(frozen=True)
 class Content:
-    """Files made of a plan, by their names, before they are written, and their loss."""
+    """Files made of a plan, in the order of the format's names, before they are written, and their loss."""
 
-    files: Mapping[str, bytes]
+    files: tuple[bytes, ...]
     loss: Loss
 
 

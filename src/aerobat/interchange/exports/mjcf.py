@@ -51,7 +51,7 @@ def mujoco_scene(plan: Plan, rate: float) -> Content:
     indent(root)
     without = "the vehicle's drag" if vehicle.drag_body.any() else ""
     loss = replace(ExportRows.of(found).loss(plan), without=without)
-    return Content({"plan.xml": tostring(root, encoding="utf-8")}, loss)
+    return Content((tostring(root, encoding="utf-8"),), loss)
 
 
 def _commands(plan: Plan, vehicle: Vehicle, found: Reference) -> Array:

@@ -72,7 +72,7 @@ def px4_setpoints(plan: Plan, rate: float) -> Content:
         so3.multiply(so3.conjugate(NED_ENU), so3.normalize(q_d)), so3.conjugate(FLU_FRD)
     )
     rows = ExportRows(found.times, ned(position), ned(velocity), q_world_body)
-    files = {name: _table(timestamps, HEADERS[name], columns[name]) for name in SETPOINTS}
+    files = tuple(_table(timestamps, HEADERS[name], columns[name]) for name in SETPOINTS)
     return Content(files, rows.loss(plan, held=True))
 
 
