@@ -94,6 +94,14 @@ def test_a_saved_plan_that_was_flown_is_flown_again_not_planned(capsys) -> None:
     assert "the same as" in capsys.readouterr().err
 
 
+def test_a_saved_plan_that_was_flown_with_a_plugin_is_recorded_with_it(capsys) -> None:
+    shared_plan("line").save("line.plan")
+    Path("mine.py").write_text("")
+    assert code("fly", "line.plan", "--import", "mine.py", "--out", "flown") == 0
+    assert read_record(Path("flown")).plugins == ("mine.py",)
+    assert "`aerobat sweep flown --import mine.py` counts more flights" in capsys.readouterr().out
+
+
 def test_what_is_planned_anew_from_a_folder_alone_is_the_same_bit_by_bit(kept: Path, capsys) -> None:
     assert code("repeat", kept, "--out", "again") == 0
     assert capsys.readouterr().err == f"aerobat: the same as in {kept}/, bit for bit\n"

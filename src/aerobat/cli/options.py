@@ -61,6 +61,11 @@ class PluginOptions:
     """A Python file that registers maneuvers, planners or control laws of your own; may be given several
     times."""
 
+    @property
+    def plugin_names(self) -> tuple[str, ...]:
+        """The files of plugins as a run's record names them."""
+        return tuple(map(str, self.plugins))
+
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions(PluginOptions):

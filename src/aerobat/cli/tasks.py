@@ -82,6 +82,7 @@ def read_run(
             source=name,
             flight=flight,
             columns=columns,
+            plugins=options.plugin_names,
         )
         return record, saved
     for flag, value in (("--rate", options.rate), ("--heading", options.heading)):
@@ -97,7 +98,7 @@ def read_run(
         angle=options.angle,
         flight=flight,
         columns=columns,
-        plugins=tuple(map(str, options.plugins)),
+        plugins=options.plugin_names,
     )
     return record, None
 

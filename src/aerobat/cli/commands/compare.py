@@ -48,7 +48,7 @@ def compare(problem: str, options: CompareOptions = CompareOptions()) -> None:
         vehicle=vehicle,
         angle=options.angle,
         time_limit=options.time_limit,
-        plugins=tuple(map(str, options.plugins)),
+        plugins=options.plugin_names,
     )
     run_comparison(record, options, options.workers)
 

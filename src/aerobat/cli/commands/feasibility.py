@@ -97,7 +97,7 @@ def feasibility(problem: str, options: FeasibilityOptions = FeasibilityOptions()
         over=options.over,
         of=options.least or None,
         tolerance=options.tolerance,
-        plugins=tuple(map(str, options.plugins)),
+        plugins=options.plugin_names,
     )
     require_replaceable(options.out or record.folder, is_of_a_run)  # before minutes of planning
     run_study = run_map if options.over else run_need
