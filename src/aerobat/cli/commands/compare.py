@@ -54,13 +54,7 @@ def compare(problem: str, options: CompareOptions = CompareOptions()) -> None:
 
 
 def run_comparison(record: RunRecord, options: OutputOptions, workers: str = "1") -> None:
-    """Compare all planners on a run's problem, write the comparison, then show it.
-
-    Args:
-        record: What is planned.
-        options: Where to write, and in what form to say it.
-        workers: Who plans.
-    """
+    """Compare all planners on a run's problem, write the comparison, then show it."""
     with showing(PlanningProgress()) as progress:
         comparison = compare_planners(
             record.problem,

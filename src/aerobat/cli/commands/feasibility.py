@@ -105,43 +105,31 @@ def feasibility(problem: str, options: FeasibilityOptions = FeasibilityOptions()
 
 
 def run_map(record: RunRecord, options: OutputOptions, workers: str | None = None) -> None:
-    """Make the map of a run, write it, then show it; finished cells are kept beside its folder until then.
-
-    Args:
-        record: What is planned, and how.
-        options: Where to write, and in what form to say it.
-        workers: Who plans.
-    """
+    """Make the map of a run, write it, then show it; finished cells are kept beside its folder until then."""
     axes = [Axis.parse(text) for text in record.over]
     over = {axis.name: axis.values for axis in axes}
     if len(over) < len(axes):
         raise SpecError(f"--over names {axes[0].name} twice; give another field, or drop one")
     count = prod(len(axis.values) for axis in axes)
-    unfinished = Unfinished.beside(options.out or record.folder)
-    with unfinished.kept("cells", count, finished_cells), showing(Progress("cells", count)) as progress:
-        found = feasibility_map(
-            record.problem,
-            over,
-            record.vehicle,
-            record.planner,
-            time_limit=TIME_LIMIT if record.time_limit is None else record.time_limit,
-            workers=workers,
-            keep=unfinished.parts,
-            progress=progress.counting("planned"),
-        )
     name = f"map.{record.flight.table}"
-    finish_study(found, record, options, lambda staging: write_table(found.table, staging / name))
-    unfinished.remove()
+    unfinished = Unfinished.beside(options.out or record.folder)
+    with unfinished.kept("cells", count, finished_cells):
+        with showing(Progress("cells", count)) as progress:
+            found = feasibility_map(
+                record.problem,
+                over,
+                record.vehicle,
+                record.planner,
+                time_limit=TIME_LIMIT if record.time_limit is None else record.time_limit,
+                workers=workers,
+                keep=unfinished.parts,
+                progress=progress.counting("planned"),
+            )
+        finish_study(found, record, options, lambda staging: write_table(found.table, staging / name))
 
 
 def run_need(record: RunRecord, options: OutputOptions, workers: str | None = None) -> None:
-    """Find the least that a run asks for, write it with its plans, then show it.
-
-    Args:
-        record: What is planned, and how.
-        options: Where to write, and in what form to say it.
-        workers: Who plans.
-    """
+    """Find the least that a run asks for, write it with its plans, then show it."""
     with showing(Progress("plans tried")) as progress:
 
         def note(quantity: str, value: float, planned: bool) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -26,6 +26,12 @@ from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_table
 from aerobat.planning import Plan
 from aerobat.simulation import Flight, load_flight
+
+STUDIES: Mapping[str, Callable[[RunRecord, OutputOptions], None]] = {  # by commands; a sweep needs its plan
+    "compare": run_comparison,
+    "map": run_map,
+    "need": run_need,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,16 +76,11 @@ def repeat(folder: Path, options: RepeatOptions = RepeatOptions()) -> ExitCode:
 
 def _run_study(folder: Path, record: RunRecord, options: RepeatOptions) -> None:
     """Do the study in a folder again."""
-    match record.command:
-        case "compare":
-            run_comparison(record, options)
-        case "map":
-            run_map(record, options)
-        case "need":
-            run_need(record, options)
-        case "sweep":
-            plan = _Run.read(folder, record).plan if record.planner is None else plan_of(record)
-            run_sweep(plan, record, options)
+    if record.command in STUDIES:
+        STUDIES[record.command](record, options)
+    else:
+        plan = _Run.read(folder, record).plan if record.planner is None else plan_of(record)
+        run_sweep(plan, record, options)
 
 
 def _results(folder: Path, record: RunRecord) -> Mapping[str, Any]:

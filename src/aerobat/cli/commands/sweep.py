@@ -113,23 +113,22 @@ def run_sweep(plan: Plan, record: RunRecord, options: OutputOptions, workers: st
     flight = record.flight
     assert flight.conditions is not None, "a sweep has conditions"
     unfinished = Unfinished.beside(options.out or record.folder)
-    keeping = unfinished.kept("flights", flight.runs, finished_flights)
-    with keeping, showing(Progress("flown", flight.runs)) as progress:
-        swept = sweep_plan(
-            plan,
-            flight.conditions,
-            flight.runs,
-            flight.seed,
-            vehicle=record.vehicle,
-            controller=named_controller(flight.controller, record.vehicle.controller),
-            workers=workers,
-            keep=unfinished.parts,
-            progress=progress.counting("went well"),
-        )
+    with unfinished.kept("flights", flight.runs, finished_flights):
+        with showing(Progress("flown", flight.runs)) as progress:
+            swept = sweep_plan(
+                plan,
+                flight.conditions,
+                flight.runs,
+                flight.seed,
+                vehicle=record.vehicle,
+                controller=named_controller(flight.controller, record.vehicle.controller),
+                workers=workers,
+                keep=unfinished.parts,
+                progress=progress.counting("went well"),
+            )
 
-    def write_others(staging: Path) -> None:
-        swept.plan.save(staging / f"{swept.plan.problem.name}.plan")
-        write_table(swept.table, staging / f"flights.{flight.table}")
+        def write_others(staging: Path) -> None:
+            swept.plan.save(staging / f"{swept.plan.problem.name}.plan")
+            write_table(swept.table, staging / f"flights.{flight.table}")
 
-    finish_study(swept, record, options, write_others)
-    unfinished.remove()
+        finish_study(swept, record, options, write_others)

@@ -14,7 +14,7 @@ from aerobat.studies.workers import WorkerEnded
 
 @dataclass(frozen=True)
 class Unfinished:
-    """The folder of a study until its results are written."""
+    """The folder that an unfinished study keeps beside the one that its results will be written to."""
 
     folder: Path
 
@@ -30,7 +30,7 @@ class Unfinished:
 
     @contextmanager
     def kept(self, what: str, count: int, finished: Callable[[Path], int]) -> Iterator[None]:
-        """Report the kept parts of a study that ends early in the block; without any, remove the folder.
+        """Remove the folder after the block; if that ends early, report the kept parts, if there are any.
 
         Args:
             what: The name of the parts.
@@ -42,11 +42,11 @@ class Unfinished:
         except BaseException as error:
             done = finished(self.parts)
             if not done:
-                self.remove()
+                self._remove()
             elif isinstance(error, KeyboardInterrupt | WorkerEnded):
                 say(f"{done} of {count} {what} are kept: the same command goes on from there")
             raise
+        self._remove()
 
-    def remove(self) -> None:
-        """Remove the folder."""
+    def _remove(self) -> None:
         shutil.rmtree(self.folder, ignore_errors=True)
