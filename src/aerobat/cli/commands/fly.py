@@ -54,28 +54,27 @@ def fly(
 
 def flown(plan: Plan, settings: FlightSettings) -> Flown:
     """The flight of a plan, and its score."""
-    assert plan.vehicle is not None, "a command plans for a vehicle"
-    controller = named_controller(settings.controller, plan.vehicle.controller)
+    vehicle = plan.vehicle
+    assert vehicle is not None, "a command plans for a vehicle"
+    controller = named_controller(settings.controller, vehicle.controller)
     autopilot = AUTOPILOTS.instance(settings.autopilot)
     given = settings.conditions, settings.plant, settings.autopilot
-    is_nominal = given == (None, None, None) and controller == plan.vehicle.controller
-    if is_nominal:  # the flight that the plan was judged by
-        flight = nominal_flight(plan.trajectory, plan.vehicle, plan.problem.surroundings)
-        return Flown(flight, score(flight, plan, plan.vehicle), settings.controller, settings.plant)
-    with TemporaryDirectory() as folder:
-        log = Path(folder) / BLACKBOX
-        flight = simulate(
-            plan,
-            controller=controller,
-            conditions=settings.conditions,
-            seed=settings.seed,
-            plant=settings.plant,
-            autopilot=None if autopilot is None else autopilot.logging_to(str(log)),
-        )
-        own_log = log.read_bytes() if log.exists() else b""
-    judged = score(flight, plan, plan.vehicle)
-    if autopilot is None:
-        return Flown(flight, judged, settings.controller, settings.plant)
-    by = f"{settings.controller} on {settings.autopilot}"
-    peak = float(np.abs(flight.setpoint.omega_body).max())
-    return Flown(flight, judged, by, settings.plant, autopilot.settings(plan.vehicle, peak), own_log)
+    by, of_board, own_log = settings.controller, "", b""
+    if given == (None, None, None) and controller == vehicle.controller:  # the flight that judged the plan
+        flight = nominal_flight(plan.trajectory, vehicle, plan.problem.surroundings)
+    else:
+        with TemporaryDirectory() as folder:
+            log = Path(folder) / BLACKBOX
+            flight = simulate(
+                plan,
+                controller=controller,
+                conditions=settings.conditions,
+                seed=settings.seed,
+                plant=settings.plant,
+                autopilot=None if autopilot is None else autopilot.logging_to(str(log)),
+            )
+            own_log = log.read_bytes() if log.exists() else b""
+    if autopilot is not None:
+        by = f"{settings.controller} on {settings.autopilot}"
+        of_board = autopilot.settings(vehicle, float(np.abs(flight.setpoint.omega_body).max()))
+    return Flown(flight, score(flight, plan, vehicle), by, settings.plant, of_board, own_log)

@@ -137,6 +137,14 @@ class Flown:
     settings: str = ""  # of an autopilot's firmware, for its command line
     own_log: bytes = b""  # of an autopilot's firmware
 
+    def write(self, folder: Path) -> None:
+        """Write the flight to a folder, with the settings and the log of an autopilot's firmware, if any."""
+        self.flight.save(folder / FLIGHT)
+        if self.settings:
+            (folder / AUTOPILOT).write_text(self.settings, encoding="utf-8")
+        if self.own_log:
+            (folder / BLACKBOX).write_bytes(self.own_log)
+
 
 def finish(
     plan: Plan, record: RunRecord, options: OutputOptions, flown: Flown | None = None, explain: bool = False
@@ -162,12 +170,8 @@ def finish(
     def write(staging: Path) -> None:
         plan.save(staging / f"{plan.problem.name}.plan")
         write_columns(plan, staging / "plan.csv", record.columns)
-        if flight is not None:
-            flight.save(staging / FLIGHT)
-        if flown is not None and flown.settings:
-            (staging / AUTOPILOT).write_text(flown.settings, encoding="utf-8")
-        if flown is not None and flown.own_log:
-            (staging / BLACKBOX).write_bytes(flown.own_log)
+        if flown is not None:
+            flown.write(staging)
         (staging / "report.json").write_text(facts + "\n", encoding="utf-8")
         (staging / "report.png").write_bytes(pixels)
 
