@@ -32,7 +32,6 @@ from aerobat.declaration.field_types import (
     VectorLike,
     finite,
     in_degrees,
-    in_radians,
     number,
     unit,
 )
@@ -82,7 +81,6 @@ __all__ = [
     "import_plugin",
     "in_degrees",
     "in_notebooks",
-    "in_radians",
     "missing_fields",
     "number",
     "placed",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Any
 
@@ -29,21 +28,6 @@ Level = Annotated[float, Field(ge=0, le=1, description="number from 0 to 1")]
 
 _LATERAL = "_lateral_m"
 LEVELS = (0.5, 0.95, 1.0)  # levels of the quantiles that tables show
-
-
-@dataclass(frozen=True, eq=False)
-class ErrorBand:
-    """Quantiles over flights of an error over time, each (T,)."""
-
-    low: Array  # 5 %
-    median: Array
-    high: Array  # 95 %
-    max: Array
-
-    @classmethod
-    def of(cls, errors: Array) -> ErrorBand:
-        """Return the band of errors (flights, T)."""
-        return cls(*np.quantile(errors, (0.05, 0.5, 0.95, 1.0), axis=0))
 
 
 @in_notebooks
