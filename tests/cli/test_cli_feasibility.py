@@ -190,6 +190,12 @@ def test_progress_says_how_many_and_how_long_still() -> None:
     now[0] = 5.0
     progress.counting("planned")(20, 12)
     assert str(progress) == "cells 20 of 100 in 5 s: 12 planned; 20 s to go"
+    resumed = Progress("cells", 100, lambda: now[0], kept=80)  # by an earlier run: they take no time
+    now[0] = 10.0
+    resumed.counting("planned")(80, 60)
+    assert str(resumed) == "cells 80 of 100 in 5 s: 60 planned"
+    resumed.counting("planned")(90, 70)
+    assert str(resumed) == "cells 90 of 100 in 5 s: 70 planned; 5 s to go"
     tried = Progress("plans tried", clock=lambda: now[0])
     for note in ("ceiling 3.51 planned", "gate 0.5 refused"):
         tried.step(note)

@@ -29,12 +29,15 @@ class Progress:
         doing: The kind of parts that are counted, in words.
         total: The number of all parts; 0 if it is unknown.
         clock: Returns a monotonic time [s].
+        kept: The number of parts that an earlier run finished, which take this one no time.
     """
 
-    def __init__(self, doing: str, total: int = 0, clock: Callable[[], float] = perf_counter) -> None:
+    def __init__(
+        self, doing: str, total: int = 0, clock: Callable[[], float] = perf_counter, kept: int = 0
+    ) -> None:
         self._clock = clock
         self._began = clock()
-        self._doing, self._total = doing, total
+        self._doing, self._total, self._kept = doing, total, kept
         self._done, self._note = 0, ""
 
     def tell(self, done: int, note: str = "") -> None:
@@ -54,9 +57,10 @@ class Progress:
         spent = self._clock() - self._began
         of = f" of {self._total}" if self._total else ""
         text = f"{self._doing} {self._done}{of} in {spent:.0f} s" + (f": {self._note}" if self._note else "")
-        if not self._total or not self._done:
+        done_now = self._done - self._kept
+        if not self._total or done_now <= 0:
             return text
-        return f"{text}; {(self._total - self._done) * spent / self._done:.0f} s to go"
+        return f"{text}; {(self._total - self._done) * spent / done_now:.0f} s to go"
 
     def __rich__(self) -> str:
         """Return the line for rich, which asks for it at every refresh, with its brackets escaped."""

@@ -114,7 +114,7 @@ def run_map(record: RunRecord, options: OutputOptions, workers: str | None = Non
     name = f"map.{record.flight.table}"
     unfinished = Unfinished.beside(options.out or record.folder)
     with unfinished.kept("cells", count, finished_cells):
-        with showing(Progress("cells", count)) as progress:
+        with showing(Progress("cells", count, kept=finished_cells(unfinished.parts))) as progress:
             found = feasibility_map(
                 record.problem,
                 over,

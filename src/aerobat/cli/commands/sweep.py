@@ -114,7 +114,8 @@ def run_sweep(plan: Plan, record: RunRecord, options: OutputOptions, workers: st
     assert flight.conditions is not None, "a sweep has conditions"
     unfinished = Unfinished.beside(options.out or record.folder)
     with unfinished.kept("flights", flight.runs, finished_flights):
-        with showing(Progress("flown", flight.runs)) as progress:
+        kept = finished_flights(unfinished.parts)
+        with showing(Progress("flown", flight.runs, kept=kept)) as progress:
             swept = sweep_plan(
                 plan,
                 flight.conditions,
