@@ -113,6 +113,8 @@ def test_what_is_planned_anew_from_a_folder_alone_is_the_same_bit_by_bit(kept: P
 def test_a_comparison_is_repeated_too(capsys, monkeypatch) -> None:
     monkeypatch.setattr("aerobat.studies.compare.registered_planners", lambda: {"min-snap": MinSnap})
     assert code("compare", "line") == 0
+    assert code("repeat", "out/line-compare", "--explain") == 2  # there is no report on a plan
+    assert "--explain is for a plan or a flight" in capsys.readouterr().err
     assert code("repeat", "out/line-compare") == 0
     assert "the same as in out/line-compare/" in capsys.readouterr().err
     Path("out/line-compare/compare.json").write_text("3")

@@ -101,6 +101,8 @@ def test_what_cannot_be_shown_is_refused_in_a_sentence(run: Path, capsys: pytest
     assert "holds a path alone" in refused(capsys, str(run / "plan.csv"))
     assert "no replay" in refused(capsys, str(run), "--html", str(run / "plan.csv"))
     assert "hexarotor has 6" in refused(capsys, str(run), "--vehicle", "hexarotor")
+    assert "--speed is for --video" in refused(capsys, str(run), "--speed", "1")
+    assert "--speed is for --video" in refused(capsys, "line", "--live", "--speed", "1")
     content = dict(np.load(run / "flight.npz"))
     content["position"] = content["position"].copy()
     content["position"][100, 1] = np.nan

@@ -63,6 +63,8 @@ def repeat(folder: Path, options: RepeatOptions = RepeatOptions()) -> ExitCode:
     out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")
     options = replace(options, out=out)
     if record.command not in ("fly", "plan"):
+        if options.explain:
+            raise SpecError(f"--explain is for a plan or a flight, and {folder}/ holds neither; leave it out")
         earlier = _results(folder, record)
         _run_study(folder, record, options)
         names = [name for name, value in _results(out, record).items() if not _same(value, earlier.get(name))]

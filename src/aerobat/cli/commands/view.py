@@ -34,6 +34,7 @@ from aerobat.viewer.scene import plan_fits
 PROBLEM = "flip-roll"  # where nobody names one
 serving = Group("Live", sort_key=4)
 SWEPT = 50  # flights of a sweep that are shown
+USUAL_SPEED = 0.5  # of time in a video
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +49,8 @@ class ViewOptions(VehicleOptions):
     """A video instead, to FILE.mp4 or FILE.gif, 30 frames a second; beside the page if --html is given too.
     Needs aerobat[viewer]."""
 
-    speed: Annotated[float, Parameter(group=output, validator=POSITIVE)] = 0.5
-    """The pace of time in the video, 1 as it was flown."""
+    speed: Annotated[float | None, Parameter(group=output, validator=POSITIVE)] = None
+    """The pace of time in the video, 1 as it was flown. Default: 0.5."""
 
     open: Annotated[bool, Parameter(group=output, show_default=False)] = False
     """Open the page in the browser."""
@@ -137,6 +138,8 @@ def view(
         A folder that `aerobat plan`, `fly` or `sweep` wrote, a .plan file, or a flight's .npz file; with
         --live a problem's name or file too, by default flip-roll.
     """
+    if options.speed is not None and options.video is None:
+        raise SpecError("--speed is for --video; add it, or leave --speed out")
     if serving.live:
         serve(source, options, serving)
         return
@@ -153,7 +156,8 @@ def view(
         require_replaceable(page)
     if options.video is not None:
         with showing(Progress("pictures drawn")) as progress:
-            write_video(shown, options.video, plan, vehicle, options.speed, progress.counting("in all"))
+            pace = options.speed or USUAL_SPEED
+            write_video(shown, options.video, plan, vehicle, pace, progress.counting("in all"))
     if page is not None:
         save_replay(replay, page)
     if options.json:
