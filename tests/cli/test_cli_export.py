@@ -49,6 +49,17 @@ def test_a_runs_plan_is_exported_to_every_format_and_its_loss_said(
     assert all(file in said for file in facts["files"])
 
 
+def test_plans_of_folders_whose_names_end_in_other_numbers_have_files_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("line-pass-0.95", "line-pass-0.99"):
+        Path(name).mkdir()
+        shared_plan("line").save(Path(name) / "line.plan")
+        cli.main(["export", name, "--to", "csv"])
+    assert sorted(path.name for path in Path("out").iterdir()) == ["line-pass-0.95.csv", "line-pass-0.99.csv"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [

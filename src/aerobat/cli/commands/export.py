@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -55,7 +56,9 @@ def export(plan: Path, options: ExportOptions) -> ExitCode:
     """
     found = whole_plan(plan, "give it to `aerobat fly`, and export what that writes")
     form = FORMATS[options.to]
-    default = Path("out") / f"{plan.resolve().stem}{form.suffix or '.' + options.to}"
+    source = plan.resolve()
+    name = source.name if os.path.isdir(source) else source.stem  # names of folders may hold numbers
+    default = Path("out") / f"{name}{form.suffix or '.' + options.to}"
     made = export_plan(found, options.out or default, options.to, options.rate)
     if options.json:
         facts = {"format": made.format, "files": list(map(str, made.files)), "loss": made.loss.record()}
