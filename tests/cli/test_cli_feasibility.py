@@ -107,7 +107,10 @@ REFUSED = (
     (("feasibility", "half-flip", "--over", "sped=1:2:1"), "did you mean 'speed'?"),
     (("feasibility", "half-flip", "--over", "speed=2:1:1"), "the range of speed is empty"),
     (("feasibility", "half-flip", "--over", "speed=1:2:0"), "the step of speed is 0"),
-    (("feasibility", "half-flip", "--over", "speed=0:1:1e-7"), "10000 at most"),
+    (("feasibility", "half-flip", "--over", "speed=0:1:1e-7"), "speed has 10000001 values, 10000 at most"),
+    (("feasibility", "half-flip", "--over", "speed=0:1:1e-320"), "speed has too many values, 10000 at most"),
+    (("feasibility", "half-flip", "--over", "speed=0:1:-1e-320"), "the range of speed is empty"),
+    (("feasibility", "half-flip", "--over", "speed=-1e308:1e308:1"), "too many values, 10000 at most"),
     (
         ("feasibility", "line", "--over", "speed=1:200:1", "--over", "vehicle.mass=1:91:1"),
         "18200 cells are too",

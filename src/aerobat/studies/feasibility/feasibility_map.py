@@ -99,15 +99,17 @@ def _range(name: str, first: float, last: float, step: float) -> tuple[float, ..
     """Return the values from first to last in equal steps; last is included if a step ends there."""
     if step == 0.0:
         raise SpecError(f"the step of {name} is 0; give another, or one value, as {name}={first:g}")
-    count = floor((last - first) / step + 1e-9) + 1
-    if count < 1:
+    steps = (last - first) / step + 1e-9  # may be infinite
+    if steps < 0.0:
         raise SpecError(
             f"the range of {name} is empty: steps of {step:g} do not lead from {first:g} to {last:g}; "
             "turn it round"
         )
-    if count > MAX_CELLS:
+    if steps >= MAX_CELLS:
+        count = f"{floor(steps) + 1}" if isfinite(steps) else "too many"
         raise SpecError(f"{name} has {count} values, {MAX_CELLS} at most are allowed; take a larger step")
-    return tuple(round(first + k * step, 12) + 0.0 for k in range(count))  # steps of 0.1 add up to 0.3
+    values = (first + k * step for k in range(floor(steps) + 1))
+    return tuple(round(value, 12) + 0.0 for value in values)  # steps of 0.1 add up to 0.3
 
 
 @by_value
