@@ -9,7 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from aerobat.certification import Certificate, Envelope, certify
+from aerobat.certification import Envelope, certify
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import HEADING, POSITIVE, VehicleOptions, limiting
 from aerobat.cli.runs.record import default_vehicle
@@ -71,18 +71,16 @@ def check(plan: Path, options: CheckOptions = CheckOptions()) -> ExitCode:
     """
     chosen = None if options.vehicle is None else named_vehicle(options.vehicle)
     found, facts = read_source(plan, options.rate)
-    if isinstance(found, Plan):
-        trajectory, own, environment = found.trajectory, found.vehicle, found.problem.environment
-    else:
-        trajectory, own, environment = found, None, Environment()
+    trajectory, own = (found.trajectory, found.vehicle) if isinstance(found, Plan) else (found, None)
     if options.heading is not None:
         trajectory = replace(trajectory, heading=radians(options.heading))
     vehicle = chosen or own or load_vehicle(default_vehicle())
     if isinstance(found, Plan):
+        environment = found.problem.environment
         envelope = Task.of(found.problem, vehicle).envelope(found.stages)
         explained, assumed = _explained(found, trajectory, vehicle), []
     else:
-        envelope, explained = Envelope(), None
+        environment, envelope, explained = Environment(), Envelope(), None
         beyond = ("no wind", "no limits, stages or gates of a problem")
         assumed = [*assumed_of_path(options, vehicle, environment), *beyond, *facts]
     envelope = replace(
@@ -96,16 +94,12 @@ def check(plan: Path, options: CheckOptions = CheckOptions()) -> ExitCode:
     beside = Facts(evidence(explained))
     if options.json:
         print_json(to_json(plain(certificate) | plain(beside) | ({"assumed": assumed} if assumed else {})))
-        return _judgement(certificate)
-    print_table(table(certificate, title=f"{plan} · {vehicle.name}"))
-    if assumed:
-        print(f"judged as a path; assumed: {', '.join(assumed)}")
-    elif explained is not None:
-        print_table(table(Facts((Fact("", beside, "beside the proof"),))))
-    return _judgement(certificate)
-
-
-def _judgement(certificate: Certificate) -> ExitCode:
+    else:
+        print_table(table(certificate, title=f"{plan} · {vehicle.name}"))
+        if assumed:
+            print(f"judged as a path; assumed: {', '.join(assumed)}")
+        elif explained is not None:
+            print_table(table(Facts((Fact("", beside, "beside the proof"),))))
     return ExitCode.WELL if certificate.certified else ExitCode.NOT_WELL
 
 

@@ -28,7 +28,7 @@ def read_urdf(root: Element, path: Path) -> Robot:
     poses = _poses(root, elements)
     joints = {_end(joint, "child"): joint for joint in by_name(root.findall("joint")).values()}
     links = tuple(_link(name, each, poses[name], joints.get(name)) for name, each in elements.items())
-    defaults = _properties(root.find("properties"), links)
+    defaults = _properties(root.find("properties"))
     children = {name_of(joint, "joint"): child for child, joint in joints.items()}
     notes = tuple(
         f"link '{name}' has no <inertial>: taken as massless"
@@ -116,7 +116,7 @@ def _end(joint: Element, which: str) -> str:
     return link
 
 
-def _properties(element: Element | None, links: tuple[Link, ...]) -> dict[str, float]:
+def _properties(element: Element | None) -> dict[str, float]:
     """Return the properties of all rotors by gym-pybullet-drones; the thrust is a ratio to the weight."""
     if element is None:
         return {}
