@@ -1,6 +1,7 @@
 """Feasibility over the values of two fields, and the smallest values that a problem needs."""
 
-from aerobat.studies.feasibility.feasibility_map import Axis, Cell, FeasibilityMap, feasibility_map
+from aerobat.studies.feasibility.axis import Axis
+from aerobat.studies.feasibility.feasibility_map import Cell, FeasibilityMap, feasibility_map
 from aerobat.studies.feasibility.min_requirements import Requirement, min_requirements
 from aerobat.studies.feasibility.probe import Feasibility
 
