@@ -51,6 +51,16 @@ def test_what_became_of_flights_that_fail_is_told(capsys) -> None:
     assert "95 % confidence; the others: 30 wrong attitude, 7 hit frame; plan for more with" in shown
 
 
+def test_a_search_is_told_only_of_plans_that_were_searched_for(capsys) -> None:
+    plan = shared_plan("line")
+    given = ab.Plan(problem=plan.problem, trajectory=plan.trajectory, planner="file", status="as it is")
+    for each, is_told in ((plan, True), (given.for_vehicle(ab.load_vehicle("agile-quad")), False)):
+        print_table(table(Report(each)))
+        shown = " ".join(capsys.readouterr().out.split())
+        assert ("after" in shown and "attempts" in shown and "solved in" in shown) == is_told
+        assert json.loads(to_json(Report(each)))["plan"]["nodes"] == each.nodes
+
+
 def test_a_verdict_is_well_where_enough_are_proven_to_succeed(capsys) -> None:
     found = report(Share(784, 800))
     assert found.is_well

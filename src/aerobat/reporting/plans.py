@@ -62,8 +62,9 @@ def _(plan: Plan) -> Iterator[Fact]:
         text = f"{plan.problem.heading.mode}, {usual:.3g}° off, at worst {most:.3g}° at {off.time:.2f} s"
         yield Fact("heading_error_deg", most, "heading", text, level=REPORT)
         yield from record(heading_error_median_deg=usual, heading_error_time_s=off.time)
-    dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
-    yield line("search", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts")
+    if plan.attempts:  # none were made for a path that another program gave
+        dt = "" if plan.dt is None else f"dt {plan.dt:.4f} s "
+        yield line("search", f"{plan.duration:.3f} s, {dt}after {len(plan.attempts)} attempts")
     cost = ""
     if plan.cost is not None:
         sized = "the duration" if plan.cost == plan.duration else f"{plan.cost:.7g}"
@@ -74,7 +75,7 @@ def _(plan: Plan) -> Iterator[Fact]:
     if plan.spread is not None:
         coarse = f"{plan.starts[0]:.3f} to {plan.starts[-1]:.3f} s on a coarse mesh"
         yield line("starts", f"{len(plan.starts)}, {coarse}, {100 * plan.spread:.2g} % apart")
-    solved = f"{plan.nodes}, solved in {1000 * plan.solve_time:.0f} ms"
+    solved = f"{plan.nodes}, solved in {1000 * plan.solve_time:.0f} ms" if plan.nodes else ""
     yield Fact("nodes", plan.nodes, "nodes", solved)
     yield Fact("solve_time_s", plan.solve_time)
     label, when = "stages", [f"{stage.name} at {stage.time:.2f} s" for stage in plan.stages]
