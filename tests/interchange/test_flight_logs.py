@@ -42,6 +42,12 @@ def weak(**factors: float) -> ab.Vehicle:
     return replace(vehicle, rotors=tuple(rotors))
 
 
+def heavier_to_turn() -> ab.Vehicle:
+    vehicle = plan().vehicle
+    assert vehicle is not None
+    return replace(vehicle, inertia=2.0 * vehicle.inertia)
+
+
 def handed_over() -> ab.Flight:
     lab = ab.load_dispersion("lab")
     assert lab.motion_capture is not None
@@ -54,6 +60,7 @@ PLANTED: dict[str, Callable[[], ab.Flight]] = {
     "vehicle": lambda: under(mass=0.1),
     "hand-off": handed_over,
     "saturation": lambda: ab.fly(plan(), weak(max_thrust=0.6)),
+    "inertia": lambda: ab.fly(plan(), heavier_to_turn(), nominal=plan().vehicle),
     "gains": lambda: ab.fly(
         plan(), controller=ab.Controller(attitude_frequency=14.0, moment_feedforward=False)
     ),
@@ -93,6 +100,15 @@ def test_a_planted_cause_is_named_first_from_another_systems_log(cause: str, tmp
 def flown_by(cause: str) -> ab.Vehicle | None:
     """The vehicle whose limits the log's reader knows."""
     return weak(max_thrust=0.6) if cause == "saturation" else None
+
+
+@pytest.mark.parametrize("every", [1, ROWS])
+def test_commands_alone_do_not_take_slow_rotors_for_an_inertia(every: int, tmp_path: Path) -> None:
+    slow = ab.fly(plan(), weak(lag=3.0), nominal=plan().vehicle)
+    file = log(tmp_path / "log.csv", slow, (*POSE, *RATES, *COMMANDS), every)
+    flight = ab.read_flight_log(file, plan())
+    assert ab.inspect_flight(flight, plan()).cause != "inertia"
+    assert ab.inspect_flight(replace(flight, engine="log"), plan()).cause == "inertia"  # as if measured
 
 
 def test_a_pose_and_thrusts_alone_tell_a_heavy_vehicle(tmp_path: Path) -> None:

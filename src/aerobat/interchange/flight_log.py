@@ -18,7 +18,7 @@ from aerobat.interchange.rows import NAMES, has_header, named_columns
 from aerobat.kernels.motors import first_order_response
 from aerobat.planning import Plan
 from aerobat.simulation import Flight, Outcome
-from aerobat.simulation.flight import setpoint_series
+from aerobat.simulation.flight import LOG_OF_COMMANDS, setpoint_series
 from aerobat.storage import read_whole
 from aerobat.vehicle import Vehicle
 
@@ -111,6 +111,7 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
     _require_near(position, planned.setpoint.flat.position)
     _require_aligned(q, planned.setpoint.q_world_body)
     thrusts, commands = _of_rotors(columns, planned.rotor_thrusts[0], nominal)
+    are_measured = all(f"f{k}" in columns for k in range(len(nominal.rotors)))
     span = nominal.max_thrusts - nominal.min_thrusts
     margin = np.minimum(commands - nominal.min_thrusts, nominal.max_thrusts - commands)
     series = {
@@ -140,7 +141,7 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
         vehicles=(nominal.name,),
         outcomes=(Outcome.COMPLETE,),
         sentences=("recorded by another system",),
-        engine="log",
+        engine="log" if are_measured else LOG_OF_COMMANDS,
         environment=plan.problem.surroundings,
     )
 

@@ -25,6 +25,7 @@ from aerobat.storage import format_of, read_arrays, whole_file
 
 _FORMAT = "aerobat-flight-2"
 MAX_FLIGHT = 2**31  # largest size of a flight file [bytes]: hours of flight at 500 Hz
+LOG_OF_COMMANDS = "log of commands"  # the engine of a recorded flight whose thrusts follow from its commands
 _ROTORS = -1  # placeholder in a shape for the number of rotors
 
 
@@ -91,7 +92,7 @@ class Flight:
     vehicles: tuple[str, ...]  # their names
     outcomes: tuple[Outcome, ...]  # outcome of each vehicle
     sentences: tuple[str, ...]  # the outcomes as sentences with their numbers
-    engine: str  # name of the engine, or of the plant, that flew them
+    engine: str  # name of the engine, or of the plant, that flew them; of a recorded one, log
     environment: Environment
 
     def __post_init__(self) -> None:
