@@ -199,6 +199,20 @@ def test_what_makes_no_sense_is_refused_before_anything_is_planned(arguments, na
     assert sorted(path.name for path in Path().iterdir()) == ["half-flip.plan", "mine", "spread.toml"]
 
 
+@pytest.mark.parametrize("theirs", ["thesis.tex", "finished/thesis.tex", "finished/flights.npz"])
+def test_a_folder_of_others_that_is_called_as_one_of_an_unfinished_sweep_is_left_alone(
+    theirs: str, capsys
+) -> None:
+    file = Path("there-unfinished") / theirs
+    file.parent.mkdir(parents=True)
+    file.write_text("of years")
+    for command in (("sweep", "half-flip.plan"), ("feasibility", "line", "--over", "vehicle.mass=1")):
+        assert code(*command, "--out", "there") == 2
+        assert f"holds {file.name}, which no run wrote" in capsys.readouterr().err
+    assert file.read_text() == "of years"
+    assert not Path("there").exists()
+
+
 def test_a_sweep_that_cannot_be_flown_leaves_nothing(capsys) -> None:
     Path("nowhere.toml").write_text("computation_delay = 1.0\n")
     assert code("sweep", "half-flip.plan", "--conditions", "nowhere.toml", "--runs", "3") == 2

@@ -113,8 +113,8 @@ def run_map(record: RunRecord, options: OutputOptions, workers: str | None = Non
     count = prod(len(axis.values) for axis in axes)
     name = f"map.{record.flight.table}"
     unfinished = Unfinished.beside(options.out or record.folder)
-    with unfinished.kept("cells", count, finished_cells):
-        with showing(Progress("cells", count, kept=finished_cells(unfinished.parts))) as progress:
+    with unfinished.kept("cells", count, finished_cells) as kept:
+        with showing(Progress("cells", count, kept=kept)) as progress:
             found = feasibility_map(
                 record.problem,
                 over,

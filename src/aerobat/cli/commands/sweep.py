@@ -13,7 +13,7 @@ from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, 
 from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import finish_study, is_of_a_run
 from aerobat.cli.runs.record import RECORD, FlightSettings, RunRecord, read_record, write_record
-from aerobat.cli.runs.unfinished import Unfinished
+from aerobat.cli.runs.unfinished import PLAN, Unfinished
 from aerobat.cli.tasks import plan_of, read_run
 from aerobat.control import named_controller
 from aerobat.environment import load_dispersion
@@ -23,8 +23,6 @@ from aerobat.planning import Plan, load_plan
 from aerobat.storage import require_replaceable
 from aerobat.studies.sweep.sweep import finished_flights
 from aerobat.studies.sweep.sweep import sweep as sweep_plan
-
-PLAN = "sweep.plan"
 
 
 def _plan_kept(folder: Path, record: RunRecord) -> Plan:
@@ -113,8 +111,7 @@ def run_sweep(plan: Plan, record: RunRecord, options: OutputOptions, workers: st
     flight = record.flight
     assert flight.conditions is not None, "a sweep has conditions"
     unfinished = Unfinished.beside(options.out or record.folder)
-    with unfinished.kept("flights", flight.runs, finished_flights):
-        kept = finished_flights(unfinished.parts)
+    with unfinished.kept("flights", flight.runs, finished_flights) as kept:
         with showing(Progress("flown", flight.runs, kept=kept)) as progress:
             swept = sweep_plan(
                 plan,

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from aerobat.cli.runs.record import RECORD
 from aerobat.cli.terminal import say
+from aerobat.storage import require_replaceable
+from aerobat.studies.kept import FINGERPRINT
 from aerobat.studies.workers import WorkerEnded
+
+PARTS = "finished"  # the folder of the finished parts
+PLAN = "sweep.plan"  # what a sweep flies
+PART = re.compile(rf"(flights|cell)-.*\.npz|{re.escape(FINGERPRINT)}")  # the names of what it holds
 
 
 @dataclass(frozen=True)
@@ -20,17 +28,25 @@ class Unfinished:
 
     @classmethod
     def beside(cls, folder: Path) -> Unfinished:
-        """Return the unfinished study whose results will be written to a folder."""
-        return cls(folder.with_name(f"{folder.name}-unfinished"))
+        """Return the unfinished study whose results will be written to a folder.
+
+        Raises SpecError where its own folder holds what no study wrote, since that folder is removed.
+        """
+        found = cls(folder.with_name(f"{folder.name}-unfinished"))
+        require_replaceable(found.folder, (PARTS, PLAN, RECORD).__contains__)
+        require_replaceable(found.parts, lambda name: PART.fullmatch(name) is not None)
+        return found
 
     @property
     def parts(self) -> Path:
         """The folder of the finished parts."""
-        return self.folder / "finished"
+        return self.folder / PARTS
 
     @contextmanager
-    def kept(self, what: str, count: int, finished: Callable[[Path], int]) -> Iterator[None]:
-        """Remove the folder after the block; if that ends early, report the kept parts, if there are any.
+    def kept(self, what: str, count: int, finished: Callable[[Path], int]) -> Iterator[int]:
+        """Give the number of parts that an earlier run kept, and remove the folder after the block.
+
+        If the block ends early, the parts that are kept by then are reported.
 
         Args:
             what: The name of the parts.
@@ -38,7 +54,7 @@ class Unfinished:
             finished: Returns the number of parts in a folder.
         """
         try:
-            yield
+            yield finished(self.parts)
         except BaseException as error:
             done = finished(self.parts)
             if not done:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import asdict
@@ -111,9 +112,9 @@ def sweep(
 
 
 def finished_flights(folder: Path) -> int:
-    """Return the number of flights that a folder keeps."""
-    spans = (name.split("-")[1:] for name in names_of_parts(folder))
-    return sum(int(end) - int(begin) for begin, end in spans)
+    """Return the number of flights that a folder keeps; files of others do not count."""
+    spans = (re.fullmatch(r"flights-(\d+)-(\d+)", name) for name in names_of_parts(folder))
+    return sum(int(span[2]) - int(span[1]) for span in spans if span)
 
 
 def _name(flights: range) -> str:
