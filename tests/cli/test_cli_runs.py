@@ -94,6 +94,18 @@ def test_a_saved_plan_that_was_flown_is_flown_again_not_planned(capsys) -> None:
     assert "the same as" in capsys.readouterr().err
 
 
+def test_a_run_is_repeated_beside_the_folder_that_one_is_in(monkeypatch, capsys) -> None:
+    shared_plan("line").save("line.plan")
+    assert code("fly", "line.plan", "--conditions", "none", "--out", "flown") == 0
+    Path("flown/inner").mkdir()
+    for place, folder in (("flown", "."), ("flown/inner", "..")):
+        with monkeypatch.context() as patch:
+            patch.chdir(place)
+            assert code("repeat", folder) == 0
+            assert "the same as in" in capsys.readouterr().err
+    assert {path.name for path in Path().glob("flown*")} == {"flown", "flown-repeated"}
+
+
 def test_a_saved_plan_that_was_flown_with_a_plugin_is_recorded_with_it(capsys) -> None:
     shared_plan("line").save("line.plan")
     Path("mine.py").write_text("")

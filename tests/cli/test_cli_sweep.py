@@ -199,6 +199,16 @@ def test_what_makes_no_sense_is_refused_before_anything_is_planned(arguments, na
     assert sorted(path.name for path in Path().iterdir()) == ["half-flip.plan", "mine", "spread.toml"]
 
 
+def test_a_study_is_written_to_the_folder_that_one_is_in(monkeypatch, capsys) -> None:
+    plan, there = Path("half-flip.plan").resolve(), Path("there").resolve()
+    there.mkdir()
+    monkeypatch.chdir(there)
+    assert code("sweep", str(plan), "--runs", "3", "--out", "/") == 2
+    assert "no place beside /" in capsys.readouterr().err
+    assert code("sweep", str(plan), "--runs", "3", "--out", ".") == 0  # by name: another folder is there now
+    assert (there / "flights.csv").exists()
+
+
 @pytest.mark.parametrize("theirs", ["thesis.tex", "finished/thesis.tex", "finished/flights.npz"])
 def test_a_folder_of_others_that_is_called_as_one_of_an_unfinished_sweep_is_left_alone(
     theirs: str, capsys

@@ -17,7 +17,7 @@ from aerobat.cli.commands.sweep import run_sweep
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ExplainingOptions, OutputOptions, output
 from aerobat.cli.runs.folder import FLIGHT, finish
-from aerobat.cli.runs.record import RunRecord, read_record, versions_now
+from aerobat.cli.runs.record import RunRecord, beside, read_record, versions_now
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
 from aerobat.declaration.registry import imported_plugins
@@ -60,7 +60,7 @@ def repeat(folder: Path, options: RepeatOptions = RepeatOptions()) -> ExitCode:
     missing = [file for file in record.plugins if str(Path(file).resolve()) not in imported]
     if missing:
         raise SpecError(f"{folder}/ was made with --import {' '.join(missing)}; give that here too")
-    out = options.out or folder.with_name(f"{folder.resolve().name}-repeated")
+    out = options.out or beside(folder, "-repeated")
     options = replace(options, out=out)
     if record.command not in ("fly", "plan"):
         if options.explain:

@@ -164,6 +164,14 @@ def _in_a_name(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def beside(folder: Path, suffix: str) -> Path:
+    """Return the path beside a folder that has its name and a suffix. Raises SpecError for the root."""
+    named = folder.resolve() if folder.name in ("", "..") else folder
+    if not named.name:
+        raise SpecError(f"there is no place beside {folder}; give another folder")
+    return named.with_name(f"{named.name}{suffix}")
+
+
 def default_vehicle(paper: bool = False) -> str:
     """Return the name of the default vehicle."""
     return "hexarotor" if paper else DEFAULT_VEHICLE

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from aerobat.cli.runs.record import RECORD
+from aerobat.cli.runs.record import RECORD, beside
 from aerobat.cli.terminal import say
 from aerobat.storage import require_replaceable
 from aerobat.studies.kept import FINGERPRINT
@@ -32,7 +32,7 @@ class Unfinished:
 
         Raises SpecError where its own folder holds what no study wrote, since that folder is removed.
         """
-        found = cls(folder.with_name(f"{folder.name}-unfinished"))
+        found = cls(beside(folder, "-unfinished"))
         require_replaceable(found.folder, (PARTS, PLAN, RECORD).__contains__)
         require_replaceable(found.parts, lambda name: PART.fullmatch(name) is not None)
         return found
