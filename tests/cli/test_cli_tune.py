@@ -12,6 +12,7 @@ import pytest
 import aerobat as ab
 from aerobat import cli
 from aerobat.cli.progress import Progress
+from aerobat.problem import problem_text
 from aerobat.studies.tune import TUNED
 from shared_plans import shared_plan
 
@@ -64,6 +65,20 @@ def test_an_interrupted_search_writes_nothing(folder: Path, monkeypatch: pytest.
         cli.main(["tune", "half-flip.plan", "--vehicle", "slow.toml", *FEW, "20"])
     assert stop.value.code == 130
     assert sorted(folder.iterdir()) == before
+
+
+def test_what_is_no_vehicles_file_is_not_replaced_by_one(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    problem = problem_text("line")
+    Path("mine.toml").write_text(problem)
+    Path("folder.toml").mkdir()
+    for place in ("mine.toml", "folder.toml"):
+        with pytest.raises(SystemExit) as stop:
+            cli.main(["tune", "half-flip.plan", "--out", place])
+        assert stop.value.code == 2
+        assert "is there already, and no vehicle's file; name another" in capsys.readouterr().err
+    assert Path("mine.toml").read_text() == problem
 
 
 @pytest.mark.parametrize(

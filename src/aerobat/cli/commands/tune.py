@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -27,7 +28,7 @@ from aerobat.errors import SpecError
 from aerobat.reporting.plain_data import plain, to_json
 from aerobat.reporting.tables import print_table, table
 from aerobat.studies.tune import tune as tune_gains
-from aerobat.vehicle import write_vehicle
+from aerobat.vehicle import load_vehicle, write_vehicle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,8 +69,8 @@ def tune(*problems: str, options: TuningOptions = TuningOptions()) -> ExitCode:
     out = options.out
     if not problems:
         raise SpecError("a problem is missing; `aerobat show` lists some")
-    if out is not None and out.suffix != ".toml":
-        raise SpecError(f"--out must be a vehicle's file, its name ending in .toml, got {out}")
+    if out is not None:
+        _require_place(out)
     conditions = load_dispersion(options.conditions)
     planning = PlanningOptions(vehicle=options.vehicle, angle=options.angle, plugins=options.plugins)
     plans = [plan_of(*read_run(problem, planning, "plan")) for problem in problems]
@@ -94,3 +95,14 @@ def tune(*problems: str, options: TuningOptions = TuningOptions()) -> ExitCode:
         print_table(table(tuning))
     say(f"written to {out}" if tuning.is_better else "nothing is written")
     return ExitCode.WELL if tuning.is_better else ExitCode.NOT_WELL
+
+
+def _require_place(out: Path) -> None:
+    """Raise SpecError, before hours of flying, unless a vehicle's file may be written there."""
+    if out.suffix != ".toml":
+        raise SpecError(f"--out must be a vehicle's file, its name ending in .toml, got {out}")
+    if os.path.lexists(out):
+        try:
+            load_vehicle(str(out))
+        except SpecError:
+            raise SpecError(f"--out {out} is there already, and no vehicle's file; name another") from None
