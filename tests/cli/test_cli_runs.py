@@ -204,6 +204,32 @@ def test_a_folders_name_holds_nothing_that_leads_elsewhere() -> None:
     assert ":" not in record.folder.name
 
 
+@pytest.mark.parametrize(
+    ("command", "work"),
+    [
+        (("fly", "line.plan"), "fly.plan_of"),
+        (("plan", "line.plan"), "plan.plan_of"),
+        (("compare", "line"), "compare.compare_planners"),
+        (("sweep", "line.plan"), "sweep.sweep_plan"),
+        (("repeat", "kept"), "repeat.plan_of"),
+    ],
+)
+def test_a_folder_of_others_is_refused_before_anything_is_planned_or_flown(
+    command: tuple[str, ...], work: str, kept: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    def never(*arguments: object, **options: object) -> None:
+        raise AssertionError(f"{work} was called")
+
+    shared_plan("line").save("line.plan")
+    shutil.copytree(kept, "kept")
+    Path("mine").mkdir()
+    Path("mine/thesis.tex").write_text("years of work")
+    monkeypatch.setattr(f"aerobat.cli.commands.{work}", never)
+    assert code(*command, "--out", "mine") == 2
+    assert "mine/ holds thesis.tex, which no run wrote" in capsys.readouterr().err
+    assert not list(Path().glob("mine-*"))
+
+
 def test_an_earlier_run_that_is_replaced_is_said_and_leaves_nothing_behind(kept: Path, capsys) -> None:
     shared_plan("line").save("line.plan")
     shutil.copytree(kept, "out/line")

@@ -9,7 +9,7 @@ from cyclopts import Parameter, validators
 
 from aerobat.cli.options import OutputOptions, ProblemOptions, Workers, planning
 from aerobat.cli.progress import PlanningProgress, showing
-from aerobat.cli.runs.folder import finish_study
+from aerobat.cli.runs.folder import finish_study, require_place
 from aerobat.cli.runs.record import RunRecord
 from aerobat.cli.tasks import read_task
 from aerobat.studies.compare import compare as compare_planners
@@ -50,6 +50,7 @@ def compare(problem: str, options: CompareOptions = CompareOptions()) -> None:
         time_limit=options.time_limit,
         plugins=options.plugin_names,
     )
+    require_place(record, options)
     run_comparison(record, options, options.workers)
 
 

@@ -11,14 +11,13 @@ from cyclopts import Parameter, validators
 
 from aerobat.cli.options import OutputOptions, PlannerOptions, Workers, output, planning
 from aerobat.cli.progress import Progress, showing
-from aerobat.cli.runs.folder import finish_study, is_of_a_run
+from aerobat.cli.runs.folder import finish_study, require_place
 from aerobat.cli.runs.record import DEFAULT_TOLERANCE, FlightSettings, RunRecord
 from aerobat.cli.runs.unfinished import Unfinished
 from aerobat.cli.tasks import make_planner, read_task
 from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.reporting.feasibility.facts import requirements
-from aerobat.storage import require_replaceable
 from aerobat.studies.feasibility import Axis, feasibility_map, min_requirements
 from aerobat.studies.feasibility.feasibility_map import finished_cells
 from aerobat.studies.feasibility.probe import TIME_LIMIT
@@ -99,7 +98,7 @@ def feasibility(problem: str, options: FeasibilityOptions = FeasibilityOptions()
         tolerance=options.tolerance,
         plugins=options.plugin_names,
     )
-    require_replaceable(options.out or record.folder, is_of_a_run)  # before minutes of planning
+    require_place(record, options)
     run_study = run_map if options.over else run_need
     run_study(record, options, options.workers)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ExplainingOptions, FlyingOptions, TableOptions
-from aerobat.cli.runs.folder import BLACKBOX, Flown, finish
+from aerobat.cli.runs.folder import BLACKBOX, Flown, finish, require_place
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import flight_settings, plan_of, read_run
 from aerobat.control import named_controller
@@ -48,6 +48,7 @@ def fly(
     if autopilot is not None:
         autopilot.require()
     record, saved = read_run(problem, options, "fly", settings)
+    require_place(record, options)
     plan = plan_of(record, saved, explaining.explain, flying.workers)
     return finish(plan, record, options, flown(plan, settings), explaining.explain)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ConditionsOptions, ExplainingOptions, TableOptions
-from aerobat.cli.runs.folder import finish
+from aerobat.cli.runs.folder import finish, require_place
 from aerobat.cli.runs.record import FlightSettings
 from aerobat.cli.tasks import flight_settings, plan_of, read_run
 from aerobat.errors import SpecError
@@ -36,5 +36,6 @@ def plan(
             "`aerobat fly`; leave them out"
         )
     record, saved = read_run(problem, options, "plan", settings)
+    require_place(record, options)
     found = plan_of(record, saved, explaining.explain, passing.workers)
     return finish(found, record, options, explain=explaining.explain)

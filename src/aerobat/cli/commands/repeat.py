@@ -16,7 +16,7 @@ from aerobat.cli.commands.fly import flown
 from aerobat.cli.commands.sweep import run_sweep
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ExplainingOptions, OutputOptions, output
-from aerobat.cli.runs.folder import FLIGHT, finish
+from aerobat.cli.runs.folder import FLIGHT, finish, require_place
 from aerobat.cli.runs.record import RunRecord, beside, read_record, versions_now
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
@@ -62,6 +62,7 @@ def repeat(folder: Path, options: RepeatOptions = RepeatOptions()) -> ExitCode:
         raise SpecError(f"{folder}/ was made with --import {' '.join(missing)}; give that here too")
     out = options.out or beside(folder, "-repeated")
     options = replace(options, out=out)
+    require_place(record, options)
     if record.command not in ("fly", "plan"):
         if options.explain:
             raise SpecError(f"--explain is for a plan or a flight, and {folder}/ holds neither; leave it out")

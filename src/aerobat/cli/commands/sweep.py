@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from aerobat.cli.options import FlightsOptions, OutputOptions, PlanningOptions, flying, output
 from aerobat.cli.progress import Progress, showing
-from aerobat.cli.runs.folder import finish_study, is_of_a_run
+from aerobat.cli.runs.folder import finish_study, require_place
 from aerobat.cli.runs.record import RECORD, FlightSettings, RunRecord, read_record, write_record
 from aerobat.cli.runs.unfinished import PLAN, Unfinished
 from aerobat.cli.tasks import plan_of, read_run
@@ -20,7 +20,6 @@ from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.planning import Plan, load_plan
-from aerobat.storage import require_replaceable
 from aerobat.studies.sweep.sweep import finished_flights
 from aerobat.studies.sweep.sweep import sweep as sweep_plan
 
@@ -90,10 +89,9 @@ def sweep(
     )
     require_writable(f"flights.{settings.table}")
     record, plan = read_run(problem, options, "sweep", settings)
+    require_place(record, options)
     if plan is None:
-        folder = options.out or record.folder
-        require_replaceable(folder, is_of_a_run)  # before hours of flying
-        plan = _plan_kept(Unfinished.beside(folder).folder, record)
+        plan = _plan_kept(Unfinished.beside(options.out or record.folder).folder, record)
     run_sweep(plan, record, options, sweeping.workers)
 
 

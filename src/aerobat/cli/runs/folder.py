@@ -29,7 +29,7 @@ from aerobat.reporting.plain_data import to_json
 from aerobat.reporting.report import Report
 from aerobat.reporting.tables import print_table, table
 from aerobat.simulation import Flight
-from aerobat.storage import whole_folder
+from aerobat.storage import require_replaceable, whole_folder
 from aerobat.studies.share import Share, Trials
 
 FLIGHT = "flight.npz"
@@ -66,6 +66,11 @@ FILES = (
 def is_of_a_run(name: str) -> bool:
     """Return True for the name of a file that runs write."""
     return name in FILES or name.endswith(".plan")
+
+
+def require_place(record: RunRecord, options: OutputOptions) -> None:
+    """Raise SpecError, before anything is planned or flown, for a folder that holds what no run wrote."""
+    require_replaceable(options.out or record.folder, is_of_a_run)
 
 
 def written(
