@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 import aerobat as ab
 from aerobat import cli
+from aerobat.cli.progress import Progress
 from aerobat.reporting.plain_data import to_json
 from aerobat.studies.error_causes import error_causes, four_causes
 from public_calls import cruise
@@ -26,6 +28,22 @@ def quick_study(flights: int) -> ab.ErrorCauses:
         conditions=ab.Dispersion(mass=0.01, control_rate=100.0),
         flights=flights,
     )
+
+
+def test_a_trial_counts_as_progress_once_it_is_finished(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told: list[tuple[int, str]] = []
+    monkeypatch.setattr(Progress, "tell", lambda self, done, note: told.append((done, note)))
+
+    def measured(*given: object, begin: Callable[[str], None], **more: object) -> ab.ErrorCauses:
+        for name in ("none", "late", "all together"):
+            begin(name)
+        return quick_study(flights=8)
+
+    monkeypatch.setattr("aerobat.cli.commands.causes.error_causes", measured)
+    cli.main(["causes", "half-flip", *FEW, "--json"])
+    assert told == [(0, "none"), (1, "late"), (2, "all together")]
 
 
 def test_what_the_command_says_is_measured_and_told(

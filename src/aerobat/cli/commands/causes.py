@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import count
 from typing import Annotated
 
 from cyclopts import Parameter, validators
@@ -44,7 +45,8 @@ def causes(problem: str, options: CausesOptions = CausesOptions()) -> None:
     task, vehicle = read_task(problem, options)
     conditions = load_dispersion(options.conditions)
     switched = four_causes(conditions, vehicle.controller)
-    with showing(Progress("trial", len(switched) + 2)) as progress:
+    with showing(Progress("trials", len(switched) + 2)) as progress:
+        finished = count()  # as one begins, those before it are finished
         measured = error_causes(
             task,
             vehicle,
@@ -54,7 +56,7 @@ def causes(problem: str, options: CausesOptions = CausesOptions()) -> None:
             flights=options.flights,
             seed=options.seed,
             workers=options.workers,
-            begin=progress.step,
+            begin=lambda name: progress.tell(next(finished), name),
         )
     if options.json:
         print_json(to_json(measured))
