@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import expm1, inf, sqrt
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,8 +11,10 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.planning import least_duration
+from aerobat.planning.assessment import lower_bound
 from aerobat.planning.assessment.damped_point import DampedPoint
 from aerobat.planning.assessment.lower_bound import max_angular_acceleration
+from aerobat.problem import Problem, Waypoint, Waypoints, at_rest
 from random_problems import random_case
 from suites import examples
 
@@ -193,3 +196,27 @@ def test_no_rotor_thrusts_turn_the_body_faster_than_the_largest_angular_accelera
         assert (
             0.99 * max_angular_acceleration(vehicle) <= reached <= 1.0001 * max_angular_acceleration(vehicle)
         )
+
+
+def test_a_long_course_is_bounded_in_few_legs_and_as_high_as_by_all_of_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """All pairs of stages, along all directions between them, made a hundred waypoints take a minute."""
+    legs: list[int] = []
+
+    def counted(*leg: Any) -> float:
+        legs.append(1)
+        return one_leg(*leg)
+
+    one_leg = lower_bound._leg
+    monkeypatch.setattr(lower_bound, "_leg", counted)
+    places = np.cumsum(np.random.default_rng(3).normal(scale=4.0, size=(42, 3)), axis=0).tolist()
+    waypoints = tuple(Waypoint(position=tuple(place)) for place in places[1:-1])
+    course = Problem(
+        name="course", start=at_rest(places[0]), goal=at_rest(places[-1]), maneuver=Waypoints(waypoints)
+    )
+    found, few = least_duration(course, QUAD), len(legs)
+    monkeypatch.setattr(lower_bound, "_not_surpassed", lambda longest: longest)
+    legs.clear()
+    assert least_duration(course, QUAD) == found
+    assert few < 0.3 * len(legs)

@@ -196,6 +196,7 @@ def _longest(groups: Sequence[Sequence[_Place]], up: DampedPoint, down: DampedPo
     """Return the largest lower bound [s] from the first group to the last, by way of positions between.
 
     Groups between may be skipped. This is the longest path through the groups, by dynamic programming.
+    Reversals from which no longest path goes on are dropped, so that many stages cost little more than few.
     """
     longest = dict.fromkeys(groups[0], 0.0)
     for group in groups[1:]:
@@ -204,7 +205,23 @@ def _longest(groups: Sequence[Sequence[_Place]], up: DampedPoint, down: DampedPo
             for place in group
         }
         longest |= {place: max(time, longest.get(place, -inf)) for place, time in reached.items()}
+        longest = dict(_not_surpassed(longest))
     return max(0.0, *reached.values())
+
+
+def _not_surpassed(longest: dict[_Place, float]) -> Iterator[tuple[_Place, float]]:
+    """Yield the positions with their times, without reversals from which another one goes farther and later.
+
+    Motions go down from positions ABOVE and up from those BELOW, for longer the farther the next one is.
+    """
+    farthest = {_Relation.ABOVE: -inf, _Relation.BELOW: -inf}
+    for place, time in sorted(longest.items(), key=lambda item: item[1], reverse=True):
+        if place.relation is not _Relation.AT:
+            distance = place.position if place.relation is _Relation.ABOVE else -place.position
+            if distance <= farthest[place.relation]:
+                continue
+            farthest[place.relation] = distance
+        yield place, time
 
 
 def _leg(a: _Place, b: _Place, up: DampedPoint, down: DampedPoint) -> float:
