@@ -78,6 +78,23 @@ def test_what_has_no_plan_is_answered_with_the_reason_and_the_vehicle_hovers_on(
     assert sky.hovers
 
 
+def test_a_vehicle_that_was_left_to_itself_in_the_air_lands_and_takes_off_only_then() -> None:
+    """A take-off from the air would take its height for the ground's, and landings would end there."""
+    sky = aloft()
+    sky.graph.cut.add(topics.ODOMETRY)
+    sky.run(lambda: sky.node.commander.doing is Doing.NOTHING)
+    sky.graph.cut.clear()
+    sky.run(lambda: sky.hovers and sky.vehicle.mode is Mode.HOLD)
+    sky.run_for(0.2)
+    refused = sky.call("takeoff")
+    assert refused.success is False
+    assert refused.sentence == "the vehicle is in the air already; have it land first"
+    assert sky.call("land").success
+    sky.run(lambda: sky.node.commander.doing is Doing.NOTHING)
+    assert sky.stands
+    assert sky.call("takeoff").success
+
+
 class Planning(AtOnce):
     """Never has a plan."""
 

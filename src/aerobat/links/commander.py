@@ -67,6 +67,7 @@ class Commander:
         self.mission: Mission[PathGoal] | None = None  # the last one
         self._vehicle, self._gravity, self._period, self._say = vehicle, gravity, period, say
         self._deadline = 0.0  # [s] time limit for reaching the top of a climb, or the ground
+        self._is_landed = True  # false from a take-off to the end of a landing
         self._jumped = False  # the observed position has jumped since a climb or landing began
 
     def observe(self, observed: Observed) -> None:
@@ -86,7 +87,9 @@ class Commander:
         if self.doing is not Doing.NOTHING:
             raise SpecError(f"the vehicle is {self.doing} already")
         here = np.array(observed.body.position)
-        self.ground = float(here[2])
+        if not self._is_landed and here[2] - self.ground >= _HOVER_HEIGHT:
+            raise SpecError("the vehicle is in the air already; have it land first")
+        self.ground, self._is_landed = float(here[2]), False
         up = rest_to_rest(here, here + height * so3.UP)
         self._deadline, self._jumped = now + _SPIN_UP_TIME + up.duration + _ROUTE_TIMEOUT, False
         self._go(Doing.CLIMBING, now + _SPIN_UP_TIME, up, yaw_of(observed.body.q_world_body))
@@ -150,7 +153,7 @@ class Commander:
         if self.doing is not Doing.LANDING and since >= self.route.path.duration:
             self.doing = Doing.HOVERING
         if self.doing is Doing.LANDING and since > self.route.path.duration + _STANDING:
-            self.doing, self.route = Doing.NOTHING, None
+            self.doing, self.route, self._is_landed = Doing.NOTHING, None, True
             return None
         return self._goal_on_route(now)
 
