@@ -24,7 +24,7 @@ def _(found: Inspection) -> Iterator[Fact]:
     yield Fact("verdict", found.verdict, text=found.verdict)
     yield from record(
         cause=found.cause,
-        inner_loop_fault=None if found.fault is None else found.fault.cause,
+        fault=None if found.fault is None else found.fault.cause,
         max_position_error_m=found.largest,
         time_s=found.time,
     )
