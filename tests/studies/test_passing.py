@@ -5,17 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.planning.result import FLYING_RESERVE
-from aerobat.studies.passing import Passing, Round, tightening
+from aerobat.studies.passing import Passing, Round, proving
 from aerobat.studies.passing.causes import main_failure_cause
+from aerobat.studies.passing.proving import Proving
 from aerobat.studies.passing.spread import with_more_thrust
-from aerobat.studies.passing.task import VARIANTS
+from aerobat.studies.passing.steadying import steadier
+from aerobat.studies.passing.task import Flown, PassingTask
 from aerobat.studies.passing.tightening import Tightening
 from aerobat.studies.share import Share
 
@@ -66,15 +70,52 @@ def test_a_probability_that_is_met_already_costs_nothing():
     assert len(found.rounds) == 1
 
 
+class Imagined(PassingTask):
+    """Plans keep as much reserve as there is room for; as much as is needed lets all flights succeed."""
+
+    need: float
+    room: float
+
+    def tightened(self, first: Flown, start: Flown, tightening: Tightening, required: ab.Problem) -> Any:
+        if tightening.reserve > self.room + 1e-9:
+            raise ab.Infeasible("there is no room", [])
+        reserve, rate = tightening.reserve, tightening.rate
+        return SimpleNamespace(
+            duration=1.0 + reserve + (1.0 - rate), certified=True, flies=True, keeps=reserve
+        )
+
+    def selecting(self, found: Any) -> Any:
+        share = min(1.0, 0.5 + 0.5 * found.keeps / self.need) if self.need else 1.0
+        return SimpleNamespace(succeeded=np.arange(200) < 200 * share, passages=(), attitudes=())
+
+
+def imagined(need: float, room: float) -> Imagined:
+    """Return a task of a figure without gates."""
+    task = object.__new__(Imagined)
+    values = {
+        "need": need,
+        "room": room,
+        "probability": 0.95,
+        "proving": 1000,
+        "vehicle": ab.load_vehicle("agile-quad"),
+        "problem": ab.load_problem("power-loop"),
+        "noted": lambda done: None,
+    }
+    for name, value in values.items():
+        object.__setattr__(task, name, value)
+    return task
+
+
 @given(need=st.integers(0, 20), room=st.integers(0, 20))
-def test_the_least_reserve_is_found_wherever_plans_end(need: int, room: int):
+def test_hardly_more_reserve_than_needed_is_kept_wherever_plans_end(need: int, room: int):
     """Without a plan above some reserve, a smaller one that is enough is found all the same."""
-    search = object.__new__(Tightening)
-    search.task = SimpleNamespace(is_likely_proof=lambda share: share)
-    most = need + room
-    search._round = lambda steps: None if steps > most else SimpleNamespace(share=steps >= need)
-    steps, done = search._smallest()
-    assert (steps, done.share) == (need, True)
+    task = imagined(0.02 * need, 0.02 * room)
+    plain = SimpleNamespace(duration=1.0, keeps=0.0)
+    first = Flown(plain, task.selecting(plain), 0.15, task.problem)
+    found = steadier(task, first, first, 30, 0.05)
+    assert found.tightening.reserve <= min(0.02 * need + 0.1, 0.02 * room) + 1e-9
+    if need + 5 <= room:
+        assert task.suffices(found.share)
 
 
 @pytest.mark.slow
@@ -97,36 +138,29 @@ def test_a_saved_plan_carries_its_tube(tmp_path):
     assert ab.load_plan(tmp_path / "flip.plan").tube == found.tube
 
 
-def test_a_plain_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened():
-    """Its proof fails on fresh flights; the next round is of the problem as it is, and proven on others."""
-    tightening = object.__new__(Tightening)
-    tightening.task = SimpleNamespace(
-        problem="as it is",
-        is_likely_proof=lambda share: True,
-        is_proof=lambda share: share,
-        share=lambda plan, fresh: plan == "tightened",
-    )
-    tightening.training, tightening.proving = range(4), 10
-    tightening._plain = lambda: (SimpleNamespace(plan="plain", share=1.0), None)
-    tightening._planned = lambda steps, variant, problem, longest: SimpleNamespace(
-        round=SimpleNamespace(plan="tightened", share=1.0, problem=problem), variant=variant
-    )
-    tightening._proven = lambda done, share, fresh: (done.plan, done.problem, fresh)
-    assert tightening.passing() == ("tightened", "as it is", range(14, 24))
+def test_a_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened(monkeypatch: pytest.MonkeyPatch):
+    """Its proof fails on fresh flights; the next plan goes on from it, and is proven on others."""
+    task = imagined(0.0, 1.0)
+    started: list[float] = []
 
+    def steadier(task: Imagined, first: Flown, start: Flown, tries: int, price: float) -> Flown:
+        started.append(start.share.fraction)
+        return start if start.share.fraction == 1.0 else replace(start, plan="tightened", scores=all_pass)
 
-def test_where_no_remaining_variant_has_a_plan_all_are_tried_again_without_the_added_thrust():
-    """Of a power loop, more thrust in its stages helped at first, and left no plan with more reserve."""
-    found = object.__new__(Tightening)
-    found.task = SimpleNamespace(is_likely_proof=lambda share: share)
-    found._variants, found._problem, found._narrower = VARIANTS[2:3], "more thrust", "as it is"
-    found._planned = lambda steps, variant, problem, longest: (
-        None
-        if problem == "more thrust" or variant == VARIANTS[0]
-        else SimpleNamespace(round=SimpleNamespace(plan=problem, share=True), variant=variant)
-    )
-    assert found._round(6).plan == "as it is"
-    assert found._variants == (VARIANTS[1],)
+    all_pass, none = (SimpleNamespace(succeeded=np.full(10, passes)) for passes in (True, False))
+    plain = SimpleNamespace(keeps=lambda reserve: True)
+    monkeypatch.setattr(proving, "steadier", steadier)
+    monkeypatch.setattr(proving, "plan", lambda *asked: plain)
+    changed = {"planner": SimpleNamespace(reserve=0.15), "flights": range(4), "proving": 10, "progress": None}
+    changed["scores"] = lambda found, flights: all_pass if found == "tightened" else none
+    changed["selecting"] = lambda found: all_pass
+    changed["is_proof"] = lambda share: share.fraction == 1.0
+    for name, value in changed.items():
+        object.__setattr__(task, name, value)
+    search = Proving(task, [])
+    object.__setattr__(search, "_proven", lambda first, done, share, fresh: (done.plan, fresh))
+    assert search.passing() == ("tightened", range(14, 24))
+    assert started == [1.0, 1.0, 0.0, 1.0]
 
 
 @pytest.mark.slow
@@ -139,7 +173,6 @@ def test_a_power_loop_is_proven_by_the_plan_that_commands_take():
     )
     assert found.before.fraction < 0.9
     assert found.price < 0.2 * found.plain.duration
-    assert len(found.rounds) == 2
 
 
 @pytest.mark.slow
@@ -163,8 +196,7 @@ def test_where_rotors_lag_otherwise_than_known_turning_slower_costs_less_than_an
 
 @pytest.mark.slow
 def test_what_cannot_be_reached_names_the_cause_in_the_way(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(tightening, "MAX_STEPS", 3)
-    monkeypatch.setattr(tightening, "TIGHTENING_TIME", 0.5)
+    monkeypatch.setattr(proving, "TRIES", 3)
     rounds: list[Round] = []
     with pytest.raises(ab.Infeasible, match=r"the start stands in the way: without it .* pass") as refused:
         ab.plan_to_pass(

@@ -50,7 +50,7 @@ def test_a_longer_plan_is_worth_its_time(vehicle: str, tilt: float) -> None:
     first = ab.plan(half_flip(tilt), PLANNER, vehicle)
     found = steadied(first, PLANNER, ab.load_dispersion("lab"))
     if found.duration > first.duration:
-        more, less = map(int, re.findall(r"(\d+)(?: of 200 flights| *$)", found.rescue))
+        more, less = map(int, re.findall(r"(\d+)(?: of 400 flights| *$)", found.rescue))
         worth = max(MIN_GAIN, DURATION_PRICE * math.log(found.duration / first.duration))
         assert more - less >= worth * len(SELECTION_FLIGHTS)
 

@@ -14,9 +14,9 @@ from aerobat.evaluation.opening import Probability
 from aerobat.planning import Attempt, Planner, as_planner
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.flights import Flights, cut
+from aerobat.studies.passing.proving import Proving
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.task import PassingTask
-from aerobat.studies.passing.tightening import Tightening
 from aerobat.studies.share import CONFIDENCE
 from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
@@ -79,20 +79,29 @@ def plan_to_pass(
     _require_enough("flights", flights, probability)
     _require_enough("fresh", proving, probability)
     named_controller(controller)
-    flown = range(flights)
+    rounds: list[Round] = []
+
+    def note(done: Round) -> None:
+        rounds.append(done)
+        if tried is not None:
+            tried(done)
+
     with pool(workers, executor, len(cut(range(max(flights, proving))))) as flying:
         task = PassingTask(
-            as_problem(problem),
-            method,
-            as_vehicle(vehicle),
-            conditions,
-            seed,
-            controller,
-            probability,
-            progress,
-            flying,
+            problem=as_problem(problem),
+            planner=method,
+            vehicle=as_vehicle(vehicle),
+            conditions=conditions,
+            seed=seed,
+            controller=controller,
+            probability=probability,
+            flights=range(flights),
+            proving=proving,
+            progress=progress,
+            flying=flying,
+            noted=note,
         )
-        return Tightening(task, flown, proving, tried or (lambda done: None)).passing()
+        return Proving(task, rounds).passing()
 
 
 def _least_flights(probability: float) -> int:

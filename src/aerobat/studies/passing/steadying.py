@@ -1,73 +1,36 @@
 """A plan with more successful flights than the first one, where that is worth its time: used by commands.
 
-Rotors with an unknown lag are late by an angle proportional to the body rate. Paths with much lower body
-rates often take hardly longer. A push that no model contains, such as unknown drag, tilts the vehicle by the
-ratio of push to thrust, so that more thrust in a gate keeps the attitude there. A larger reserve of every
-rotor leaves more to the controller.
+The search goes on from its best plan, with one more requirement at a time, until enough flights succeed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import log, radians
 
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
-from aerobat.optimization.deadline import processor
 from aerobat.planning import Attempt, Plan, Planner, as_planner
 from aerobat.planning.result import FLYING_RESERVE
 from aerobat.problem import Problem
 from aerobat.simulation.nested import joined
-from aerobat.studies.flights import passed
+from aerobat.studies.flights import LOOKS, passed
 from aerobat.studies.passing.spread import with_more_thrust, with_narrower_gates
-from aerobat.studies.passing.task import PassingTask, Variant, warm_started_refinement
-from aerobat.studies.share import Share, Trials
+from aerobat.studies.passing.task import Flown, PassingTask, warm_started_refinement
+from aerobat.studies.passing.tightening import Tightening, rounds
+from aerobat.studies.share import Trials
 from aerobat.studies.workers import Pool
 
 MAX_LAG_ANGLE = radians(5.0)  # [rad] turned within the rotors' lag, above which flights may be too late
-SELECTION_FLIGHTS = range(10**6, 10**6 + 200)  # flights that select the plan; other flights judge it
+SELECTION_FLIGHTS = range(10**6, 10**6 + 400)  # flights that select the plan; other flights judge it
 FIRST_FLIGHTS = 50  # of these: where enough of them succeed, the plan is kept
-SUFFICIENT_SUCCESS = 0.975  # fraction of these flights: most plans with as many successes are proven for 95 %
-CERTAIN_SUCCESS = 0.985  # likewise, less the price of the duration, with which no further plan is tried
 MIN_GAIN = 0.02  # fraction of these flights that must succeed beyond the first plan's for a longer plan
 # price of a duration e times as long, as a fraction of these flights: of a plan 10 % longer, 5 of 100 flights
 # more must succeed
 DURATION_PRICE = 0.5
-PLANNING_TIME = 6.0  # [s] processor time limit of all these plans, most of which take 0.3 to 3
-PLAN_FRACTION = 0.6  # fraction of the time that is left for one of them
-LEAST_TIME = 0.5  # [s] of which no plan is begun with less
-
-
-@dataclass(frozen=True)
-class _Tightening:
-    """What is asked of a further plan."""
-
-    rate: float  # limit of the body rate, as a fraction of the first plan's largest; 1 only refines once more
-    reserve: float = 0.0  # beyond the first plan's
-    thrust: bool = False  # whether more thrust is asked in gates
-
-    def contains(self, other: _Tightening) -> bool:
-        """Return True where whatever the other asks is asked here too."""
-        return self.rate <= other.rate and self.reserve >= other.reserve and self.thrust >= other.thrust
-
-    def described(self, reserve: float) -> str:
-        """Return the differences from the first plan in words, whose reserve is given."""
-        stronger = ", with more thrust in gates" if self.thrust else ""
-        slower = "" if self.rate == 1.0 else f", turning at most {100 * self.rate:g} % as fast"
-        kept = f", with a reserve of {reserve + self.reserve:g}" if self.reserve else ""
-        return stronger + slower + kept
-
-
-# In the order of trial. Lower body rates cost flips through gates hardly any time, and more thrust keeps
-# their attitude; of figures without gates more reserve costs the least time (benchmarks/steadying.py).
-_TIGHTENINGS = (
-    _Tightening(1.0),
-    *(_Tightening(rate, thrust=thrust) for rate in (0.65, 0.5) for thrust in (False, True)),
-    *(_Tightening(1.0, reserve, thrust) for reserve in (0.1, 0.2) for thrust in (False, True)),
-    *(_Tightening(0.8, reserve) for reserve in (0.0, 0.1)),
-)
+TRIES = 12  # further plans that are tried by commands
 
 
 @validated
@@ -110,90 +73,89 @@ def steadied(
         seed=seed,
         controller=controller,
         probability=Trials.NEEDED,
+        flights=SELECTION_FLIGHTS,
+        proving=LOOKS[-1],
         progress=progress,
         flying=Pool(),
     )
-    return steadier(task, plan, kept, may_grow=reserve == FLYING_RESERVE)[0]
+    scores = task.scores(plan, SELECTION_FLIGHTS[:FIRST_FLIGHTS])
+    if task.suffices(passed(scores)):
+        return plan
+    scores = joined([scores, task.scores(plan, SELECTION_FLIGHTS[FIRST_FLIGHTS:])])
+    first = Flown(plan, scores, kept, plan.problem)
+    found = steadier(task, first, first, TRIES, DURATION_PRICE, may_grow=reserve == FLYING_RESERVE)
+    return plan if found is first else _explained(found, first)
 
 
-@dataclass(frozen=True)
-class _Candidate:
-    """A plan, and the share of its flights that succeed."""
+def steadier(
+    task: PassingTask, first: Flown, start: Flown, tries: int, price: float, may_grow: bool = True
+) -> Flown:
+    """Return the most valuable of some plans of which more flights succeed, or the plan at the start.
 
-    plan: Plan
-    share: Share
-    tightening: _Tightening  # what is asked of it, beyond the first plan
-    price: float = 0.0  # of its duration, as a fraction of the flights
-
-    @property
-    def value(self) -> float:
-        """The fraction of the flights that succeed, less the price of the duration."""
-        return self.share.fraction - self.price
-
-    def explained(self, first: _Candidate, reserve: float) -> Plan:
-        """Return the plan with its relation to the first plan, which keeps a reserve, as its `rescue`."""
-        why = (
-            f"goes on from {first.plan.planner}'s {first.plan.duration:.3f} s"
-            f"{self.tightening.described(reserve)}: {self.share.count} of {self.share.of} flights succeed "
-            f"instead of {first.share.count}"
-        )
-        return replace(self.plan, attempts=(*first.plan.attempts, *self.plan.attempts), rescue=why)
-
-
-def steadier(task: PassingTask, plan: Plan, reserve: float, may_grow: bool) -> tuple[Plan, float]:
-    """Return the most valuable of some plans of which more flights succeed, or the plan; and its reserve.
+    Each round of steps goes on from the most valuable plan so far. The search ends when enough flights
+    succeed.
 
     Args:
         task: The flights, and the planner of further plans.
-        plan: The first plan.
-        reserve: The reserve that the first plan keeps.
+        first: The first plan, from which longer durations have their price.
+        start: The plan at the start.
+        tries: The largest number of further plans.
+        price: The price of a duration e times as long, as a fraction of the flights.
         may_grow: Whether larger reserves are tried, too.
     """
-    scores = task.scores(plan, SELECTION_FLIGHTS[:FIRST_FLIGHTS])
-    if passed(scores).fraction >= SUFFICIENT_SUCCESS:
-        return plan, reserve
-    scores = joined([scores, task.scores(plan, SELECTION_FLIGHTS[FIRST_FLIGHTS:])])
-    share = passed(scores)
-    if share.fraction >= SUFFICIENT_SUCCESS:
-        return plan, reserve
-    first = best = _Candidate(plan, share, _Tightening(1.0))
-    deadline = processor() + PLANNING_TIME
-    narrower = with_narrower_gates(plan.problem, task.vehicle, scores)
-    stronger = with_more_thrust(narrower, task.vehicle, plan, scores, SUFFICIENT_SUCCESS)
-    too_long: list[_Tightening] = []  # whose plans are not worth their duration
-    for each in _tightenings(plan.problem, may_grow, stronger != narrower):
-        left = deadline - processor()
-        if best.value >= CERTAIN_SUCCESS or left <= LEAST_TIME:
+
+    def price_of(plan: Plan) -> float:
+        return price * log(plan.duration / first.plan.duration)
+
+    sufficiency = 1.0 - task.probability  # worth of enough flights: a proof leaves at most as many failures
+    best, most = start, start.share.fraction - price_of(start.plan)
+    too_long: list[Tightening] = []  # whose plans are not worth their duration
+    base, last = best, tuple[Tightening, ...]()
+    for steps in rounds(task.problem, may_grow):
+        if best is base and steps == last:  # which would find the same
             break
-        if any(each.contains(other) for other in too_long):
-            continue
-        problem, variant = stronger if each.thrust else narrower, Variant(each.rate, True)
-        try:
-            other = task.tightened(plan, reserve + each.reserve, variant, problem, PLAN_FRACTION * left)
-        except (Infeasible, SpecError):  # no plan, or gates too narrow for one
-            continue
-        price = DURATION_PRICE * log(other.duration / plan.duration)
-        if 1.0 - price <= best.value:
-            too_long.append(each)
-        elif other.certified and other.flies:
-            flown = _Candidate(other, passed(task.scores(other, SELECTION_FLIGHTS)), each, price)
-            least = first.share.fraction + (MIN_GAIN if price > 0.0 else 0.0)
-            if flown.value > best.value and flown.share.fraction > least:
-                best = flown
-    if best is first:
-        return plan, reserve
-    return best.explained(first, reserve), reserve + best.tightening.reserve
+        base, last = best, steps
+        for step in steps:
+            if not tries or task.suffices(best.share):
+                return best
+            tightening, required = base.tightening.then(step), _required(task, base, step.thrust)
+            if any(tightening.contains(each) for each in too_long):
+                continue
+            if step.thrust and required.maneuver == base.required.maneuver:  # no more would help
+                continue
+            tries -= 1
+            try:
+                plan = task.tightened(first, base, tightening, required)
+            except (Infeasible, SpecError):  # no plan, or gates too narrow for one
+                continue
+            if 1.0 + sufficiency - price_of(plan) <= most:
+                too_long.append(tightening)
+            elif plan.certified and plan.flies:
+                flown = Flown(plan, task.selecting(plan), first.first_reserve, required, tightening)
+                task.noted(flown.round)
+                share = flown.share
+                value = share.fraction + sufficiency * task.suffices(share) - price_of(plan)
+                least = start.share.fraction + MIN_GAIN * (price_of(plan) > 0.0)
+                if value > most and share.fraction > least:
+                    best, most = flown, value
+    return best
 
 
-def _tightenings(problem: Problem, may_grow: bool, may_push: bool) -> list[_Tightening]:
-    """Return the tightenings that are tried; larger reserves and more thrust in gates only where they may be.
+def _required(task: PassingTask, best: Flown, more_thrust: bool) -> Problem:
+    """Return the problem of a further plan: gates narrowed by flights, and thrust in stages as required."""
+    narrower = with_narrower_gates(task.problem, task.vehicle, best.scores)
+    narrower = replace(narrower, maneuver=best.required.maneuver)
+    if not more_thrust:
+        return narrower
+    fraction = 0.5 * (1.0 + task.probability)  # half of the flights that may fail
+    return with_more_thrust(narrower, task.vehicle, best.plan, best.scores, fraction)
 
-    Without gates only larger reserves are tried, if they may be.
-    """
-    allowed = [
-        each
-        for each in _TIGHTENINGS
-        if (may_grow or not each.reserve) and (not each.thrust or (may_push and problem.gates))
-    ]
-    larger = [each for each in allowed if each.reserve]
-    return allowed if problem.gates or not larger else larger
+
+def _explained(found: Flown, first: Flown) -> Plan:
+    """Return the found plan with its relation to the first one as its `rescue`."""
+    why = (
+        f"goes on from {first.plan.planner}'s {first.plan.duration:.3f} s"
+        f"{found.tightening.described(first.reserve)}: {found.share.count} of {found.share.of} "
+        f"flights succeed instead of {first.share.count}"
+    )
+    return replace(found.plan, attempts=(*first.plan.attempts, *found.plan.attempts), rescue=why)

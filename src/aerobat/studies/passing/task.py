@@ -1,10 +1,10 @@
-"""The task of a search for a plan that passes: variants of the plain plan, and their shares of flights."""
+"""The task of a search for a plan that flies better: further plans, their flights, and what suffices."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from math import ceil, inf, sqrt
+from dataclasses import dataclass, field, replace
+from math import inf, sqrt
 from typing import Any, cast
 
 from aerobat.control import named_controller
@@ -16,36 +16,47 @@ from aerobat.planning.planners import planner_with_reserve
 from aerobat.problem import Problem
 from aerobat.simulation.nested import joined
 from aerobat.studies.flights import FlightTask, fly_scores, passed
+from aerobat.studies.passing.result import Round
+from aerobat.studies.passing.tightening import Tightening
 from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool
 from aerobat.vehicle import Vehicle
 
 SCREENING_FLIGHTS = 200  # flights after which a plan is rejected if they already refute its probability
-# Fractions of the plain plan's largest body rate that limit tightened plans. Rotors with an unknown lag are
-# late by an angle proportional to the body rate. With half the body rate, flips of five vehicles took at most
-# 2 % longer, with a fifth as many attitude failures; a third of it gained nothing more (lab book).
-BODY_RATE_FRACTIONS = (1.0, 0.8, 0.65, 0.5)
+PLANNING_TIME = 4.0  # [s] processor time limit of a further plan, most of which take 0.3 to 3
 REFINEMENT_PLANNER = "free-knots"  # planner that continues from a plan where the requested planner cannot
 KEPT_SETTINGS = ("segments", "clearance", "time_limit")  # settings taken from the requested planner
 
 
-@dataclass(frozen=True)
-class Variant:
-    """A kind of tightening beside the reserve."""
+@dataclass(frozen=True, eq=False)
+class Flown:
+    """A plan, what was required of it, and the scores of its flights."""
 
-    body_rate_fraction: float  # [-] limit of body rate, as a fraction of the plain plan's largest
-    warm_start: bool  # True: warm start from the plain plan; false: the planner starts anew
+    plan: Plan
+    scores: Score
+    first_reserve: float  # that the first plan keeps
+    required: Problem  # the plan's problem, or one with narrower gates or more thrust in its stages
+    tightening: Tightening = field(default_factory=Tightening)  # beyond the first plan's requirements
 
+    @property
+    def reserve(self) -> float:
+        """The reserve of every limit's range that was required [-]."""
+        return round(self.first_reserve + self.tightening.reserve, 9)
 
-VARIANTS = (
-    *(Variant(fraction, True) for fraction in BODY_RATE_FRACTIONS),
-    *(Variant(fraction, False) for fraction in BODY_RATE_FRACTIONS[::2]),
-)
+    @property
+    def share(self) -> Share:
+        """The share of the flights that succeed."""
+        return passed(self.scores)
+
+    @property
+    def round(self) -> Round:
+        """The plan, its reserve, and the share of its flights that succeed."""
+        return Round(self.reserve, self.plan, self.share)
 
 
 @dataclass(frozen=True, eq=False)
 class PassingTask:
-    """Problem, vehicle and flights of the search for a plan that passes."""
+    """Problem, vehicle and flights of the search for a plan that flies better."""
 
     problem: Problem
     planner: Any  # a planner with a reserve
@@ -53,25 +64,28 @@ class PassingTask:
     conditions: Dispersion
     seed: int
     controller: str
-    probability: float
+    probability: float  # with which flights must succeed
+    flights: range  # numbers of the flights by which plans are selected
+    proving: int  # number of other flights that prove the selected plan
     progress: Callable[[Attempt], None] | None
     flying: Pool
+    noted: Callable[[Round], None] = field(default=lambda done: None)
 
-    def tightened(
-        self, plain: Plan, reserve: float, variant: Variant, problem: Problem, limit: float
-    ) -> Plan:
-        """Return a variant of the plan with a reserve, judged by the task's own problem and vehicle.
+    def tightened(self, first: Flown, start: Flown, tightening: Tightening, required: Problem) -> Plan:
+        """Return a plan that goes on from another, judged by the task's own problem and vehicle.
 
-        Planning is limited to `limit` [s] of processor time.
+        Args:
+            first: The first plan.
+            start: The plan that is gone on from.
+            tightening: The requirements beyond the first plan's.
+            required: The problem to plan.
         """
-        vehicle = self.vehicle
-        if variant.body_rate_fraction < 1.0 and plain.assessment is not None:
-            vehicle = replace(
-                vehicle, max_body_rate=variant.body_rate_fraction * (plain.assessment.max_body_rate or inf)
-            )
-        planner = self._warm_started(plain, reserve) if variant.warm_start else self._cold_started(reserve)
-        with within_time(limit, processor):
-            found = plan(problem, planner, vehicle, self.progress)
+        vehicle, assessment = self.vehicle, first.plan.assessment
+        if tightening.rate < 1.0 and assessment is not None:
+            vehicle = replace(vehicle, max_body_rate=tightening.rate * (assessment.max_body_rate or inf))
+        planner = self._warm_started(start.plan, round(first.first_reserve + tightening.reserve, 9))
+        with within_time(PLANNING_TIME, processor):
+            found = plan(required, planner, vehicle, self.progress)
         return replace(found, problem=self.problem, vehicle=self.vehicle)
 
     def _warm_started(self, start: Plan, reserve: float) -> Planner:
@@ -80,23 +94,18 @@ class PassingTask:
             return cast(Planner, replace(self.planner, reserve=reserve, start=start))
         return warm_started_refinement(self.planner, start, reserve)
 
-    def _cold_started(self, reserve: float) -> Planner:
-        """Return the planner with a reserve, without a rescue by another planner."""
-        own = {"rescue": False} if hasattr(self.planner, "rescue") else {}
-        return cast(Planner, replace(self.planner, reserve=reserve, **own))
-
     def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Score:
         """Return scores of flights of a plan, by default under the task's conditions."""
         controller = named_controller(self.controller, self.vehicle.controller)
         task = FlightTask(found, self.vehicle, conditions or self.conditions, self.seed, controller)
         return fly_scores(self.flying, (task,), flights)[0]
 
-    def training(self, found: Plan, flights: range) -> Score:
-        """Return scores of the training flights, or of the first ones if they refute the probability."""
-        first = self.scores(found, flights[:SCREENING_FLIGHTS])
-        if len(flights) <= SCREENING_FLIGHTS or passed(first).interval[1] < self.probability:
+    def selecting(self, found: Plan) -> Score:
+        """Return scores of the selecting flights, or of the first ones if they refute the probability."""
+        first = self.scores(found, self.flights[:SCREENING_FLIGHTS])
+        if len(self.flights) <= SCREENING_FLIGHTS or passed(first).interval[1] < self.probability:
             return first
-        return joined([first, self.scores(found, flights[SCREENING_FLIGHTS:])])
+        return joined([first, self.scores(found, self.flights[SCREENING_FLIGHTS:])])
 
     def share(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Share:
         """Return the share of flights of a plan that pass."""
@@ -106,10 +115,11 @@ class PassingTask:
         """Return True where this share proves the probability."""
         return share.interval[0] >= self.probability
 
-    def is_likely_proof(self, share: Share) -> bool:
-        """True where the share proves the probability even with one standard deviation fewer passes."""
-        deviation = sqrt(share.of * share.fraction * (1.0 - share.fraction))
-        return self.is_proof(Share(max(share.count - ceil(deviation), 0), share.of))
+    def suffices(self, share: Share) -> bool:
+        """Return True where the proving flights, one standard deviation below this share, are a proof."""
+        fraction = share.fraction
+        least = self.proving * fraction - sqrt(self.proving * fraction * (1.0 - fraction))
+        return self.is_proof(Share(max(int(least), 0), self.proving))
 
 
 def warm_started_refinement(planner: Any, start: Plan, reserve: float) -> Planner:

@@ -1,0 +1,88 @@
+"""The proof of a plan on fresh flights, and the refusal where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from aerobat.errors import Infeasible
+from aerobat.planning import plan
+from aerobat.planning.tube import Tube
+from aerobat.studies.flights import passed
+from aerobat.studies.passing.causes import main_failure_cause
+from aerobat.studies.passing.result import Passing, Round
+from aerobat.studies.passing.spread import LEVEL, tube_series
+from aerobat.studies.passing.steadying import DURATION_PRICE, steadier
+from aerobat.studies.passing.task import Flown, PassingTask
+from aerobat.studies.share import Share, percent
+
+# proofs are attempted on separate flights: each errs with probability 2.5 % at most, both together 5 %
+PROOFS = 2
+TRIES = 15  # further plans that are tried at each price
+# prices of a duration e times as long, as fractions of the flights: as commands, then of success at any price
+PRICES = (DURATION_PRICE, 0.05)
+
+
+@dataclass(frozen=True, eq=False)
+class Proving:
+    """The search for a plan that is proven on fresh flights."""
+
+    task: PassingTask
+    rounds: list[Round]  # that the task noted
+
+    def passing(self) -> Passing:
+        """Return the plan that passes, with its proof. Raises Infeasible where there is none."""
+        task = self.task
+        found = plan(task.problem, task.planner, task.vehicle, task.progress)
+        kept = task.planner.reserve if found.keeps(task.planner.reserve) else 0.0  # a rescue gives it up
+        first = done = Flown(found, task.selecting(found), kept, task.problem)
+        task.noted(first.round)
+        for attempt in range(PROOFS):
+            for price in PRICES:
+                done = steadier(task, first, done, TRIES, price)
+            if done.share.fraction < task.probability:
+                raise self._unreachable(done, task.flights)
+            start = len(task.flights) + attempt * task.proving
+            fresh = range(start, start + task.proving)
+            scores = task.scores(done.plan, fresh)
+            if task.is_proof(passed(scores)):
+                return self._proven(first, done, passed(scores), fresh)
+            done = replace(done, scores=scores)
+        raise self._unreachable(done, fresh)
+
+    def _proven(self, first: Flown, done: Flown, share: Share, fresh: range) -> Passing:
+        task = self.task
+        tube = Tube(
+            conditions=task.conditions.name,
+            seed=task.seed,
+            level=LEVEL,
+            **tube_series(task, done.plan, fresh),
+            reserve=done.reserve,
+            plain_duration=first.plan.duration,
+            probability=task.probability,
+            passed=share.count,
+            flights=share.of,
+            lower_bound=share.interval[0],
+        )
+        return Passing(
+            plan=replace(done.plan, tube=tube),
+            plain=first.plan,
+            before=share if done is first else task.share(first.plan, fresh),
+            after=share,
+            probability=task.probability,
+            fresh=fresh,
+            rounds=tuple(self.rounds),
+        )
+
+    def _unreachable(self, best: Flown, flights: range) -> Infeasible:
+        """Return the error with the best share of passing flights and the main cause of failures."""
+        task, share = self.task, self.task.share(best.plan, flights)
+        why = main_failure_cause(
+            task.conditions, task.probability, lambda without: task.share(best.plan, flights, without)
+        )
+        return Infeasible(
+            f"'{task.problem.name}' on {task.vehicle.name} is not proven to pass as often as asked, "
+            f"{percent(task.probability)} %: under {task.conditions.name} {share} pass at best, with a "
+            f"reserve of {best.reserve:g}{f'; {why}' if why else ''}; ask for less, or better that",
+            [attempt for done in self.rounds for attempt in done.plan.attempts],
+            remedy="",
+        )
