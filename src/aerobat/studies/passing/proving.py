@@ -11,15 +11,14 @@ from aerobat.studies.flights import passed
 from aerobat.studies.passing.causes import main_failure_cause
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, tube_series
-from aerobat.studies.passing.steadying import DURATION_PRICE, steadier
+from aerobat.studies.passing.steadying import steadier
 from aerobat.studies.passing.task import Flown, PassingTask
 from aerobat.studies.share import Share, percent
 
 # proofs are attempted on separate flights: each errs with probability 2.5 % at most, both together 5 %
 PROOFS = 2
-TRIES = 15  # further plans that are tried at each price
-# prices of a duration e times as long, as fractions of the flights: as commands, then of success at any price
-PRICES = (DURATION_PRICE, 0.05)
+TRIES = 20  # further plans that are tried for each proof
+DURATION_PRICE = 0.05  # of a duration e times as long, as a fraction of the flights: less than of commands
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +36,7 @@ class Proving:
         first = done = Flown(found, task.selecting(found), kept, task.problem)
         task.noted(first.round)
         for attempt in range(PROOFS):
-            for price in PRICES:
-                done = steadier(task, first, done, TRIES, price)
+            done = steadier(task, first, done, TRIES, DURATION_PRICE)
             if done.share.fraction < task.probability:
                 raise self._unreachable(done, task.flights)
             start = len(task.flights) + attempt * task.proving

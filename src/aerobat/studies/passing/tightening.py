@@ -44,11 +44,7 @@ AT_GATES: tuple[Tightening, ...] = (
     Tightening(),
     *(Tightening(rate, thrust=thrust) for thrust in (False, True) for rate in (0.5, 0.65)),
 )
-MORE_RESERVE: tuple[Tightening, ...] = (
-    Tightening(reserve=0.05),
-    Tightening(reserve=0.1),
-    Tightening(0.8, 0.1),
-)
+MORE_RESERVE: tuple[Tightening, ...] = (Tightening(reserve=0.05), Tightening(reserve=0.1))
 GROWTHS = 6  # rounds of more reserve: with 0.05 each beyond the default, a tenth of the range is left to fly
 
 
