@@ -113,7 +113,7 @@ def steadier(
     base, last = best, tuple[Tightening, ...]()
     for steps in rounds(task.problem, may_grow):
         if best is base and steps == last:  # which would find the same
-            break
+            continue
         base, last = best, steps
         for step in steps:
             if not tries or task.suffices(best.share):

@@ -45,6 +45,7 @@ AT_GATES: tuple[Tightening, ...] = (
     *(Tightening(rate, thrust=thrust) for thrust in (False, True) for rate in (0.5, 0.65)),
 )
 MORE_RESERVE: tuple[Tightening, ...] = (Tightening(reserve=0.05), Tightening(reserve=0.1))
+SLOWER: tuple[Tightening, ...] = (Tightening(0.8), Tightening(0.8, 0.1))  # where more reserve alone ends
 GROWTHS = 6  # rounds of more reserve: with 0.05 each beyond the default, a tenth of the range is left to fly
 
 
@@ -53,5 +54,5 @@ def rounds(problem: Problem, may_grow: bool) -> list[tuple[Tightening, ...]]:
 
     Without gates only larger reserves are tried, if they may be.
     """
-    growing = [MORE_RESERVE] * GROWTHS if may_grow else []
+    growing = [*[MORE_RESERVE] * GROWTHS, SLOWER] if may_grow else []
     return [AT_GATES, *growing] if problem.gates or not growing else growing
