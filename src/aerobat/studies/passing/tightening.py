@@ -42,7 +42,8 @@ class Tightening:
 # keeps their attitude; of figures without gates more reserve costs the least time (benchmarks/steadying.py).
 AT_GATES: tuple[Tightening, ...] = (
     Tightening(),
-    *(Tightening(rate, thrust=thrust) for thrust in (False, True) for rate in (0.5, 0.65)),
+    *(Tightening(rate) for rate in (0.5, 0.65)),
+    *(Tightening(rate, thrust=True) for rate in (0.65, 0.5)),
 )
 MORE_RESERVE: tuple[Tightening, ...] = (Tightening(reserve=0.05), Tightening(reserve=0.1))
 SLOWER: tuple[Tightening, ...] = (Tightening(0.8), Tightening(0.8, 0.1))  # where more reserve alone ends
