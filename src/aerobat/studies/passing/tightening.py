@@ -42,7 +42,7 @@ class Tightening:
 # keeps their attitude; of figures without gates more reserve costs the least time (benchmarks/steadying.py).
 AT_GATES: tuple[Tightening, ...] = (
     Tightening(),
-    *(Tightening(rate) for rate in (0.5, 0.65)),
+    *(Tightening(rate) for rate in (0.5, 0.65, 0.8)),
     *(Tightening(rate, thrust=True) for rate in (0.65, 0.5)),
 )
 MORE_RESERVE: tuple[Tightening, ...] = (Tightening(reserve=0.05), Tightening(reserve=0.1))
