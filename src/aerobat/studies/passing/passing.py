@@ -47,9 +47,9 @@ def plan_to_pass(
     The plain plan is flown many times. If too few flights pass, their spread determines how much to narrow
     the gates for planning, and how much thrust to require in them. Further plans go on from the best one so
     far, with lower body rates, more thrust in gates and larger reserves. The search ends when enough of the
-    same flights pass. The resulting plan is flown on fresh flights, which the
-    search has not used: it is returned if the lower end of the Clopper–Pearson interval reaches the
-    probability. A flight passes if its `Outcome` is a success.
+    same flights pass. The resulting plan is flown on fresh flights, which the search has not used: it is
+    returned if the lower end of the Clopper–Pearson interval reaches the probability. A flight passes if its
+    `Outcome` is a success.
 
     Args:
         problem: The problem or its name.

@@ -12,7 +12,7 @@ from aerobat.studies.passing.causes import main_failure_cause
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, tube_series
 from aerobat.studies.passing.steadying import steadier
-from aerobat.studies.passing.task import Flown, PassingTask
+from aerobat.studies.passing.task import Flown, PassingTask, reserve_kept
 from aerobat.studies.share import Share, percent
 
 # proofs are attempted on separate flights: each errs with probability 2.5 % at most, both together 5 %
@@ -32,7 +32,7 @@ class Proving:
         """Return the plan that passes, with its proof. Raises Infeasible where there is none."""
         task = self.task
         found = plan(task.problem, task.planner, task.vehicle, task.progress)
-        kept = task.planner.reserve if found.keeps(task.planner.reserve) else 0.0  # a rescue gives it up
+        kept = reserve_kept(found, task.planner.reserve)
         first = done = Flown(found, task.selecting(found), kept, task.problem)
         task.noted(first.round)
         for attempt in range(PROOFS):

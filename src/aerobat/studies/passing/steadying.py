@@ -18,7 +18,7 @@ from aerobat.problem import Problem
 from aerobat.simulation.nested import joined
 from aerobat.studies.flights import LOOKS, passed
 from aerobat.studies.passing.spread import with_more_thrust, with_narrower_gates
-from aerobat.studies.passing.task import Flown, PassingTask, warm_started_refinement
+from aerobat.studies.passing.task import Flown, PassingTask, reserve_kept, warm_started_refinement
 from aerobat.studies.passing.tightening import Tightening, rounds
 from aerobat.studies.share import Trials
 from aerobat.studies.workers import Pool
@@ -64,7 +64,7 @@ def steadied(
         return plan
     if float(vehicle.lags.max()) * (plan.assessment.max_body_rate or 0.0) <= MAX_LAG_ANGLE:
         return plan
-    kept = reserve if plan.keeps(reserve) else 0.0
+    kept = reserve_kept(plan, reserve)
     task = PassingTask(
         problem=plan.problem,
         planner=warm_started_refinement(planner, plan, kept),
@@ -107,7 +107,6 @@ def steadier(
     def price_of(plan: Plan) -> float:
         return price * log(plan.duration / first.plan.duration)
 
-    sufficiency = 1.0 - task.probability  # worth of enough flights: a proof leaves at most as many failures
     best, most = start, start.share.fraction - price_of(start.plan)
     too_long: list[Tightening] = []  # whose plans are not worth their duration
     base, last = best, tuple[Tightening, ...]()
@@ -128,13 +127,13 @@ def steadier(
                 plan = task.tightened(first, base, tightening, required)
             except (Infeasible, SpecError):  # no plan, or gates too narrow for one
                 continue
-            if 1.0 + sufficiency - price_of(plan) <= most:
+            if 1.0 - price_of(plan) <= most:
                 too_long.append(tightening)
             elif plan.certified and plan.flies:
                 flown = Flown(plan, task.selecting(plan), first.first_reserve, required, tightening)
                 task.noted(flown.round)
                 share = flown.share
-                value = share.fraction + sufficiency * task.suffices(share) - price_of(plan)
+                value = share.fraction - price_of(plan)
                 least = start.share.fraction + MIN_GAIN * (price_of(plan) > 0.0)
                 if value > most and share.fraction > least:
                     best, most = flown, value

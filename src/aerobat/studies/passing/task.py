@@ -122,6 +122,11 @@ class PassingTask:
         return self.is_proof(Share(max(int(least), 0), self.proving))
 
 
+def reserve_kept(found: Plan, asked: float) -> float:
+    """Return the reserve that a plan keeps: what was asked, half of it, or none, as fallbacks give it up."""
+    return next((part * asked for part in (1.0, 0.5) if found.keeps(part * asked)), 0.0)
+
+
 def warm_started_refinement(planner: Any, start: Plan, reserve: float) -> Planner:
     """Return the refinement, warm-started from a plan, with the settings of the planner that found it."""
     kept = {name: getattr(planner, name) for name in KEPT_SETTINGS if hasattr(planner, name)}
