@@ -78,6 +78,7 @@ def test_what_has_no_plan_is_answered_with_the_reason_and_the_vehicle_hovers_on(
     assert sky.hovers
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_was_left_to_itself_in_the_air_lands_and_takes_off_only_then() -> None:
     """A take-off from the air would take its height for the ground's, and landings would end there."""
     sky = aloft()

@@ -149,7 +149,6 @@ def place(vehicle: SimulatedVehicle, position: Array, velocity: Array, q: Array)
     """Put a flying vehicle into a state."""
     live = vehicle._body
     observer, controller, motion = live._carry
-    live.state = ab.BodyState(position, velocity, q, ZERO)
     parts = (position, velocity, q, ZERO)
     body = type(motion.body)(*(tuple(np.array([x]) for x in part) for part in parts))
     live._carry = (observer, controller, motion._replace(body=body))
