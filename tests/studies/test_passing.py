@@ -19,7 +19,7 @@ from aerobat.studies.passing.causes import main_failure_cause
 from aerobat.studies.passing.proving import Proving
 from aerobat.studies.passing.spread import with_more_thrust
 from aerobat.studies.passing.steadying import steadier
-from aerobat.studies.passing.task import Flown, PassingTask
+from aerobat.studies.passing.task import FlownPlan, PassingTask
 from aerobat.studies.passing.tightening import Tightening
 from aerobat.studies.share import Share
 
@@ -76,7 +76,9 @@ class Imagined(PassingTask):
     need: float
     room: float
 
-    def tightened(self, first: Flown, start: Flown, tightening: Tightening, required: ab.Problem) -> Any:
+    def tightened(
+        self, first: FlownPlan, start: FlownPlan, tightening: Tightening, required: ab.Problem
+    ) -> Any:
         if tightening.reserve > self.room + 1e-9:
             raise ab.Infeasible("there is no room", [])
         reserve, rate = tightening.reserve, tightening.rate
@@ -111,7 +113,7 @@ def test_hardly_more_reserve_than_needed_is_kept_wherever_plans_end(need: int, r
     """Without a plan above some reserve, a smaller one that is enough is found all the same."""
     task = imagined(0.02 * need, 0.02 * room)
     plain = SimpleNamespace(duration=1.0, keeps=0.0)
-    first = Flown(plain, task.selecting(plain), 0.15, task.problem)
+    first = FlownPlan(plain, task.selecting(plain), 0.15, task.problem)
     found = steadier(task, first, first, 30, 0.05)
     assert found.tightening.reserve <= min(0.02 * need + 0.1, 0.02 * room) + 1e-9
     if need + 5 <= room:
@@ -143,7 +145,7 @@ def test_a_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened(monkeypa
     task = imagined(0.0, 1.0)
     started: list[float] = []
 
-    def steadier(task: Imagined, first: Flown, start: Flown, tries: int, price: float) -> Flown:
+    def steadier(task: Imagined, first: FlownPlan, start: FlownPlan, tries: int, price: float) -> FlownPlan:
         started.append(start.share.fraction)
         return start if start.share.fraction == 1.0 else replace(start, plan="tightened", scores=all_pass)
 

@@ -12,7 +12,7 @@ from aerobat.studies.passing.causes import main_failure_cause
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, tube_series
 from aerobat.studies.passing.steadying import steadier
-from aerobat.studies.passing.task import Flown, PassingTask, reserve_kept
+from aerobat.studies.passing.task import FlownPlan, PassingTask, reserve_kept
 from aerobat.studies.share import Share, percent
 
 # proofs are attempted on separate flights: each errs with probability 2.5 % at most, both together 5 %
@@ -33,7 +33,7 @@ class Proving:
         task = self.task
         found = plan(task.problem, task.planner, task.vehicle, task.progress)
         kept = reserve_kept(found, task.planner.reserve)
-        first = done = Flown(found, task.selecting(found), kept, task.problem)
+        first = done = FlownPlan(found, task.selecting(found), kept, task.problem)
         task.noted(first.round)
         for attempt in range(PROOFS):
             done = steadier(task, first, done, TRIES, DURATION_PRICE)
@@ -47,7 +47,7 @@ class Proving:
             done = replace(done, scores=scores)
         raise self._unreachable(done, fresh)
 
-    def _proven(self, first: Flown, done: Flown, share: Share, fresh: range) -> Passing:
+    def _proven(self, first: FlownPlan, done: FlownPlan, share: Share, fresh: range) -> Passing:
         task = self.task
         tube = Tube(
             conditions=task.conditions.name,
@@ -71,7 +71,7 @@ class Proving:
             rounds=tuple(self.rounds),
         )
 
-    def _unreachable(self, best: Flown, flights: range) -> Infeasible:
+    def _unreachable(self, best: FlownPlan, flights: range) -> Infeasible:
         """Return the error with the best share of passing flights and the main cause of failures."""
         task, share = self.task, self.task.share(best.plan, flights)
         why = main_failure_cause(

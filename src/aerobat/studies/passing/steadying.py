@@ -18,7 +18,7 @@ from aerobat.problem import Problem
 from aerobat.simulation.nested import joined
 from aerobat.studies.flights import LOOKS, passed
 from aerobat.studies.passing.spread import with_more_thrust, with_narrower_gates
-from aerobat.studies.passing.task import Flown, PassingTask, reserve_kept, warm_started_refinement
+from aerobat.studies.passing.task import FlownPlan, PassingTask, reserve_kept, warm_started_refinement
 from aerobat.studies.passing.tightening import Tightening, rounds
 from aerobat.studies.share import Trials
 from aerobat.studies.workers import Pool
@@ -82,14 +82,14 @@ def steadied(
     if task.suffices(passed(scores)):
         return plan
     scores = joined([scores, task.scores(plan, SELECTION_FLIGHTS[FIRST_FLIGHTS:])])
-    first = Flown(plan, scores, kept, plan.problem)
+    first = FlownPlan(plan, scores, kept, plan.problem)
     found = steadier(task, first, first, TRIES, DURATION_PRICE, may_grow=reserve == FLYING_RESERVE)
     return plan if found is first else _explained(found, first)
 
 
 def steadier(
-    task: PassingTask, first: Flown, start: Flown, tries: int, price: float, may_grow: bool = True
-) -> Flown:
+    task: PassingTask, first: FlownPlan, start: FlownPlan, tries: int, price: float, may_grow: bool = True
+) -> FlownPlan:
     """Return the most valuable of some plans of which more flights succeed, or the plan at the start.
 
     Each round of steps goes on from the most valuable plan so far. The search ends when enough flights
@@ -130,7 +130,7 @@ def steadier(
             if 1.0 - price_of(plan) <= most:
                 too_long.append(tightening)
             elif plan.certified and plan.flies:
-                flown = Flown(plan, task.selecting(plan), first.first_reserve, required, tightening)
+                flown = FlownPlan(plan, task.selecting(plan), first.first_reserve, required, tightening)
                 task.noted(flown.round)
                 share = flown.share
                 value = share.fraction - price_of(plan)
@@ -140,7 +140,7 @@ def steadier(
     return best
 
 
-def _required(task: PassingTask, best: Flown, more_thrust: bool) -> Problem:
+def _required(task: PassingTask, best: FlownPlan, more_thrust: bool) -> Problem:
     """Return the problem of a further plan: gates narrowed by flights, and thrust in stages as required."""
     narrower = with_narrower_gates(task.problem, task.vehicle, best.scores)
     narrower = replace(narrower, maneuver=best.required.maneuver)
@@ -150,7 +150,7 @@ def _required(task: PassingTask, best: Flown, more_thrust: bool) -> Problem:
     return with_more_thrust(narrower, task.vehicle, best.plan, best.scores, fraction)
 
 
-def _explained(found: Flown, first: Flown) -> Plan:
+def _explained(found: FlownPlan, first: FlownPlan) -> Plan:
     """Return the found plan with its relation to the first one as its `rescue`."""
     why = (
         f"goes on from {first.plan.planner}'s {first.plan.duration:.3f} s"

@@ -29,7 +29,7 @@ KEPT_SETTINGS = ("segments", "clearance", "time_limit")  # settings taken from t
 
 
 @dataclass(frozen=True, eq=False)
-class Flown:
+class FlownPlan:
     """A plan, what was required of it, and the scores of its flights."""
 
     plan: Plan
@@ -71,7 +71,9 @@ class PassingTask:
     flying: Pool
     noted: Callable[[Round], None] = field(default=lambda done: None)
 
-    def tightened(self, first: Flown, start: Flown, tightening: Tightening, required: Problem) -> Plan:
+    def tightened(
+        self, first: FlownPlan, start: FlownPlan, tightening: Tightening, required: Problem
+    ) -> Plan:
         """Return a plan that goes on from another, judged by the task's own problem and vehicle.
 
         Args:
