@@ -23,6 +23,8 @@ from aerobat.vehicle import Vehicle, as_vehicle
 
 # expected failures among the fresh flights at the required probability: two thirds as many are a proof
 PROVING_FAILURES = 50
+# [s] processor time limit of a further plan: with 4, section-v's flip in pitch is refused
+PLANNING_TIME = 20.0
 
 
 @validated
@@ -97,6 +99,7 @@ def plan_to_pass(
             probability=probability,
             flights=range(flights),
             proving=proving,
+            planning_time=PLANNING_TIME,
             progress=progress,
             flying=flying,
             noted=note,

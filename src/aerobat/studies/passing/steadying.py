@@ -12,6 +12,7 @@ from math import log, radians
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
+from aerobat.optimization.deadline import out_of_time, processor, within_time
 from aerobat.planning import Attempt, Plan, Planner, as_planner
 from aerobat.planning.result import FLYING_RESERVE
 from aerobat.problem import Problem
@@ -31,6 +32,8 @@ MIN_GAIN = 0.02  # fraction of these flights that must succeed beyond the first 
 # more must succeed
 DURATION_PRICE = 0.5
 TRIES = 12  # further plans that are tried by commands
+PLANNING_TIME = 4.0  # [s] processor time limit of each of them; most take 0.3 to 3
+SEARCH_TIME = 15.0  # [s] processor time after which commands try no further plan; most searches take 1 to 7
 
 
 @validated
@@ -75,6 +78,7 @@ def steadied(
         probability=Trials.NEEDED,
         flights=SELECTION_FLIGHTS,
         proving=LOOKS[-1],
+        planning_time=PLANNING_TIME,
         progress=progress,
         flying=Pool(),
     )
@@ -83,7 +87,8 @@ def steadied(
         return plan
     scores = joined([scores, task.scores(plan, SELECTION_FLIGHTS[FIRST_FLIGHTS:])])
     first = FlownPlan(plan, scores, kept, plan.problem)
-    found = steadier(task, first, first, TRIES, DURATION_PRICE, may_grow=reserve == FLYING_RESERVE)
+    with within_time(SEARCH_TIME, processor):
+        found = steadier(task, first, first, TRIES, DURATION_PRICE, may_grow=reserve == FLYING_RESERVE)
     return plan if found is first else _explained(found, first)
 
 
@@ -115,7 +120,7 @@ def steadier(
             continue
         base, last = best, steps
         for step in steps:
-            if not tries or task.suffices(best.share):
+            if not tries or out_of_time() or task.suffices(best.share):
                 return best
             tightening, required = base.tightening.then(step), _required(task, base, step.thrust)
             if any(tightening.contains(each) for each in too_long):

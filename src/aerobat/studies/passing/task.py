@@ -23,7 +23,6 @@ from aerobat.studies.workers import Pool
 from aerobat.vehicle import Vehicle
 
 SCREENING_FLIGHTS = 200  # flights after which a plan is rejected if they already refute its probability
-PLANNING_TIME = 4.0  # [s] processor time limit of a further plan, most of which take 0.3 to 3
 REFINEMENT_PLANNER = "free-knots"  # planner that continues from a plan where the requested planner cannot
 KEPT_SETTINGS = ("segments", "clearance", "time_limit")  # settings taken from the requested planner
 
@@ -67,6 +66,7 @@ class PassingTask:
     probability: float  # with which flights must succeed
     flights: range  # numbers of the flights by which plans are selected
     proving: int  # number of other flights that prove the selected plan
+    planning_time: float  # [s] processor time limit of a further plan
     progress: Callable[[Attempt], None] | None
     flying: Pool
     noted: Callable[[Round], None] = field(default=lambda done: None)
@@ -86,7 +86,7 @@ class PassingTask:
         if tightening.rate < 1.0 and assessment is not None:
             vehicle = replace(vehicle, max_body_rate=tightening.rate * (assessment.max_body_rate or inf))
         planner = self._warm_started(start.plan, round(first.first_reserve + tightening.reserve, 9))
-        with within_time(PLANNING_TIME, processor):
+        with within_time(self.planning_time, processor):
             found = plan(required, planner, vehicle, self.progress)
         return replace(found, problem=self.problem, vehicle=self.vehicle)
 
