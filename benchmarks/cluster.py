@@ -4,10 +4,9 @@ Starts a Dask scheduler and three worker processes on this machine, and flies ha
 process, in three forks of it, in three processes that share no memory with it, and on the cluster, where one
 worker is killed in mid-run the second time. The floor is an overhead of 5 % of the processor's time at 10^5
 flights, of the cluster over as many processes of this machine: those share its cores and caches as the
-workers do. Each kind flies a little first, so that
-imports and compilations are not counted; of several rounds, the least time of each kind counts. What the
-idle cluster takes (its heartbeats) is measured first, and taken off. Linux only: processor times are read
-from /proc.
+workers do. Each kind flies a little first, so that imports and compilations are not counted; of several
+rounds, the least time of each kind counts. What the idle cluster takes (its heartbeats) is measured first,
+and taken off. Linux only: processor times are read from /proc.
 
 Usage: python benchmarks/cluster.py [runs] [rounds]
 """

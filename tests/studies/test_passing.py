@@ -95,13 +95,13 @@ def imagined(need: float, room: float) -> Imagined:
     """Return a task of a figure without gates."""
     task = object.__new__(Imagined)
     values = {
+        "rounds": [],
         "need": need,
         "room": room,
         "probability": 0.95,
         "proving": 1000,
         "vehicle": ab.load_vehicle("agile-quad"),
         "problem": ab.load_problem("power-loop"),
-        "noted": lambda done: None,
     }
     for name, value in values.items():
         object.__setattr__(task, name, value)
@@ -159,7 +159,7 @@ def test_a_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened(monkeypa
     changed["is_proof"] = lambda share: share.fraction == 1.0
     for name, value in changed.items():
         object.__setattr__(task, name, value)
-    search = Proving(task, [])
+    search = Proving(task)
     object.__setattr__(search, "_proven", lambda first, done, share, fresh: (done.plan, fresh))
     assert search.passing() == ("tightened", range(14, 24))
     assert started == [1.0, 0.0]

@@ -26,6 +26,7 @@ from aerobat.vehicle import Vehicle
 # reserve of plans that are to be flown, as a fraction of every limit's range, by planners that otherwise use
 # the whole range: with rotors without lag they would leave the controller nothing
 FLYING_RESERVE = 0.15
+KEPT_PART = 0.5  # part of that reserve that is kept where no plan keeps the whole
 FLYING_CLEARANCE = 0.1  # clearance from obstacles of plans to be flown [m]: covers tracking errors under lab
 
 

@@ -15,7 +15,7 @@ from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
 from aerobat.planning.planners import Planner, planner_class, planner_with_reserve
 from aerobat.planning.recorder import Recorder
-from aerobat.planning.result import FLYING_RESERVE, Plan
+from aerobat.planning.result import FLYING_RESERVE, KEPT_PART, Plan
 from aerobat.planning.turns import priced_duration
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import MIN_CROSSING_SPEED, StageSequence
@@ -62,7 +62,7 @@ class Rescue:
         if found is None or found.keeps(self.requested.reserve):
             return found
         with within_time(RESCUE_TIME, processor):
-            half = replace(self.requested, reserve=0.5 * self.requested.reserve, rescue=False)
+            half = replace(self.requested, reserve=KEPT_PART * self.requested.reserve, rescue=False)
             longest = LONGER_FOR_RESERVE * _priced(found)
             return self._first(iter([(half, HALF_RESERVE)]), self._none_found, longest) or found
 

@@ -81,13 +81,6 @@ def plan_to_pass(
     _require_enough("flights", flights, probability)
     _require_enough("fresh", proving, probability)
     named_controller(controller)
-    rounds: list[Round] = []
-
-    def note(done: Round) -> None:
-        rounds.append(done)
-        if tried is not None:
-            tried(done)
-
     with pool(workers, executor, len(cut(range(max(flights, proving))))) as flying:
         task = PassingTask(
             problem=as_problem(problem),
@@ -102,9 +95,9 @@ def plan_to_pass(
             planning_time=PLANNING_TIME,
             progress=progress,
             flying=flying,
-            noted=note,
+            tried=tried,
         )
-        return Proving(task, rounds).passing()
+        return Proving(task).passing()
 
 
 def _least_flights(probability: float) -> int:

@@ -9,7 +9,7 @@ from aerobat.planning import plan
 from aerobat.planning.tube import Tube
 from aerobat.studies.flights import passed
 from aerobat.studies.passing.causes import main_failure_cause
-from aerobat.studies.passing.result import Passing, Round
+from aerobat.studies.passing.result import Passing
 from aerobat.studies.passing.spread import LEVEL, tube_series
 from aerobat.studies.passing.steadying import steadier
 from aerobat.studies.passing.task import FlownPlan, PassingTask, reserve_kept
@@ -26,7 +26,6 @@ class Proving:
     """The search for a plan that is proven on fresh flights."""
 
     task: PassingTask
-    rounds: list[Round]  # that the task noted
 
     def passing(self) -> Passing:
         """Return the plan that passes, with its proof. Raises Infeasible where there is none."""
@@ -34,7 +33,7 @@ class Proving:
         found = plan(task.problem, task.planner, task.vehicle, task.progress)
         kept = reserve_kept(found, task.planner.reserve)
         first = done = FlownPlan(found, task.selecting(found), kept, task.problem)
-        task.noted(first.round)
+        task.note(first)
         for attempt in range(PROOFS):
             done = steadier(task, first, done, TRIES, DURATION_PRICE)
             if done.share.fraction < task.probability:
@@ -68,7 +67,7 @@ class Proving:
             after=share,
             probability=task.probability,
             fresh=fresh,
-            rounds=tuple(self.rounds),
+            rounds=tuple(task.rounds),
         )
 
     def _unreachable(self, best: FlownPlan, flights: range) -> Infeasible:
@@ -81,6 +80,6 @@ class Proving:
             f"'{task.problem.name}' on {task.vehicle.name} is not proven to pass as often as asked, "
             f"{percent(task.probability)} %: under {task.conditions.name} {share} pass at best, with a "
             f"reserve of {best.reserve:g}{f'; {why}' if why else ''}; ask for less, or better that",
-            [attempt for done in self.rounds for attempt in done.plan.attempts],
+            [attempt for done in task.rounds for attempt in done.plan.attempts],
             remedy="",
         )

@@ -136,7 +136,7 @@ def steadier(
                 too_long.append(tightening)
             elif plan.certified and plan.flies:
                 flown = FlownPlan(plan, task.selecting(plan), first.first_reserve, required, tightening)
-                task.noted(flown.round)
+                task.note(flown)
                 share = flown.share
                 value = share.fraction - price_of(plan)
                 least = start.share.fraction + MIN_GAIN * (price_of(plan) > 0.0)

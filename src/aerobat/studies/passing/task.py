@@ -13,6 +13,7 @@ from aerobat.evaluation import Score
 from aerobat.optimization.deadline import processor, within_time
 from aerobat.planning import Attempt, Plan, Planner, plan
 from aerobat.planning.planners import planner_with_reserve
+from aerobat.planning.result import KEPT_PART
 from aerobat.problem import Problem
 from aerobat.simulation.nested import joined
 from aerobat.studies.flights import FlightTask, fly_scores, passed
@@ -69,7 +70,14 @@ class PassingTask:
     planning_time: float  # [s] processor time limit of a further plan
     progress: Callable[[Attempt], None] | None
     flying: Pool
-    noted: Callable[[Round], None] = field(default=lambda done: None)
+    tried: Callable[[Round], None] | None = None  # called with every round
+    rounds: list[Round] = field(default_factory=list)
+
+    def note(self, flown: FlownPlan) -> None:
+        """Record a plan and its flights as a round, and report it."""
+        self.rounds.append(flown.round)
+        if self.tried is not None:
+            self.tried(flown.round)
 
     def tightened(
         self, first: FlownPlan, start: FlownPlan, tightening: Tightening, required: Problem
@@ -125,8 +133,8 @@ class PassingTask:
 
 
 def reserve_kept(found: Plan, asked: float) -> float:
-    """Return the reserve that a plan keeps: what was asked, half of it, or none, as fallbacks give it up."""
-    return next((part * asked for part in (1.0, 0.5) if found.keeps(part * asked)), 0.0)
+    """Return the reserve that a plan keeps: what was asked, the part that fallbacks keep of it, or none."""
+    return next((part * asked for part in (1.0, KEPT_PART) if found.keeps(part * asked)), 0.0)
 
 
 def warm_started_refinement(planner: Any, start: Plan, reserve: float) -> Planner:
