@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import linprog, minimize
 
+from aerobat.optimization.bordered_band import BorderedBand
 from aerobat.optimization.deadline import within_time
 from aerobat.optimization.interior_point import Settings, interior_point
+from bordered_bands import bordered_band
 
 Array = NDArray[np.float64]
 ACCURATE = Settings(barrier=1e-3, least_barrier=1e-9, tolerance=1e-8, gain=0.0, iterations=200)
@@ -75,10 +77,11 @@ class QuadraticsPoint:
     def equality_rows(self) -> Array:
         return self.program.equal
 
-    def curvature(self, weights: Array, equality_weights: Array, squares: Array) -> Array:
+    def curvature(self, weights: Array, equality_weights: Array, squares: Array) -> BorderedBand:
         del equality_weights
-        rows = self.rows.matrix
-        return np.asarray(np.tensordot(weights, self.program.squares, 1) + rows.T @ (squares[:, None] * rows))
+        return bordered_band(np.tensordot(weights, self.program.squares, 1)).plus_squares(
+            self.rows.matrix, squares
+        )
 
 
 def drawn(seed: int, convex: bool) -> Quadratics:

@@ -25,6 +25,7 @@ from aerobat.problem import Limits, Problem, load_problem
 from aerobat.problem.ball import Ball
 from aerobat.problem.stage import Stage
 from aerobat.vehicle import Vehicle, load_vehicle
+from bordered_bands import dense
 from places import CASES
 from random_flights import with_lags
 from shared_plans import shared_plan
@@ -89,9 +90,9 @@ def test_slopes_and_second_derivatives_are_differences(problem: Problem, lag: fl
     weights, others = rng.uniform(size=len(moved)), rng.normal(size=len(equal))
     gradients = [at.rows.transposed(weights) + at.equality_rows.T @ others for at in (ahead, behind)]
     change_of_gradient = (gradients[0] - gradients[1]) / (2.0 * change)
-    expected = here.curvature(weights, others, 0.0 * weights) @ step
+    expected = dense(here.curvature(weights, others, 0.0 * weights)) @ step
     np.testing.assert_allclose(change_of_gradient, expected, atol=1e-5 * np.abs(expected).max())
-    squared = here.curvature(0.0 * weights, 0.0 * others, weights) @ step
+    squared = dense(here.curvature(0.0 * weights, 0.0 * others, weights)) @ step
     expected = here.rows.transposed(weights * here.rows.times(step))
     np.testing.assert_allclose(squared, expected, rtol=1e-8, atol=1e-10 * np.abs(expected).max())
 

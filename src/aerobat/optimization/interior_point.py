@@ -14,8 +14,8 @@ line search finds a decrease of the merit function: the barrier function plus th
 violation. Where the first trial increases the violation, a second-order correction is tried. The merit
 function is the one of Byrd, Hribar and Nocedal, "An interior point algorithm for large-scale nonlinear
 programming", 1999. Each slack is limited by its own fraction-to-the-boundary rule, and is raised to −c(x)
-after a step where that is larger. The dense matrix of some hundred to a thousand unknowns is factorized in
-one or two milliseconds. Most of the time of a step goes into second derivatives.
+after a step where that is larger. The matrix has a band and a border, as the variables of a path's segments
+give it. Most of the time of a step goes into second derivatives.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotrs
 
 from aerobat.arrays import Array
+from aerobat.optimization.bordered_band import BorderedBand
 from aerobat.optimization.deadline import out_of_time
 
 _BOUND_PUSH = 1e-2  # distance of the start from the bounds of the box, as a fraction of its width
@@ -85,7 +85,7 @@ class ConstrainedPoint(Protocol):
     def equality_rows(self) -> Array:
         """The Jacobian E of the equalities, (p, n)."""
 
-    def curvature(self, inequality_weights: Array, equality_weights: Array, squares: Array) -> Array:
+    def curvature(self, inequality_weights: Array, equality_weights: Array, squares: Array) -> BorderedBand:
         """Return the second derivatives of the weighted constraints plus Cᵀ diag(squares) C, (n, n)."""
 
 
@@ -442,25 +442,22 @@ class _Equations:
     def __init__(self, at: _Iterate, method: _InteriorPoint) -> None:
         lower, upper = at.x - method._lower, method._upper - at.x
         matrix = at.point.curvature(at.z, at.y, at.z / at.slacks)
-        _diagonal(matrix)[:] += at.z_lower / lower + at.z_upper / upper
+        matrix = matrix.plus_diagonal(at.z_lower / lower + at.z_upper / upper)
         self._equal = at.point.equality_rows
-        largest = max(1.0, np.abs(_diagonal(matrix)).max())
-        self._weight = largest * _EQUALITY_WEIGHT if len(self._equal) else 0.0
-        self._matrix = matrix + self._weight * (self._equal.T @ self._equal)
+        self._weight = max(1.0, np.abs(matrix.diagonal).max()) * _EQUALITY_WEIGHT
+        self._matrix = matrix.plus_squares(self._equal, self._weight)
         barrier = self._barrier = method._barrier
         self._residual = method._cost + self._equal.T @ at.y - barrier * (1.0 / lower - 1.0 / upper)
         self._at = at
 
     def factorize(self, damping: float) -> bool:
         """Factorize the damped matrix. Return False where it is not positive definite."""
-        damped = self._matrix.copy()
-        _diagonal(damped)[:] += damping
-        self._factor, failed = dpotrf(damped.T, clean=False, overwrite_a=True)
-        if failed:
+        factors = self._matrix.plus_diagonal(damping).cholesky()
+        if factors is None:
             return False
-        self._moved, _ = dpotrs(self._factor, self._equal.T)
-        self._schur = self._equal @ self._moved
-        _diagonal(self._schur)[:] += 1e-14
+        self._factors = factors
+        self._moved = factors.solve(self._equal.T)
+        self._schur = self._equal @ self._moved + 1e-14 * np.eye(len(self._equal))
         return True
 
     def step(self, residual: Array, equal: Array) -> _Step:
@@ -469,8 +466,8 @@ class _Equations:
         sigma, central = at.z / at.slacks, self._barrier / at.slacks
         right = -self._residual - at.point.rows.transposed(central + sigma * residual)
         right -= self._weight * (self._equal.T @ equal)
-        x, _ = dpotrs(self._factor, right)
-        y = np.linalg.solve(self._schur, self._equal @ x + equal)
+        x = self._factors.solve(right)
+        y = np.asarray(np.linalg.solve(self._schur, self._equal @ x + equal), dtype=float)
         x = x - self._moved @ y
         slacks = -residual - at.point.rows.times(x)
         return _Step(x, slacks, central - at.z - sigma * slacks, y)
@@ -484,8 +481,3 @@ def _step_to_boundary(values: Array, changes: Array) -> float:
     """Return the step length, at most 1, that keeps positive values positive."""
     fall = float((-changes / values).max(initial=0.0))
     return _FRACTION_TO_BOUNDARY / fall if fall > _FRACTION_TO_BOUNDARY else 1.0
-
-
-def _diagonal(matrix: Array) -> Array:
-    """Return a writable view of the diagonal (n,) of a square matrix."""
-    return matrix.reshape(-1)[:: len(matrix) + 1]

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from aerobat.arrays import Array, Indices, Mask
+from aerobat.optimization.bordered_band import BorderedBand
 from aerobat.planning.refinement.closure import FRACTIONS, Closure
 from aerobat.planning.refinement.limit_values import Frames, LimitSlopes, LimitValues
 from aerobat.planning.refinement.spline import KnotData, Motion, Spline, basis
@@ -216,7 +217,7 @@ class RefinedPoint:
             found.append(self.program.spline.scattered(by_local)[None])
         return np.concatenate(found)
 
-    def curvature(self, inequality_weights: Array, equality_weights: Array, squares: Array) -> Array:
+    def curvature(self, inequality_weights: Array, equality_weights: Array, squares: Array) -> BorderedBand:
         """Return the Hessian of the weighted constraints, plus Jᵀ diag(squares) J of inequalities, (n, n)."""
         program, spline = self.program, self.program.spline
         segments, count, kinds = program.enforced.shape
@@ -234,12 +235,11 @@ class RefinedPoint:
         # only the stages' equalities: the curvature of a closure is neglected
         first, end = len(program.timed[1]), len(equality_weights) - (program.closure is not None)
         blocks += self._stage_blocks(others[windows:], equality_weights[first:end])
-        rows = self.rows.others
-        matrix = spline.assembled(blocks) + rows.T @ (squares[size:, None] * rows)
         by_ratio = others[:windows] @ program.windows[0] + equality_weights[:first] @ program.timed[0]
-        columns = spline.ratio_columns
-        matrix[columns, columns] += by_ratio * self._data.ratios
-        return matrix
+        diagonal = np.zeros(spline.size)
+        diagonal[spline.ratio_columns] = by_ratio * self._data.ratios
+        matrix = spline.assembled(blocks).plus_diagonal(diagonal)
+        return matrix.plus_squares(self.rows.others, squares[size:])
 
     def _stage_blocks(self, inequality_weights: Array, equality_weights: Array) -> Array:
         """Return the Hessian of the stages' weighted constraints, in each segment's local variables."""

@@ -19,8 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aerobat.arrays import Array, Indices
+from aerobat.arrays import Array, Indices, Mask
 from aerobat.flatness import lateral_drag
+from aerobat.optimization.bordered_band import BorderedBand, Pattern
 from aerobat.planning.task import Task
 from aerobat.problem.end_state import EndState
 from aerobat.trajectory import Trajectory, polynomial
@@ -125,9 +126,9 @@ class _Variable(NamedTuple):
 class _Layout(NamedTuple):
     """The order of the variables."""
 
-    free: list[_Variable]  # the scaled derivatives at knots
-    ratio_columns: list[int]  # the indices of ln τ
-    mean_column: int  # the index of ln h
+    free: list[_Variable]  # the scaled derivatives at knots; those at the seam of a closed course come last
+    band: int  # the number of scaled derivatives that only two neighbouring segments share: not at the seam
+    mean_column: int  # the index of ln h, after the scaled derivatives and ln τ of all segments
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +169,7 @@ class Spline:
     @cached_property
     def ratio_columns(self) -> Indices:
         """The indices of the variables ln τ, (S,)."""
-        return np.array(self._layout.ratio_columns, dtype=np.intp)
+        return np.arange(self.mean_column - self.segments, self.mean_column)
 
     @property
     def columns(self) -> Indices:
@@ -225,17 +226,24 @@ class Spline:
         total = np.bincount(self.columns.ravel(), parts.ravel(), self.size + 1)
         return np.asarray(total[:-1], dtype=float)
 
-    def assembled(self, blocks: Array) -> Array:
-        """Return the matrix (n, n) that sums the segments' local blocks (S, K + 2, K + 2)."""
-        width = self.size + 1
-        total = np.bincount(self._entries, blocks.ravel(), width**2)
-        return np.asarray(total.reshape(width, width)[:-1, :-1], dtype=float)
+    def assembled(self, blocks: Array) -> BorderedBand:
+        """Return the matrix (n, n) that sums the segments' local symmetric blocks (S, K + 2, K + 2)."""
+        pattern, lower, where = self._entries
+        values = np.bincount(where, blocks[lower], pattern.entries)
+        return BorderedBand(pattern, np.asarray(values, dtype=float))
 
     @cached_property
-    def _entries(self) -> Indices:
-        """The flat indices of the blocks' entries in a matrix (n + 1, n + 1)."""
-        rows = self.columns[:, :, None] * (self.size + 1)
-        return np.asarray((rows + self.columns[:, None]).ravel())
+    def _entries(self) -> tuple[Pattern, Mask, Indices]:
+        """The pattern of matrices, which entries of the blocks it stores (S, K + 2, K + 2), and where.
+
+        The band holds what two neighbouring segments share, and is as wide as the variables of one segment.
+        """
+        rows, columns = self.columns[:, :, None], self.columns[:, None]
+        lower = (columns <= rows) & (rows < self.size)
+        in_band = lower & (rows < self._layout.band)
+        pattern = Pattern(self.size, self.size - self._layout.band, int((rows - columns)[in_band].max()))
+        where = pattern.index(*np.broadcast_arrays(rows, columns))
+        return pattern, lower, where[lower]
 
     @property
     def _shared(self) -> int:
@@ -312,7 +320,6 @@ class Spline:
     def _layout(self) -> _Layout:
         """The order of the variables."""
         free: list[_Variable] = []
-        ratios: list[int] = []
         count = 0
 
         def add(direction: Array, *where: tuple[int, int]) -> None:
@@ -320,22 +327,26 @@ class Spline:
             free.extend(_Variable(segment, row, direction, count) for segment, row in where)
             count += 1
 
-        start, goal = self._end_states or ((), ())
-        for direction, *where in self._end_variables(*start) if start else ():
-            add(direction, *where)
-        joints = {before: (after, shared) for before, after, shared in self._joints}
-        for before in range(self.segments):
-            ratios.append(count)
-            count += 1
-            after, shared = joints.get(before, (0, 0))
-            for order in range(END_ORDER if before in joints else 0):
+        def add_end(*end: tuple[int, int, EndState]) -> None:
+            for each in end:
+                for direction, where in self._end_variables(*each):
+                    add(direction, where)
+
+        def add_knot(before: int, after: int, shared: int) -> None:
+            for order in range(END_ORDER):
                 sides = [(before, END_ORDER + order), (after, order)]
                 for where in [sides] if order < shared else [[side] for side in sides]:
                     for axis in np.eye(3):
                         add(axis, *where)
-        for direction, *where in self._end_variables(*goal) if goal else ():
-            add(direction, *where)
-        return _Layout(free, ratios, count)
+
+        add_end(*self._end_states[:1])
+        for joint in self._joints[: self.segments - 1]:
+            add_knot(*joint)
+        add_end(*self._end_states[1:])
+        band = count
+        for seam in self._joints[self.segments - 1 :]:
+            add_knot(*seam)
+        return _Layout(free, band, count + self.segments)
 
     def _end_variables(
         self, segment: int, first: int, state: EndState
@@ -362,16 +373,16 @@ class Spline:
     @cached_property
     def _arranged(self) -> tuple[Indices, Array]:
         """`columns`, and the slopes of each segment's data by its local variables, (S, 10, 3, K)."""
-        free, ratios, mean = self._layout
+        free = self._layout.free
         local: list[dict[int, int]] = [{} for _ in range(self.segments)]
         for segment, _, _, column in free:
             local[segment].setdefault(column, len(local[segment]))
         widest = max(map(len, local))
-        columns = np.full((self.segments, widest + 2), mean + 1, dtype=np.intp)
+        columns = np.full((self.segments, widest + 2), self.size, dtype=np.intp)
         effect = np.zeros((self.segments, 2 * END_ORDER, 3, widest))
         for segment, row, direction, column in free:
             place = local[segment][column]
             columns[segment, place] = column
             effect[segment, row, :, place] += direction * self._sizes[row % END_ORDER]
-        columns[:, -2], columns[:, -1] = ratios, mean
+        columns[:, -2], columns[:, -1] = self.ratio_columns, self.mean_column
         return columns, effect
