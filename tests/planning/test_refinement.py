@@ -164,3 +164,13 @@ def test_a_path_that_begins_and_ends_at_a_limit_is_refined() -> None:
     found = Miqp().plan(grounded, QUAD)
     assert found.certified
     assert found.duration < 1.02 * 1.457
+
+
+@pytest.mark.slow
+def test_a_path_that_holds_at_its_places_but_swings_far_between_them_is_repaired() -> None:
+    """Rotors that lag by 55 ms: their commands swing by 1.2 times their range between the first places."""
+    problem, quad = load_problem(str(CASES / "two-gates.toml")), load_vehicle(str(CASES / "late-quad.toml"))
+    refinement = Refinement.of(replace(Task.of(problem, quad), reserve=0.15), Recorder(None))
+    rough = refinement.rough(start_along_normals(refinement.task, 4).time_scaled(1.5), 8)
+    assert refinement.is_promising(rough)
+    assert rough.violation.largest < 0.1
