@@ -9,6 +9,7 @@ from aerobat.kernels.allocation import Mixer, desaturate, mix, within_limits
 from aerobat.kernels.control_loops import (
     AttitudeCommand,
     AttitudeError,
+    FeatureFlags,
     Gains,
     PositionLoopState,
     ReferencePoint,
@@ -30,14 +31,6 @@ from aerobat.kernels.vectors import ZERO, add, dot, norm
 
 # [-] smallest thrust, as a fraction of the commanded specific thrust, where the vehicle points away from it
 _MIN_THRUST_FRACTION = 0.3
-
-
-class FeatureFlags(NamedTuple):
-    """Features beyond the paper's law; see `aerobat.control.Controller`."""
-
-    moment_feedforward: bool
-    motor_lag_compensation: bool
-    prioritize_tilt: bool
 
 
 class ControllerModel(NamedTuple):

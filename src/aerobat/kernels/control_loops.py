@@ -41,6 +41,14 @@ class Gains(NamedTuple):
     lead_time_constant: Scalar  # [s]
 
 
+class FeatureFlags(NamedTuple):
+    """Features beyond the paper's law; see `aerobat.control.Controller`."""
+
+    moment_feedforward: bool
+    motor_lag_compensation: bool
+    prioritize_tilt: bool
+
+
 class Lookahead(NamedTuple):
     """Reference at the controller's next step, when the commands of this step have taken effect.
 

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from aerobat.kernels import control, motors, rate_loop
 from aerobat.kernels.battery import BatteryState
-from aerobat.kernels.control import Commands, ControllerModel, ControllerState, Controlling, FeatureFlags
-from aerobat.kernels.control_loops import ReferencePoint
+from aerobat.kernels.control import Commands, ControllerModel, ControllerState, Controlling
+from aerobat.kernels.control_loops import FeatureFlags, ReferencePoint
 from aerobat.kernels.imu import ImuState
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.ops import PerRotor, Scalar, Vector, select_tree

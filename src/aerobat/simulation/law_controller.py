@@ -16,8 +16,8 @@ from aerobat.engines.floats import FloatOps
 from aerobat.engines.pytree import tree_leaves
 from aerobat.errors import SpecError
 from aerobat.kernels import control, motors
-from aerobat.kernels.control import Commands, ControllerModel, FeatureFlags
-from aerobat.kernels.control_loops import moment_and_change
+from aerobat.kernels.control import Commands, ControllerModel
+from aerobat.kernels.control_loops import FeatureFlags, moment_and_change
 from aerobat.kernels.ops import Ops, PerRotor
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rate_loop import RateLoopModel

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from aerobat.declaration import NonNegative, declared
-from aerobat.kernels.control import FeatureFlags
-from aerobat.kernels.control_loops import Gains
+from aerobat.kernels.control_loops import FeatureFlags, Gains
 from aerobat.kernels.ops import Scalar
 
 _SMALLEST = 1e-9  # [s], [rad/s] replaces zero in divisions

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from aerobat.kernels import control
-from aerobat.kernels.control import AttitudePursuit, ControllerModel, ControllerState, FeatureFlags
+from aerobat.kernels.control import AttitudePursuit, ControllerModel, ControllerState
 from aerobat.kernels.control_loops import (
     AttitudeCommand,
+    FeatureFlags,
     Gains,
     PositionLoopState,
     ThrustDemand,
