@@ -9,12 +9,12 @@ from functools import wraps
 from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from pydantic_core import CoreSchema, core_schema
 
 from aerobat.arrays import Array
-from aerobat.declaration.field_types import in_degrees, in_radians
+from aerobat.declaration.field_types import CONFIG, in_degrees, in_radians, plain
 from aerobat.declaration.sentences import (
     FieldError,
     UnknownKey,
@@ -29,13 +29,6 @@ from aerobat.errors import SpecError
 
 PAPER_THRUST = ("eps", "ε")  # prefixes of the paper's names for minimum thrusts
 T = TypeVar("T")
-
-CONFIG = ConfigDict(
-    strict=True,  # text and bool are not numbers
-    allow_inf_nan=False,
-    arbitrary_types_allowed=True,
-    validate_default=True,
-)
 
 
 def from_table(cls: type[T], table: Mapping[str, Any]) -> T:
@@ -169,15 +162,6 @@ def _named_init(cls: Any) -> Callable[..., None]:
             raise SpecError(str(error.inside(cls.__name__))) from None
 
     return __init__
-
-
-def plain(value: Any) -> Any:
-    """Return a list as a tuple, and a NumPy scalar as Python's."""
-    if isinstance(value, list):
-        return tuple(value)
-    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
-        return value.item()
-    return value
 
 
 def _field_schema(cls: Any, source: Any, handler: Any) -> CoreSchema:

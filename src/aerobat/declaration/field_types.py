@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, Field, GetCoreSchemaHandler, PlainSerializer, PlainValidator
+from pydantic import AfterValidator, ConfigDict, Field, GetCoreSchemaHandler, PlainSerializer, PlainValidator
 from pydantic_core import CoreSchema, core_schema
 
 from aerobat.arrays import AXES, Array
@@ -23,6 +23,21 @@ _UNIT = 1e-15  # [-] round-off of the norm of a unit vector
 _CONTROL = {*map(chr, range(32)), "\x7f"}  # control characters, which no path needs and no terminal shows
 _MAX_MAGNITUDE = 1e15  # in SI units; its inverse is the smallest magnitude; powers of larger numbers overflow
 _TWO_TURNS = 2.0 * tau * (1.0 + _ROUND_OFF)  # [rad] largest angle: more is hardly in radians
+CONFIG = ConfigDict(  # how pydantic checks values by these types
+    strict=True,  # text and bool are not numbers
+    allow_inf_nan=False,
+    arbitrary_types_allowed=True,
+    validate_default=True,
+)
+
+
+def plain(value: Any) -> Any:
+    """Return a list as a tuple, and a NumPy scalar as Python's."""
+    if isinstance(value, list):
+        return tuple(value)
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        return value.item()
+    return value
 
 
 def in_radians(table: dict[str, Any], name: str) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from pydantic import TypeAdapter, ValidationError
 
 from aerobat.arrays import numbers
-from aerobat.declaration.declared import CONFIG, plain
+from aerobat.declaration.field_types import CONFIG, plain
 from aerobat.declaration.sentences import FieldError, closest, first_complaint, one_of, shown, with_article
 from aerobat.errors import SpecError
 
