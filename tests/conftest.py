@@ -14,10 +14,10 @@ from hypothesis import is_hypothesis_test, settings
 
 import budget
 from aerobat.control.law import CONTROL_LAWS
-from aerobat.declaration.registry import imported_plugins
 from aerobat.environment.obstacles import OBSTACLES
 from aerobat.planning.planners import PLANNERS
 from aerobat.problem.maneuvers.maneuver import MANEUVERS
+from aerobat.registry import imported_plugins
 from aerobat.simulation.plants.plant import PLANTS
 from suites import FAST, FULL, GROUPS, missing, register_profiles
 

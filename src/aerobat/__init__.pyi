@@ -1,6 +1,5 @@
 from .certification import Certificate, Envelope, certify
 from .control import ControlLaw, Controller, controller
-from .declaration import import_plugin
 from .environment import (
     Battery,
     Box,
@@ -106,6 +105,7 @@ from .problem import (
     tilted_gate,
     write_problem,
 )
+from .registry import import_plugin
 from .reporting.comparison import comparison_figure
 from .reporting.feasibility.figure import map_figure
 from .reporting.figures import draw

@@ -13,9 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import aerobat as ab
-from aerobat.declaration import Registry, from_table, to_table
+from aerobat.declaration import from_table, to_table
 from aerobat.errors import SpecError
 from aerobat.problem import GatePassage, StageSequence
+from aerobat.registry import Registry
 from refusals import complaint
 
 START, GOAL = ab.at_rest((0, 0, 0)), ab.at_rest((9, 0, 0))

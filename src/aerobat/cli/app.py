@@ -103,7 +103,7 @@ def _import_plugins(tokens: Sequence[str]) -> None:
     The planners add options of their own, so the files run before the options are read.
     """
     for path in _import_paths(tokens):
-        from aerobat.declaration import import_plugin
+        from aerobat.registry import import_plugin
 
         import_plugin(path)
 

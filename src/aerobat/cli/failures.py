@@ -58,7 +58,7 @@ def foreseen(error: AerobatError) -> Failure:
         return Failure("no_plan", sentence, next(iter(error.limits), None))
     if isinstance(error, BackendMissing):
         return Failure("missing_backend", str(error))
-    from aerobat.declaration.registry import placed
+    from aerobat.registry import placed
 
     return Failure("bad_input", str(placed(error) if isinstance(error, SpecError) else error), _field(error))
 
@@ -73,7 +73,7 @@ def of_plugins(error: BaseException, arguments: Sequence[str]) -> Failure | None
         error: The error.
         arguments: The arguments of the command line.
     """
-    from aerobat.declaration.registry import imported_plugins
+    from aerobat.registry import imported_plugins
 
     plugins = imported_plugins()
     if not plugins:

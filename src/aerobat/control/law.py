@@ -14,12 +14,13 @@ from typing import Any, ClassVar, NamedTuple, TypeVar, cast, dataclass_transform
 
 from pydantic import Field
 
-from aerobat.declaration import FieldError, Label, Registry, placed, shown, unknown_name, validated
+from aerobat.declaration import FieldError, Label, shown, unknown_name, validated
 from aerobat.errors import SpecError
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.ops import Ops, PerRotor, Scalar
 from aerobat.kernels.rigid_body import Body, RotorWrench
+from aerobat.registry import Registry, placed
 from aerobat.vehicle.controller import Controller
 
 # names of the tracking controller: with the vehicle's settings, and with the paper's

@@ -35,7 +35,6 @@ from aerobat.declaration.field_types import (
     number,
     unit,
 )
-from aerobat.declaration.registry import Registry, import_plugin, placed
 from aerobat.declaration.sentences import (
     FieldError,
     missing_fields,
@@ -66,7 +65,6 @@ __all__ = [
     "PathName",
     "PerAxis",
     "Positive",
-    "Registry",
     "Repeats",
     "Seed",
     "Series",
@@ -78,12 +76,10 @@ __all__ = [
     "declared",
     "finite",
     "from_table",
-    "import_plugin",
     "in_degrees",
     "in_notebooks",
     "missing_fields",
     "number",
-    "placed",
     "short",
     "shown",
     "suggest_for",

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from aerobat.declaration import placed, shown
+from aerobat.declaration import shown
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.limits import body_rate, box, path_condition, rotor_command, rotor_thrust, thrust_floor, tilt
 from aerobat.limits.limit import Asked, Limit
 from aerobat.problem import Condition, Limits
+from aerobat.registry import placed
 from aerobat.vehicle import Vehicle
 
 Family = Callable[[Asked], Iterator[Limit]]

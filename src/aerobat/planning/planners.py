@@ -25,7 +25,7 @@ from typing import (
 
 from pydantic import Field
 
-from aerobat.declaration import Label, Registry, placed, shown, suggest_for, validated
+from aerobat.declaration import Label, shown, suggest_for, validated
 from aerobat.errors import Infeasible, Reason, SpecError
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.courses import is_course
@@ -37,6 +37,7 @@ from aerobat.planning.recorder import Progress
 from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan, PlanMethod
 from aerobat.problem import Problem, as_problem
 from aerobat.problem.heading import HeadingMode
+from aerobat.registry import Registry, placed
 from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
 
 

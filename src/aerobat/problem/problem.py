@@ -23,7 +23,6 @@ from aerobat.declaration import (
     from_table,
     in_degrees,
     number,
-    placed,
     shown,
     to_table,
     validated,
@@ -40,6 +39,7 @@ from aerobat.problem.maneuvers.line import Line
 from aerobat.problem.maneuvers.maneuver import MANEUVERS, Maneuver
 from aerobat.problem.stage import StageSequence
 from aerobat.problem.tolerance import Tolerance
+from aerobat.registry import placed
 
 ROUNDING = 1e-9  # [-] tolerance relative to the scale of a bound
 MIN_PLACES = 2  # fewest places of a closed course

@@ -5,9 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple, Protocol
 
-from aerobat.declaration import Registry
 from aerobat.kernels.ops import PerRotor, Quaternion, Vector
 from aerobat.kernels.rate_loop import RateSetpoint
+from aerobat.registry import Registry
 from aerobat.vehicle import Vehicle
 
 

@@ -11,7 +11,7 @@ from traceback import extract_tb
 from typing import Any, NamedTuple
 
 from aerobat.control import ControlLaw, Controller, Seen
-from aerobat.declaration import placed, shown
+from aerobat.declaration import shown
 from aerobat.engines.floats import FloatOps
 from aerobat.engines.pytree import tree_leaves
 from aerobat.errors import SpecError
@@ -22,6 +22,7 @@ from aerobat.kernels.ops import Ops, PerRotor
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.rate_loop import RateLoopModel
 from aerobat.kernels.rigid_body import RotorWrench
+from aerobat.registry import placed
 from aerobat.simulation.components import (
     ControllerParameters,
     RateLoop,

@@ -28,10 +28,10 @@ from typing import Annotated, Any, TypeVar
 from pydantic import Field, PlainValidator
 
 from aerobat.declaration import FieldError, shown
-from aerobat.declaration.registry import import_plugin, imported_plugins
 from aerobat.engines.engine import available_cores
 from aerobat.errors import SpecError, import_extra
 from aerobat.provenance import installed_versions
+from aerobat.registry import import_plugin, imported_plugins
 
 MAX_WORKERS = 4096
 WORKERS = f"whole number from 1 to {MAX_WORKERS}, or dask://HOST:PORT"

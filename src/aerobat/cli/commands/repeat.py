@@ -20,11 +20,11 @@ from aerobat.cli.runs.folder import FLIGHT, finish, require_place
 from aerobat.cli.runs.record import RunRecord, beside, read_record, versions_now
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
-from aerobat.declaration.registry import imported_plugins
 from aerobat.documents import read_json
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan, read_table
 from aerobat.planning import Plan
+from aerobat.registry import imported_plugins
 from aerobat.simulation import Flight, load_flight
 
 STUDIES: Mapping[str, Callable[[RunRecord, OutputOptions], None]] = {  # by commands; a sweep needs its plan

@@ -10,9 +10,10 @@ from typing import ClassVar, TypeVar, cast, dataclass_transform
 import numpy as np
 from pydantic import Field
 
-from aerobat.declaration import Label, Registry, Vector3, validated
+from aerobat.declaration import Label, Vector3, validated
 from aerobat.environment.obstacles.convex_piece import ConvexPiece, ObstacleMotion
 from aerobat.environment.obstacles.path_rows import PathRows
+from aerobat.registry import Registry
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)

@@ -12,10 +12,11 @@ from typing import ClassVar, TypeVar, cast, dataclass_transform
 from pydantic import Field
 
 from aerobat.arrays import Array
-from aerobat.declaration import Angle, Label, Positive, Registry, validated
+from aerobat.declaration import Angle, Label, Positive, validated
 from aerobat.errors import SpecError
 from aerobat.problem.gate import Gate
 from aerobat.problem.stage import StageSequence
+from aerobat.registry import Registry
 
 
 class Maneuver(ABC):

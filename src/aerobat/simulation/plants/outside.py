@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.declaration import placed, shown
+from aerobat.declaration import shown
 from aerobat.engines.engine import expanded
 from aerobat.engines.floats import FloatOps, first_numbers
 from aerobat.engines.pytree import tree_map, tree_stack
@@ -27,6 +27,7 @@ from aerobat.kernels.rate_loop import RateSetpoint
 from aerobat.kernels.rigid_body import EnvironmentParameters, specific_force
 from aerobat.kernels.vectors import ZERO
 from aerobat.problem.gate import Gate
+from aerobat.registry import placed
 from aerobat.simulation.components import (
     LogRow,
     PlantParameters,

@@ -6,11 +6,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Protocol
 
-from aerobat.declaration import Registry
 from aerobat.environment.obstacles import Obstacle
 from aerobat.kernels.motors import Airframe, VehicleState
 from aerobat.kernels.ops import PerRotor, Vector
 from aerobat.problem.gate import Gate
+from aerobat.registry import Registry
 from aerobat.simulation.outcome import Contact
 from aerobat.vehicle.ellipsoid import Ellipsoid
 

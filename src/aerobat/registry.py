@@ -13,10 +13,8 @@ from traceback import extract_tb
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
-from aerobat.declaration.declared import declared, from_table
-from aerobat.declaration.field_types import PathName
-from aerobat.declaration.sentences import FieldError, shown, unknown_name, with_article
-from aerobat.declaration.validated import validated
+from aerobat.declaration import FieldError, PathName, declared, from_table, shown, unknown_name, validated
+from aerobat.declaration.sentences import with_article
 from aerobat.errors import SpecError, chain_of
 
 T = TypeVar("T")
