@@ -10,7 +10,7 @@ from aerobat.certification.certify import interpolated
 from aerobat.certification.subdivision import subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.flatness import reference
-from aerobat.flatness.references import UNDETERMINED
+from aerobat.flatness.inverse_dynamics import UNDETERMINED
 from aerobat.planning import Miqp, plan
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.problem import load_problem

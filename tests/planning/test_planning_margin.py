@@ -15,7 +15,7 @@ from aerobat import so3
 from aerobat.certification import certify
 from aerobat.environment import Environment
 from aerobat.flatness import reference_of
-from aerobat.flatness.references import specific_thrust
+from aerobat.flatness.inverse_dynamics import specific_thrust
 from aerobat.planning import RotorMargin
 from aerobat.planning.rotor_margin import sampled_margin
 from aerobat.states import STANDARD_GRAVITY, FlatState

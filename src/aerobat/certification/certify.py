@@ -41,7 +41,7 @@ from aerobat.certification.unequal_drag import interpolated_with_unequal_drag
 from aerobat.declaration import validated
 from aerobat.environment import Environment
 from aerobat.flatness import Planned, TimeInterval, environment_of, has_unequal_drag, vehicle_of
-from aerobat.flatness.references import UNDETERMINED
+from aerobat.flatness.inverse_dynamics import UNDETERMINED
 from aerobat.limits.along import limits_along
 from aerobat.limits.limit import Limit
 from aerobat.limits.quantity import BODY_RATE, UPRIGHT, WRENCH, WRENCH_RATE

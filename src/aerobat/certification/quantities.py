@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from aerobat.arrays import Array, frozen
-from aerobat.flatness.references import wrench_for
+from aerobat.flatness.inverse_dynamics import wrench_for
 from aerobat.vehicle import Vehicle, mixer, rotor_thrusts
 
 

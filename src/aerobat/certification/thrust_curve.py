@@ -12,7 +12,7 @@ from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.interpolation_error import YawBounds
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flatness.references import lateral_drag
+from aerobat.flatness.inverse_dynamics import lateral_drag
 from aerobat.kernels import flatness
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals

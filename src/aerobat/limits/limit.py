@@ -9,7 +9,7 @@ from math import inf
 
 from aerobat.environment import Environment
 from aerobat.errors import Reason, SpecError
-from aerobat.flatness.references import force_balance
+from aerobat.flatness.inverse_dynamics import force_balance
 from aerobat.limits.quantity import PathQuantity
 from aerobat.problem import Condition, Limits
 from aerobat.problem.condition import ForceBalance

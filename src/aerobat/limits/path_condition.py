@@ -13,7 +13,7 @@ from math import inf
 
 import numpy as np
 
-from aerobat.flatness.references import has_unequal_drag
+from aerobat.flatness.inverse_dynamics import has_unequal_drag
 from aerobat.limits.limit import MIN_SIZE, Asked, Limit
 from aerobat.limits.quantity import PATH_SHAPE, UPRIGHT, PathQuantity
 from aerobat.problem.condition import Condition, ForceBalance, Quantity

@@ -10,7 +10,7 @@ from numpy.polynomial import Polynomial
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.flatness.references import UNDETERMINED
+from aerobat.flatness.inverse_dynamics import UNDETERMINED
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
 from aerobat.problem.problem import Problem

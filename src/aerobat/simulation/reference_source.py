@@ -13,7 +13,8 @@ from aerobat.arrays import Array
 from aerobat.engines.engine import read_only
 from aerobat.engines.pytree import Tree, components, tree_map
 from aerobat.environment import Environment
-from aerobat.flatness.references import axial_drag, force_balance, has_unequal_drag, reference
+from aerobat.flatness.inverse_dynamics import axial_drag, force_balance, has_unequal_drag
+from aerobat.flatness.references import reference
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.simulation.loop import Due, StepClock, due_ticks
 from aerobat.simulation.nested import joined, rows_of

@@ -23,7 +23,7 @@ from aerobat.arrays import Array
 from aerobat.certification import quantities
 from aerobat.certification.enclosure.chebyshev import EVALUATION_ROUNDING, growth, tails
 from aerobat.certification.quantities import MagnitudeBounds
-from aerobat.flatness.references import axial_drag
+from aerobat.flatness.inverse_dynamics import axial_drag
 from aerobat.vehicle import Vehicle
 
 RHO = np.array([1.0, 1.6, 2.0, 2.5, 3.2, 4.0, 5.5, 8.0, 14.0, 30.0, 80.0])

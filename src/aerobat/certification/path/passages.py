@@ -15,7 +15,7 @@ from aerobat.arrays import Array
 from aerobat.certification.certificate import Finding, Side, Verdict
 from aerobat.environment import Environment
 from aerobat.flatness import force_balance, has_unequal_drag, reference
-from aerobat.flatness.references import UNDETERMINED
+from aerobat.flatness.inverse_dynamics import UNDETERMINED
 from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle

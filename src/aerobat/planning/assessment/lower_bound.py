@@ -17,8 +17,7 @@ from math import inf, pi, sqrt
 import numpy as np
 
 from aerobat.arrays import Array
-from aerobat.flatness import force_balance
-from aerobat.flatness.references import axial_drag
+from aerobat.flatness.inverse_dynamics import axial_drag, force_balance
 from aerobat.planning.assessment.damped_point import DampedPoint
 from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.end_state import EndState

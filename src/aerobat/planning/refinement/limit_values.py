@@ -18,8 +18,8 @@ from aerobat import so3
 from aerobat.arrays import Array, Mask
 from aerobat.engines.llvm.functions import NO_DIRECTION, SmoothFunctions, smooth_functions, triples
 from aerobat.flatness import axial_drag, has_unequal_drag, lateral_drag, reference_of
+from aerobat.flatness.inverse_dynamics import UNDETERMINED, specific_thrust
 from aerobat.flatness.parallel_transport import frames
-from aerobat.flatness.references import UNDETERMINED, specific_thrust
 from aerobat.kernels.measures import InertiaAndDrag, measures
 from aerobat.kernels.ops import Ops, Scalar
 from aerobat.kernels.quaternions import to_body
