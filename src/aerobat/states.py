@@ -1,9 +1,11 @@
 """Words that the packages share: what a body does, what a trajectory asks, what acts on a body.
 
-Every field may carry leading axes (time, vehicles); they broadcast.
+Every array may carry leading axes (time, vehicles); they broadcast.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from aerobat.arrays import Array
 from aerobat.declaration import by_value, validated
@@ -53,3 +55,11 @@ class Setpoint:
     omega_body: Array  # [rad/s], (..., 3)
     omega_dot_body: Array  # [rad/s²], (..., 3)
     wrench: Wrench
+
+
+@dataclass(frozen=True)
+class TimeInterval:
+    """An interval of time [s]."""
+
+    start: float
+    end: float

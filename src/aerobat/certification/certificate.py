@@ -9,8 +9,8 @@ from typing import Literal
 
 from aerobat.declaration import by_value, in_notebooks, validated
 from aerobat.errors import Reason
-from aerobat.flatness import TimeInterval
-from aerobat.limits.limit import quantity_name
+from aerobat.limits.quantity import quantity_name
+from aerobat.states import TimeInterval
 
 WHOLE_DIGITS = 6  # digits of a number, up to which it is shown without a power of ten
 BINDING = 0.01  # margin, as a fraction of the limit's size, below which a limit is active (binding)

@@ -40,12 +40,13 @@ from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.certification.unequal_drag import interpolated_with_unequal_drag
 from aerobat.declaration import validated
 from aerobat.environment import Environment
-from aerobat.flatness import Planned, TimeInterval, environment_of, has_unequal_drag, vehicle_of
+from aerobat.flatness import Planned, environment_of, has_unequal_drag, vehicle_of
 from aerobat.flatness.inverse_dynamics import UNDETERMINED
 from aerobat.limits.along import limits_along
 from aerobat.limits.limit import Limit
 from aerobat.limits.quantity import BODY_RATE, UPRIGHT, WRENCH, WRENCH_RATE
 from aerobat.problem import Condition, Quantity
+from aerobat.states import TimeInterval
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle

@@ -11,7 +11,7 @@ from aerobat.arrays import Array
 from aerobat.certification import quantities
 from aerobat.certification.enclosure import interpolation_error
 from aerobat.certification.thrust_curve import ThrustCurve
-from aerobat.flatness import TimeInterval
+from aerobat.states import TimeInterval
 from aerobat.trajectory.subintervals import Subintervals
 
 MAX_REMAINDER = 1e-8  # largest interpolation error of a quantity, relative to its scale

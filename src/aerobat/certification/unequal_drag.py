@@ -23,7 +23,7 @@ from aerobat.certification.enclosure.queries import ChebyshevSeries
 from aerobat.certification.series_columns import SeriesColumns
 from aerobat.certification.subdivision import MAX_COMMAND_REMAINDER, MAX_REMAINDER, MIN_DURATION
 from aerobat.certification.thrust_curve import ThrustCurve
-from aerobat.flatness import TimeInterval, reference
+from aerobat.flatness import reference
 from aerobat.flatness.unequal_drag import analysis, nodes
 from aerobat.kernels import flatness
 from aerobat.kernels import unequal_drag as kernel
@@ -31,6 +31,7 @@ from aerobat.kernels.ops import Scalar, Vector
 from aerobat.kernels.vectors import dot
 from aerobat.limits.quantity import UPRIGHT, WRENCH, WRENCH_RATE
 from aerobat.so3 import UP
+from aerobat.states import TimeInterval
 from aerobat.trajectory import polynomial
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import mixer

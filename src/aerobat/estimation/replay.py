@@ -20,11 +20,11 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.estimation.sensor_log import SensorLog
 from aerobat.estimation.settings import Ekf, ekf_parameters
-from aerobat.flatness import TimeInterval
 from aerobat.kernels import ekf
 from aerobat.kernels.ekf import EkfParameters, EkfState, ImuSample, Pose
 from aerobat.kernels.ekf.covariance import SIZE
 from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
+from aerobat.states import TimeInterval
 
 NO_SLOT = -1.0
 _SAMPLE, _EXPOSURE, _ARRIVAL = range(3)  # in this order where they have the same time

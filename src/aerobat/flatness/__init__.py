@@ -2,14 +2,12 @@
 
 from aerobat.flatness.flyable import Flyable, Planned, environment_of, vehicle_of
 from aerobat.flatness.inverse_dynamics import axial_drag, force_balance, has_unequal_drag, lateral_drag
-from aerobat.flatness.parallel_transport import TimeInterval
 from aerobat.flatness.references import Reference, reference, reference_of
 
 __all__ = [
     "Flyable",
     "Planned",
     "Reference",
-    "TimeInterval",
     "axial_drag",
     "environment_of",
     "force_balance",

@@ -18,19 +18,12 @@ from numpy.typing import NDArray
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.so3 import UP
+from aerobat.states import TimeInterval
 from aerobat.trajectory.subintervals import Subintervals
 
 MAX_TURN = 0.5  # largest change of f on a piece, as a fraction of |f| at its start: 30 degrees
 MAX_HALVINGS = 60  # far more than any realistic curve needs
 CROSSING_ROUNDS = 10  # each divides the interval by 16, so the result has full precision
-
-
-@dataclass(frozen=True)
-class TimeInterval:
-    """An interval of time [s]."""
-
-    start: float
-    end: float
 
 
 @dataclass(frozen=True)

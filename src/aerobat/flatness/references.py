@@ -26,7 +26,7 @@ from aerobat.flatness.inverse_dynamics import (
     specific_thrust,
     wrench_for,
 )
-from aerobat.flatness.parallel_transport import TimeInterval, TransportedFrames, frames
+from aerobat.flatness.parallel_transport import TransportedFrames, frames
 from aerobat.flatness.unequal_drag import (
     FrameAngle,
     UnequalDrag,
@@ -37,7 +37,7 @@ from aerobat.flatness.unequal_drag import (
     trajectory_through,
 )
 from aerobat.kernels import flatness as kernel
-from aerobat.states import FlatState, Setpoint, Wrench
+from aerobat.states import FlatState, Setpoint, TimeInterval, Wrench
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.allocation import rotor_thrusts

@@ -10,7 +10,7 @@ from math import inf
 from aerobat.environment import Environment
 from aerobat.errors import Reason, SpecError
 from aerobat.flatness.inverse_dynamics import force_balance
-from aerobat.limits.quantity import PathQuantity
+from aerobat.limits.quantity import PathQuantity, quantity_name
 from aerobat.problem import Condition, Limits
 from aerobat.problem.condition import ForceBalance
 from aerobat.vehicle import Vehicle
@@ -103,11 +103,6 @@ def effective_reserve(reserve: float, room: float) -> float:
     a limit's size.
     """
     return min(reserve, room * (reserve / (reserve + HALVING_RESERVE))) if reserve > 0.0 else 0.0
-
-
-def quantity_name(quantity: str, rotor: int | None) -> str:
-    """Return a quantity in words, with the number of its rotor if it has one."""
-    return quantity if rotor is None else f"{quantity} of rotor {rotor}"
 
 
 def size_of(lower: float, upper: float) -> float:

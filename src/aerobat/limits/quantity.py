@@ -57,3 +57,8 @@ class PathQuantity:
     def is_of_path(self) -> bool:
         """True if the quantity depends only on position and its derivatives."""
         return not self.measured.any()
+
+
+def quantity_name(quantity: str, rotor: int | None) -> str:
+    """Return a quantity in words, with the number of its rotor if it has one."""
+    return quantity if rotor is None else f"{quantity} of rotor {rotor}"

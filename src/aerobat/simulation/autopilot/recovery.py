@@ -19,7 +19,7 @@ from aerobat.engines.engine import first_row
 from aerobat.engines.pytree import Tree, components, from_components
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flatness import Planned, TimeInterval, environment_of, reference, vehicle_of
+from aerobat.flatness import Planned, environment_of, reference, vehicle_of
 from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.rigid_body import Body
@@ -32,7 +32,7 @@ from aerobat.simulation.autopilot.loop import (
 )
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.loop import Signals
-from aerobat.states import BodyState, Setpoint
+from aerobat.states import BodyState, Setpoint, TimeInterval
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
 
