@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 from aerobat.arrays import Array
 from aerobat.certification import quantities
 from aerobat.certification.enclosure import interpolation_error
-from aerobat.certification.thrust_curve import ThrustCurve
+from aerobat.certification.enclosure.interpolation_error import MAX_COMMAND_REMAINDER, MAX_REMAINDER
+from aerobat.certification.thrust_curve import MIN_DURATION, ThrustCurve
 from aerobat.states import TimeInterval
 from aerobat.trajectory.subintervals import Subintervals
 
-MAX_REMAINDER = 1e-8  # largest interpolation error of a quantity, relative to its scale
-MAX_COMMAND_REMAINDER = 1e-7  # relative error of a command, which contains the interpolant's derivative
-MIN_DURATION = 1e-8  # [s] shorter pieces are not cut further
 MAX_PIECES = 20_000  # limit of the pieces at a time, besides four a segment; no known flight needs as many
 
 

@@ -20,6 +20,7 @@ from aerobat.vehicle import Vehicle
 
 # [m/s^k] up to crackle; larger values are input errors, and their powers might overflow
 MAX_DERIVATIVE = 1e30
+MIN_DURATION = 1e-8  # [s] shorter pieces of a curve are not cut further
 
 
 @dataclass(frozen=True)

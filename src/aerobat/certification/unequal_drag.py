@@ -19,10 +19,10 @@ from numpy.polynomial import chebyshev as series_of
 from aerobat.arrays import Array, Mask
 from aerobat.certification.enclosure import chebyshev
 from aerobat.certification.enclosure.bounded import Bounded, Polynomials
+from aerobat.certification.enclosure.interpolation_error import MAX_COMMAND_REMAINDER, MAX_REMAINDER
 from aerobat.certification.enclosure.queries import ChebyshevSeries
 from aerobat.certification.series_columns import SeriesColumns
-from aerobat.certification.subdivision import MAX_COMMAND_REMAINDER, MAX_REMAINDER, MIN_DURATION
-from aerobat.certification.thrust_curve import ThrustCurve
+from aerobat.certification.thrust_curve import MIN_DURATION, ThrustCurve
 from aerobat.flatness import reference
 from aerobat.flatness.unequal_drag import analysis, nodes
 from aerobat.kernels import flatness

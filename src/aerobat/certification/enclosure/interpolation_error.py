@@ -26,6 +26,8 @@ from aerobat.certification.quantities import MagnitudeBounds
 from aerobat.flatness.inverse_dynamics import axial_drag
 from aerobat.vehicle import Vehicle
 
+MAX_REMAINDER = 1e-8  # largest interpolation error of a quantity, relative to its scale
+MAX_COMMAND_REMAINDER = 1e-7  # relative error of a command, which contains the interpolant's derivative
 RHO = np.array([1.0, 1.6, 2.0, 2.5, 3.2, 4.0, 5.5, 8.0, 14.0, 30.0, 80.0])
 MAX_FRAME_ANGLE = 30.0  # imaginary angle of the frame from which on an ellipse is not used
 
