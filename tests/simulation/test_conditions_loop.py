@@ -23,7 +23,7 @@ from aerobat.simulation.components import log_row
 from aerobat.simulation.conditions.draw import Draws
 from aerobat.simulation.conditions.random_source import InputNumber, RandomSource
 from aerobat.simulation.conditions.sensors import MocapState
-from aerobat.simulation.setup import LoopPart
+from aerobat.simulation.loop import LoopPart
 from aerobat.trajectory import Trajectory
 from dispersed_loops import dispersed_setup, drawn, rows_of
 from looping_flights import HEXA, assert_same, loops

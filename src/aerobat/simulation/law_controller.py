@@ -29,8 +29,7 @@ from aerobat.simulation.components import (
     TrackingController,
     controller_inputs,
 )
-from aerobat.simulation.loop import Component, Signals
-from aerobat.simulation.setup import LoopPart
+from aerobat.simulation.loop import Component, LoopPart, Signals
 
 GYRO, DERIVATIVE = 0.5 / (pi * 250.0), 0.5 / (pi * 150.0)  # [s] of an inner loop's filters: 250 Hz, 150 Hz
 # rate commands already lead the rotors' lag, so the inner loop's output is not lag-compensated again

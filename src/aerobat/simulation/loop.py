@@ -136,6 +136,16 @@ class Component(Protocol):
         """Return the next state, from the component's parameters and its signals."""
 
 
+@dataclass(frozen=True, eq=False)
+class LoopPart:
+    """One component of the loop with its parameters, the source of its inputs, and its period."""
+
+    component: Component
+    parameters: Tree = ()  # leaves (vehicles,), or one number for all vehicles
+    source: Source | None = None  # None for a component without inputs
+    period: int = 1  # ticks from one step to the next
+
+
 @lru_cache(maxsize=64)
 def compose(components: tuple[Component, ...], log: Log) -> tuple[Init, Step]:
     """Return the loop of some components as two functions for an engine, the same for the same arguments.

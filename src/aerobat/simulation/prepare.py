@@ -18,8 +18,9 @@ from aerobat.simulation.bodies import bodies
 from aerobat.simulation.components import ControllerParameters, StateObserver
 from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.law_controller import controller_component, inner_loop
+from aerobat.simulation.loop import LoopPart
 from aerobat.simulation.reference_source import ReferenceSource
-from aerobat.simulation.setup import FlightSetup, LoopPart, controller_model, plant_part
+from aerobat.simulation.setup import FlightSetup, controller_model, plant_part
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names

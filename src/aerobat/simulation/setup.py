@@ -20,7 +20,7 @@ from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.components import PlantParameters, RigidBodyPlant, log_row, rigid_body_steps
 from aerobat.simulation.config import FlightConfig
-from aerobat.simulation.loop import Component, Log, LoopInput, LoopParameters, Source, compose
+from aerobat.simulation.loop import Component, Log, LoopInput, LoopParameters, LoopPart, compose
 from aerobat.simulation.reference_source import BLOCK, ReferenceSource
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
@@ -28,16 +28,6 @@ from aerobat.vehicle.fleet import Fleet
 
 _VEHICLE_TICKS = 512_000  # vehicles times ticks whose own inputs are made at once, in 30 MB
 _MIN_CHUNK = 16  # smallest number of ticks made at once
-
-
-@dataclass(frozen=True, eq=False)
-class LoopPart:
-    """One component of the loop with its parameters, the source of its inputs, and its period."""
-
-    component: Component
-    parameters: Tree = ()  # leaves (vehicles,), or one number for all vehicles
-    source: Source | None = None  # None for a component without inputs
-    period: int = 1  # ticks from one step to the next
 
 
 @dataclass(frozen=True, eq=False)

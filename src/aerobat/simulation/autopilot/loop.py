@@ -11,8 +11,8 @@ from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.autopilot.attitude_law import Authority
 from aerobat.simulation.autopilot.controller import AutopilotController, AutopilotModel, Guidance
 from aerobat.simulation.components import StateObserver
-from aerobat.simulation.loop import LoopInput, StepClock
-from aerobat.simulation.setup import LoopPart, LoopSetup, plant_part
+from aerobat.simulation.loop import LoopInput, LoopPart, StepClock
+from aerobat.simulation.setup import LoopSetup, plant_part
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 

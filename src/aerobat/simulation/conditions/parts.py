@@ -39,8 +39,8 @@ from aerobat.simulation.conditions.sensors import (
     MotionCaptureSensor,
     Wind,
 )
+from aerobat.simulation.loop import LoopPart
 from aerobat.simulation.reference_source import ReferenceSource
-from aerobat.simulation.setup import LoopPart
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle.fleet import Fleet
 

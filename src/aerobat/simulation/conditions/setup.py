@@ -24,9 +24,9 @@ from aerobat.simulation.conditions.parts import TICK_TOLERANCE, DispersedFlights
 from aerobat.simulation.conditions.sensors import MotionCaptureSensor
 from aerobat.simulation.config import FlightConfig
 from aerobat.simulation.law_controller import controller_component, inner_loop
-from aerobat.simulation.loop import due_ticks
+from aerobat.simulation.loop import LoopPart, due_ticks
 from aerobat.simulation.reference_source import ReferenceSource
-from aerobat.simulation.setup import FlightSetup, LoopPart, controller_model, plant_part
+from aerobat.simulation.setup import FlightSetup, controller_model, plant_part
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller

@@ -41,10 +41,10 @@ from aerobat.simulation.components import (
     with_wind,
 )
 from aerobat.simulation.flight_controller import AutopilotRun, Sensed
-from aerobat.simulation.loop import Component, LoopInput, Signals, compose
+from aerobat.simulation.loop import Component, LoopInput, LoopPart, Signals, compose
 from aerobat.simulation.outcome import Contact
 from aerobat.simulation.plants.plant import Actuation, Plant, PlantRun, PlantScene
-from aerobat.simulation.setup import FlightSetup, LoopPart
+from aerobat.simulation.setup import FlightSetup
 from aerobat.vehicle.ellipsoid import Ellipsoid
 
 
