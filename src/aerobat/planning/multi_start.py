@@ -206,13 +206,15 @@ class MultiStart:
             return
         with within_share(ROUGH_TIME):
             others = list(starts(task, guess))
-            if not any(plan and not extra_turns(task, path.trajectory) for plan, path in others):
+            if not any(
+                plan and not extra_turns(path.trajectory, task.stages, task.balance) for plan, path in others
+            ):
                 finer = starts(task, replace(guess, segments=SEGMENTS))
                 others += [each for each in finer if each[0] is not None]
         yield self.refinement, list(islice(_varied(sorted(others, key=_likeliest)), self.starts))
 
     def _priced(self, path: Plan | WarmStart) -> float:
-        return priced_duration(self._task, path.trajectory)
+        return priced_duration(path.trajectory, self._task.stages, self._task.balance)
 
     def _of_more(self, guess: Miqp) -> Iterator[_Start]:
         """Yield starts from mixed-integer plans with more intervals; none for closed courses."""
@@ -314,7 +316,8 @@ class _Found:
         return self.path.is_clear and self.rank()[1] <= self._priced(rough)
 
     def _priced(self, refined: RefinedPath) -> float:
-        return priced_duration(self.path.refinement.task, refined.path.trajectory)
+        task = self.path.refinement.task
+        return priced_duration(refined.path.trajectory, task.stages, task.balance)
 
 
 def _likeliest(start: _Start) -> tuple[bool, bool, float]:
