@@ -15,7 +15,7 @@ from numpy.polynomial import legendre
 
 from aerobat.arrays import Array
 from aerobat.planning.refinement.limit_values import LimitValues
-from aerobat.planning.refinement.violation import chebyshev
+from aerobat.planning.refinement.spline import chebyshev
 
 FRACTIONS = chebyshev(24)  # places of every segment, both ends included, (p,)
 

@@ -31,9 +31,9 @@ from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.limit_values import LimitValues
 from aerobat.planning.refinement.program import Multipliers, RefinementProgram
-from aerobat.planning.refinement.spline import END_ORDER, Spline
+from aerobat.planning.refinement.spline import END_ORDER, Spline, chebyshev
 from aerobat.planning.refinement.stage_values import StageValues
-from aerobat.planning.refinement.violation import INWARD, JUST_INSIDE, ConstraintViolation, chebyshev
+from aerobat.planning.refinement.violation import INWARD, JUST_INSIDE, ConstraintViolation
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart

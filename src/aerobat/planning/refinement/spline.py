@@ -35,6 +35,11 @@ ORDERS = np.tile(np.arange(float(END_ORDER)), 2)  # orders of the derivatives at
 POWERS = np.arange(float(DERIVATIVES))[:, None]  # k
 
 
+def chebyshev(count: int) -> Array:
+    """Return `count` Chebyshev points from 0 to 1, both ends included, denser toward the ends."""
+    return np.asarray((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0)
+
+
 def basis(fractions: Array) -> Array:
     """Return B, the map from normalised knot data to derivatives by normalised time.
 

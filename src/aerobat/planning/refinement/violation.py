@@ -10,7 +10,7 @@ from aerobat.arrays import Array
 from aerobat.errors import Reason
 from aerobat.limits.limit import Limit
 from aerobat.planning.refinement.limit_values import LimitValues
-from aerobat.planning.refinement.spline import DERIVATIVES
+from aerobat.planning.refinement.spline import DERIVATIVES, chebyshev
 from aerobat.trajectory import Trajectory
 
 SAMPLES = 64  # samples of a segment
@@ -79,8 +79,3 @@ class ConstraintViolation:
         shared = np.where(alike, self.worst[:, None], -np.inf).max(axis=-1)
         beside = np.pad(shared, ((1, 1), (0, 0)), mode="edge")
         return np.asarray(np.max([beside[:-2], beside[1:-1], beside[2:]], axis=0))
-
-
-def chebyshev(count: int) -> Array:
-    """Return `count` Chebyshev points from 0 to 1, both ends included, denser toward the ends."""
-    return np.asarray((1.0 - np.cos(np.linspace(0.0, np.pi, count))) / 2.0)
