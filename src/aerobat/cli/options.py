@@ -14,7 +14,6 @@ from typing import Annotated, Any, TypeVar
 
 from cyclopts import Group, Parameter, validators
 
-from aerobat.cli.runs.record import USUAL_CONDITIONS
 from aerobat.errors import SpecError
 from aerobat.interchange.columns import ALL
 from aerobat.planning import PlannerOption, planner_options, registered_planners
@@ -27,6 +26,7 @@ output = Group("Output", sort_key=3)
 Seed = Annotated[int, Parameter(group=flying, validator=validators.Number(gte=0))]
 POSITIVE = validators.Number(gt=0)
 HEADING = validators.Number(gte=-720, lte=720)  # [deg]
+USUAL_CONDITIONS = "lab"  # under which flights are counted by default
 
 
 def _require_workers(type_: Any, value: str | None) -> None:

@@ -8,6 +8,7 @@ from math import isfinite, radians
 from typing import Literal
 
 from aerobat.cli.options import (
+    USUAL_CONDITIONS,
     ConditionsOptions,
     PlannerOptions,
     PlanningOptions,
@@ -18,7 +19,7 @@ from aerobat.cli.options import (
     option_name,
 )
 from aerobat.cli.progress import PlanningProgress, Progress, showing
-from aerobat.cli.runs.record import USUAL_CONDITIONS, FlightSettings, RunRecord, default_vehicle
+from aerobat.cli.runs.record import FlightSettings, RunRecord, default_vehicle
 from aerobat.cli.runs.saved_plans import named_vehicle, plan_source, read_saved_plan
 from aerobat.cli.terminal import say
 from aerobat.control import named_controller

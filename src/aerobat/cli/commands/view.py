@@ -9,10 +9,10 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter, validators
 
-from aerobat.cli.options import POSITIVE, PlanningOptions, VehicleOptions, output
+from aerobat.cli.options import POSITIVE, USUAL_CONDITIONS, PlanningOptions, VehicleOptions, output
 from aerobat.cli.progress import Progress, showing
 from aerobat.cli.runs.folder import FLIGHT, REPLAY
-from aerobat.cli.runs.record import RECORD, USUAL_CONDITIONS, RunRecord, read_record
+from aerobat.cli.runs.record import RECORD, RunRecord, read_record
 from aerobat.cli.runs.saved_plans import named_vehicle, whole_plan
 from aerobat.cli.tasks import plan_of, read_run
 from aerobat.cli.terminal import open_in_browser, print_json

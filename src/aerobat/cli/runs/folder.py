@@ -12,9 +12,9 @@ from rich.console import Group
 
 from aerobat.cli.failures import ExitCode
 from aerobat.cli.interrupts import end_interrupts
-from aerobat.cli.options import OutputOptions
+from aerobat.cli.options import USUAL_CONDITIONS, OutputOptions
 from aerobat.cli.progress import Progress, showing
-from aerobat.cli.runs.record import RECORD, USUAL_CONDITIONS, FlightSettings, RunRecord, write_record
+from aerobat.cli.runs.record import RECORD, FlightSettings, RunRecord, write_record
 from aerobat.cli.terminal import print_json
 from aerobat.control import named_controller
 from aerobat.environment import dispersion_names, load_dispersion

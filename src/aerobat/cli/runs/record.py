@@ -26,7 +26,6 @@ from aerobat.provenance import installed_versions
 from aerobat.vehicle import Vehicle
 
 RECORD = "run.toml"
-USUAL_CONDITIONS = "lab"  # under which flights are counted by default
 DEFAULT_TOLERANCE = 0.01  # of a search for least values
 MAX_NAME = 200  # bytes of a folder's name; most systems take 255
 LIBRARIES = (
