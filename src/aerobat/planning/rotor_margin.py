@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerobat.certification import Certificate, Finding, Side
-from aerobat.certification.certificate import proven_margin
+from aerobat.certification.certificate import Certificate, Finding, Side, proven_margin
 from aerobat.environment import Environment
 from aerobat.errors import Reason
 from aerobat.flatness import reference
