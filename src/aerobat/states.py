@@ -1,4 +1,4 @@
-"""Words that the packages share: what a body does, what a trajectory asks, what acts on a body.
+"""Words that the packages share: what a body does, what a trajectory asks, what acts on a body, and when.
 
 Every array may carry leading axes (time, vehicles); they broadcast.
 """
