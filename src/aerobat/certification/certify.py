@@ -66,9 +66,9 @@ def certify(
 
     The quantities are those of `flatness.reference`: the thrust of every rotor and their sum, tilt, body
     rate, moment, speed, and everything that `envelope.limits` and `envelope.conditions` bound. For a rotor
-    with lag the command is bounded too. The requirements of `envelope.passages` are checked at
-    their instants. Among
-    obstacles the clearance of the whole body is bounded, for all angles about its thrust axis at once.
+    with lag the command is bounded too. The requirements of `envelope.passages` are checked at their
+    instants. Among obstacles the clearance of the whole body is bounded, for all angles about its thrust axis
+    at once.
 
     Bounds are proven over continuous time, rounding included. Margins below about 1e-7 of a rotor's range
     stay undecided (1e-5 after tens of seconds, and for commands), as do clearances below 1e-6 m. All

@@ -35,9 +35,8 @@ class Held(NamedTuple):
 class Coded(NamedTuple):
     """Dictionary-encoded inputs: entries of a table, stored as indices; kernels see the tree of entries."""
 
-    codes: (
-        Tree  # leaves (ticks, vehicles), or (vehicles,) for one tick, in a `Held` (samples, vehicles); uint16
-    )
+    # leaves (ticks, vehicles), or (vehicles,) for one tick, in a `Held` (samples, vehicles); uint16
+    codes: Tree
     table: Array  # (65536,), shared by all `Coded` inputs of a loop
 
     def expanded(self) -> Tree:

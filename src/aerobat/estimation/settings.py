@@ -10,7 +10,6 @@ from aerobat.declaration import Count, Fraction, NonNegative, Positive, declared
 from aerobat.environment import Imu, MotionCapture
 from aerobat.kernels.ekf import EkfParameters
 
-POSE_FREEDOMS = 6
 _MIN_POSITION_NOISE = 1e-4  # [m] safely above the filter's own rounding and first-order errors
 _MIN_ATTITUDE_NOISE = 1e-3  # [rad] likewise
 
@@ -55,10 +54,10 @@ class Ekf:
 
     @property
     def max_nis(self) -> float:
-        """importing takes longer than the filter's settings"""
-        from scipy.special import chdtri  # imported when needed: it takes longer than the filter's settings
+        """The largest accepted normalized innovation squared: the quantile of χ² at `gate_probability`."""
+        from scipy.special import chdtri  # a slow import, which the settings alone do not need
 
-        return float(chdtri(POSE_FREEDOMS, 1.0 - self.gate_probability))
+        return float(chdtri(6, 1.0 - self.gate_probability))  # a pose has 6 degrees of freedom
 
 
 def ekf_parameters(settings: Ekf, gravity: float, vehicles: int) -> EkfParameters:

@@ -22,9 +22,9 @@ from aerobat.kernels.vectors import ZERO, dot, subtract
 class Ground(NamedTuple):
     """The ground; a slow vehicle near it has landed, a fast one below it has crashed."""
 
-    height: Scalar  # [m] below which a slow vehicle counts as having hit the ground
-    landing_height: Scalar  # [m²/s²] largest squared speed of a slow vehicle
-    landing_speed_sq: Scalar  # [m²/s²] of squared speed, up to which a vehicle is slow
+    height: Scalar  # [m] below which a fast vehicle has hit the ground, −infinite without a ground
+    landing_height: Scalar  # [m] below which a slow vehicle has hit the ground
+    landing_speed_sq: Scalar  # [m²/s²] largest squared speed of a slow vehicle
 
 
 class MetricsParameters(NamedTuple):

@@ -20,9 +20,9 @@ class EkfParameters(NamedTuple):
     gyro_walk: Scalar  # [rad²/s³] density of its bias's rate
     accelerometer_walk: Scalar  # [m²/s⁵] density of its bias's rate
     velocity_variance: Scalar  # [m²/s²] initial, each axis
-    gyro_bias_variance: Scalar  # [m²/s²] initial, each axis
-    accelerometer_bias_variance: Scalar  # [rad²/s²] initial
-    position_variance: Scalar  # [m²/s⁴] initial
+    gyro_bias_variance: Scalar  # [rad²/s²] initial, each axis
+    accelerometer_bias_variance: Scalar  # [m²/s⁴] initial, each axis
+    position_variance: Scalar  # [m²] of poses, each axis
     attitude_variance: Scalar  # [rad²] of poses, about each axis
     max_nis: Scalar  # [-] largest normalized innovation squared of an accepted pose
     max_rejections: Scalar  # [-] rejections in a row, the last of which is accepted as a jump

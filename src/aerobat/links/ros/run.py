@@ -9,8 +9,9 @@ from aerobat.interchange.ros import NANOSECONDS
 from aerobat.links.ros.middleware import Middleware
 
 _MAX_MISSED_TICKS = 5  # largest number of missed ticks that are made up for at once
-_CATCH_UP_TIME = 0.005  # [s] after more, for processing messages that a tick would count as lost;
-# limited by wall time too, since a clock may stand still until this node goes on
+# [s] after more missed ticks, for processing messages that a tick would count as lost; also the limit in wall
+# time, since a clock may stand still until this node goes on
+_CATCH_UP_TIME = 0.005
 
 
 class Node(Protocol):
