@@ -110,7 +110,6 @@ def test_no_multiplication_is_fused_with_an_addition(width: int) -> None:
             width,
             shared_parameters=(False,),
             inputs=(InputKind(shared=False),),
-            held_kinds=(),
             piecewise_constant=(False,),
         ),
     )

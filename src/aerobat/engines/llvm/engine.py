@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from itertools import compress
@@ -28,7 +28,7 @@ from aerobat.engines.engine import (
 )
 from aerobat.engines.llvm.code_cache import cached_code
 from aerobat.engines.llvm.codegen import module
-from aerobat.engines.llvm.packing import ARRAYS, COUNTS, Layout, PackedInputs, Packing
+from aerobat.engines.llvm.packing import ARRAYS, COUNTS, Layout, PackedInputs, Packing, input_kinds
 from aerobat.engines.pytree import Tree, piecewise_constant_leaves, tree_leaves, tree_map, tree_unflatten
 from aerobat.engines.traced_loop import TracedLoop, trace_loop
 
@@ -53,15 +53,15 @@ class MachineLoop(CompiledLoop):
         bare_inputs = _bare(expanded(inputs))
         self._loop = _traced(init, step, _bare(parameters), bare_inputs)
         width = 1 if vehicles <= MAX_SCALAR_VEHICLES else _width(equal.count(False) + len(self._loop.carry))
-        self._packing = Packing.of(inputs, vehicles, width)
-        constant = zip(piecewise_constant_leaves(bare_inputs), self._packing.kinds, strict=True)
+        kinds = input_kinds(inputs)
+        constant = zip(piecewise_constant_leaves(bare_inputs), kinds, strict=True)
         layout = Layout(
             width,
             shared_parameters=tuple(equal),
-            inputs=self._packing.kinds,
-            held_kinds=self._packing.held_kinds,
+            inputs=kinds,
             piecewise_constant=tuple(changes_seldom and kind.shared for changes_seldom, kind in constant),
         )
+        self._packing = Packing(layout, vehicles)
         self._init, self._scan = machine_code(self._loop, layout)
         self._parameters = (
             np.array([leaf[0] for leaf in compress(leaves, equal)]),
@@ -75,9 +75,7 @@ class MachineLoop(CompiledLoop):
 
     def init(self, inputs: Tree) -> Tree:
         """Return the first carry; see `CompiledLoop.init`."""
-        after = np.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
-        self._run(self._init, self._packing.inputs(inputs, 1), (_UNUSED, after, _UNUSED), 1, 1)
-        return self._unpacked(after)
+        return self._run(self._init, self._packing.inputs(inputs, 1), _UNUSED, _UNUSED, 1, 1)
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
         """Run some ticks; see `CompiledLoop.scan`."""
@@ -97,10 +95,9 @@ class MachineLoop(CompiledLoop):
         """Return the next carry, and the outputs (rows, o, vehicles)."""
         latest, packed = self._latest  # most scans continue where the last one ended
         before = packed if carry is latest else self._packing.pad_lanes(tree_leaves(carry))
-        after = np.empty((self._packing.blocks, len(self._loop.carry), self._packing.width))
         outputs = np.empty((rows, len(self._loop.outputs), self._packing.lanes))
-        self._run(self._scan, inputs, (before, after, outputs), ticks, log_stride)
-        return self._unpacked(after), outputs[..., : self._packing.vehicles]
+        after = self._run(self._scan, inputs, before, outputs, ticks, log_stride)
+        return after, outputs[..., : self._packing.vehicles]
 
     def _row(self, series: Array) -> Tree:
         """Return outputs (o, vehicles, ...) as a row's tree."""
@@ -120,16 +117,24 @@ class MachineLoop(CompiledLoop):
         return tree
 
     def _run(
-        self, function: Function, inputs: PackedInputs, arrays: Sequence[Array], ticks: int, log_stride: int
-    ) -> None:
-        """Run all lanes, in whole blocks for each thread; threads do not hold Python's lock meanwhile."""
-        arguments = [*self._addresses, *map(address, (*inputs.arrays, *arrays))]
+        self,
+        function: Function,
+        inputs: PackedInputs,
+        before: Array,
+        outputs: Array,
+        ticks: int,
+        log_stride: int,
+    ) -> Tree:
+        """Run all lanes, in whole blocks for each thread without Python's lock; return the next carry."""
+        after = np.empty((self._packing.blocks, len(self._loop.carry), self._packing.layout.width))
+        arguments = [*self._addresses, *map(address, (*inputs.arrays, before, after, outputs))]
         arguments += [self._packing.lanes, ticks, *inputs.rows, log_stride]
         if len(self._cuts) == 2:
             function(*arguments, *self._cuts)
-            return
-        pool = _pool(len(self._cuts) - 1)
-        list(pool.map(lambda begin, end: function(*arguments, begin, end), self._cuts, self._cuts[1:]))
+        else:
+            pool = _pool(len(self._cuts) - 1)
+            list(pool.map(lambda begin, end: function(*arguments, begin, end), self._cuts, self._cuts[1:]))
+        return self._unpacked(after)
 
 
 @lru_cache(maxsize=32)

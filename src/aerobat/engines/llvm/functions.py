@@ -99,7 +99,7 @@ def place_function(
     loop = TracedLoop(outputs[0].trace, given, ticks, (), (), (), found, (), ())
     width, constant = lanes(), (False,) * len(ticks)
     places = (True,) * len(shared) + (False,) * len(own)
-    layout = Layout(width, places, (InputKind(shared=True),) * len(ticks), (), constant)
+    layout = Layout(width, places, (InputKind(shared=True),) * len(ticks), constant)
     _, scan = machine_code(loop, layout)
 
     def function(shared: Array, own: Array, directions: Array) -> Array:

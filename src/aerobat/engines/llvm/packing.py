@@ -29,7 +29,6 @@ ARRAYS = (
     "outputs",
 )
 COUNTS = ("lanes", "ticks", "held inputs rows", "held codes rows", "log_stride", "begin", "end")
-_NO_TABLE = np.zeros(0)
 _DTYPES = {False: np.float64, True: np.uint16}  # dtypes of inputs, by whether they are coded
 
 
@@ -51,13 +50,17 @@ class Layout:
     width: int
     shared_parameters: tuple[bool, ...]
     inputs: tuple[InputKind, ...]
-    held_kinds: tuple[InputKind, ...]
     piecewise_constant: tuple[bool, ...]  # shared inputs that rarely change from tick to tick
 
     @cached_property
     def shared_inputs(self) -> tuple[bool, ...]:
         """True for inputs that are one number for all vehicles."""
         return tuple(kind.shared for kind in self.inputs)
+
+    @cached_property
+    def held_kinds(self) -> tuple[InputKind, ...]:
+        """The kinds of held inputs that differ between vehicles."""
+        return tuple(dict.fromkeys(k for k in self.inputs if k.held is not None and not k.shared))
 
     @property
     def shared_columns(self) -> int:
@@ -81,50 +84,49 @@ class InputKind:
     coded: bool = False  # whether it is an entry of the table
 
 
+def input_kinds(inputs: Tree) -> tuple[InputKind, ...]:
+    """Return the storage of each of a loop's inputs, given those of one tick."""
+    helds = count()
+
+    def coded(node: Coded) -> Tree:
+        return tree_map(lambda _: InputKind(shared=False, coded=True), node.codes)
+
+    def held(node: Held) -> Tree:
+        number = next(helds)
+        return tree_map(
+            lambda leaf: replace(_kind(leaf), held=number), tree_replace(node.values, Coded, coded)
+        )
+
+    leaves = tree_leaves(tree_replace(tree_replace(inputs, Held, held), Coded, coded))
+    return tuple(map(_kind, leaves))
+
+
+def _kind(leaf: Any) -> InputKind:
+    """Return the kind of a leaf of one tick, or the kind that replaces it."""
+    return leaf if isinstance(leaf, InputKind) else InputKind(shared=np.ndim(leaf) == 0)
+
+
 @dataclass(frozen=True)
 class Packing:
-    """The storage of the leaves of a loop's inputs."""
+    """Vehicles in the blocks of a layout."""
 
+    layout: Layout
     vehicles: int
-    width: int
-    kinds: tuple[InputKind, ...]  # kind of each input
-
-    @classmethod
-    def of(cls, inputs: Tree, vehicles: int, width: int) -> Packing:
-        """Return the packing for inputs with the structure of these inputs of one tick."""
-        helds = count()
-
-        def coded(node: Coded) -> Tree:
-            return tree_map(lambda _: InputKind(shared=False, coded=True), node.codes)
-
-        def held(node: Held) -> Tree:
-            number = next(helds)
-            return tree_map(
-                lambda leaf: replace(_kind(leaf), held=number), tree_replace(node.values, Coded, coded)
-            )
-
-        leaves = tree_leaves(tree_replace(tree_replace(inputs, Held, held), Coded, coded))
-        return cls(vehicles, width, tuple(map(_kind, leaves)))
-
-    @cached_property
-    def held_kinds(self) -> tuple[InputKind, ...]:
-        """The kinds of held inputs that differ between vehicles."""
-        return tuple(dict.fromkeys(k for k in self.kinds if k.held is not None and not k.shared))
 
     @property
     def blocks(self) -> int:
         """The number of blocks of lanes; the last block is filled up with copies of the last vehicle."""
-        return -(-self.vehicles // self.width)
+        return -(-self.vehicles // self.layout.width)
 
     @property
     def lanes(self) -> int:
         """The number of lanes of all blocks."""
-        return self.blocks * self.width
+        return self.blocks * self.layout.width
 
     def inputs(self, inputs: Tree, ticks: int) -> PackedInputs:
         """Return the packed inputs of `ticks` ticks, or of one tick without an axis of ticks."""
         nodes: list[Held] = []
-        tables = [_NO_TABLE]
+        tables = [np.zeros(0)]
 
         def codes_of(node: Coded) -> Tree:
             tables.append(node.table)
@@ -138,12 +140,12 @@ class Packing:
         rows = [np.zeros(ticks, dtype=np.intp) if isinstance(node.row, tuple) else node.row for node in nodes]
         columns = [
             np.asarray(leaf)[rows[kind.held]] if kind.held is not None and np.ndim(leaf) else leaf
-            for leaf, kind in zip(leaves, self.kinds, strict=True)
+            for leaf, kind in zip(leaves, self.layout.inputs, strict=True)
             if kind.shared
         ]
         held, begins = self._held(leaves)
         for kind, begin in begins.items():
-            columns.append(begin + self.kinds.count(kind) * rows[kind.held or 0])
+            columns.append(begin + self.layout.inputs.count(kind) * rows[kind.held or 0])
         shared = np.empty((ticks, len(columns)))
         for index, column in enumerate(columns):
             shared[:, index] = column
@@ -151,10 +153,10 @@ class Packing:
         arrays = (shared, plain, held[False], coded, held[True])
         return PackedInputs((*arrays, tables[-1]), (held[False].shape[1], held[True].shape[1]))
 
-    def _per_tick(self, leaves: Sequence[Array], ticks: int, coded: bool = False) -> NDArray[Any]:
+    def _per_tick(self, leaves: Sequence[Array], ticks: int, coded: bool) -> NDArray[Any]:
         """Return the inputs given at every tick, (blocks, ticks, leaf, width)."""
         chosen = self._of(leaves, InputKind(False, coded=coded))
-        packed = np.empty((self.blocks, ticks, len(chosen), self.width), _DTYPES[coded])
+        packed = np.empty((self.blocks, ticks, len(chosen), self.layout.width), _DTYPES[coded])
         self._fill(packed, chosen)
         return packed
 
@@ -162,49 +164,46 @@ class Packing:
         """Return held numbers and codes, (blocks, rows, width), and the first row of each kind."""
         sizes = {False: 0, True: 0}
         begins, chosen = {}, {}
-        for kind in self.held_kinds:
+        for kind in self.layout.held_kinds:
             chosen[kind] = self._of(leaves, kind)
             begins[kind] = sizes[kind.coded]
             sizes[kind.coded] += len(chosen[kind]) * len(chosen[kind][0])
         packed = {
-            coded: np.empty((self.blocks, size, self.width), _DTYPES[coded]) for coded, size in sizes.items()
+            coded: np.empty((self.blocks, size, self.layout.width), _DTYPES[coded])
+            for coded, size in sizes.items()
         }
         for kind, own in chosen.items():
             part = packed[kind.coded][:, begins[kind] : begins[kind] + len(own) * len(own[0])]
-            self._fill(part.reshape(self.blocks, -1, len(own), self.width), own)
+            self._fill(part.reshape(self.blocks, -1, len(own), self.layout.width), own)
         return packed, begins
 
     def _of(self, leaves: Sequence[Array], kind: InputKind) -> list[Array]:
         """Return the leaves (rows, vehicles) of one kind."""
-        chosen = (leaf for leaf, own in zip(leaves, self.kinds, strict=True) if own == kind)
+        chosen = (leaf for leaf, own in zip(leaves, self.layout.inputs, strict=True) if own == kind)
         return [np.reshape(leaf, (-1, self.vehicles)) for leaf in chosen]
 
     def pad_lanes(self, leaves: Sequence[Array]) -> Array:
         """Return leaves (vehicles,) as (blocks, leaf, width)."""
-        packed = np.empty((self.blocks, 1, len(leaves), self.width))
+        packed = np.empty((self.blocks, 1, len(leaves), self.layout.width))
         self._fill(packed, [leaf[None] for leaf in leaves])
         return packed[:, 0]
 
     def unpad_lanes(self, packed: Array) -> list[Array]:
         """Return the leaves (vehicles,) of an array (blocks, leaf, width)."""
         leaves = np.empty((packed.shape[1], self.lanes))
-        leaves.reshape(-1, self.blocks, self.width)[:] = packed.swapaxes(0, 1)
+        leaves.reshape(-1, self.blocks, self.layout.width)[:] = packed.swapaxes(0, 1)
         return list(leaves[:, : self.vehicles])
 
     def _fill(self, packed: Array, leaves: Sequence[Array]) -> None:
         """Copy leaves (rows, vehicles) into an array (blocks, rows, leaf, lane)."""
-        whole = self.vehicles // self.width
-        full = whole * self.width
+        width = self.layout.width
+        whole = self.vehicles // width
+        full = whole * width
         # all lanes of a block are copied as one item
-        lanes = np.dtype((np.void, self.width * packed.itemsize))
+        lanes = np.dtype((np.void, width * packed.itemsize))
         for index, leaf in enumerate(leaves):
             blocks = np.ascontiguousarray(leaf[:, :full], packed.dtype).view(lanes)
             packed.view(lanes)[:whole, :, index, 0] = blocks.T
             if full < self.vehicles:
                 packed[whole, :, index, : self.vehicles - full] = leaf[:, full:]
                 packed[whole, :, index, self.vehicles - full :] = leaf[:, -1:]
-
-
-def _kind(leaf: Any) -> InputKind:
-    """Return the kind of a leaf of one tick, or the kind that replaces it."""
-    return leaf if isinstance(leaf, InputKind) else InputKind(shared=np.ndim(leaf) == 0)
