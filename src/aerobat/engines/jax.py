@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Literal
 
@@ -52,7 +51,6 @@ class JaxLoop(CompiledLoop):
         precision: Literal["float64", "float32"] = "float64",
     ) -> None:
         self._loop = trace_loop(init, step, parameters, expanded(inputs))
-        self._program = _Program(str(self._loop), self._loop)
         self._precision = precision
         with jax.enable_x64(precision == "float64"):
             self._parameters = tuple(jnp.asarray(leaf, precision) for leaf in tree_leaves(parameters))
@@ -61,7 +59,7 @@ class JaxLoop(CompiledLoop):
         """Return the first carry; see `CompiledLoop.init`."""
         with jax.enable_x64(self._precision == "float64"):
             row = tuple(jnp.asarray(leaf, self._precision) for leaf in tree_leaves(expanded(inputs)))
-            return self._carry(_initialized(self._program, self._parameters, row))
+            return self._carry(_initialized(self._loop, self._parameters, row))
 
     def scan(self, carry: Tree, inputs: Tree, log_stride: int = 1) -> tuple[Tree, Tree]:
         """Run some ticks; see `CompiledLoop.scan`."""
@@ -70,7 +68,7 @@ class JaxLoop(CompiledLoop):
         with jax.enable_x64(self._precision == "float64"):
             state = tuple(map(jnp.asarray, tree_leaves(carry)))
             series = tuple(jnp.asarray(_padded(x), self._precision) for x in tree_leaves(inputs))
-            state, outputs = _scanned(self._program, self._parameters, state, series, _padded(logged))
+            state, outputs = _scanned(self._loop, self._parameters, state, series, _padded(logged))
             rows = [_row(output, len(logged)) for output in outputs]
             return self._carry(state), tree_unflatten(self._loop.row, rows)
 
@@ -78,52 +76,46 @@ class JaxLoop(CompiledLoop):
         return tree_unflatten(self._loop.carry_tree, (read_only(np.array(value)) for value in values))
 
 
-@dataclass(frozen=True)
-class _Program:
-    """A loop that equals all loops with the same listing, so that JAX compiles it only once."""
-
-    listing: str
-    loop: TracedLoop = field(compare=False)
-
-    def computed(self, numbers: Iterable[int], known: dict[int, Any]) -> dict[int, Any]:
-        """Return values by their numbers, together with those known before."""
-        values = dict(known)
-        for number in numbers:
-            operation = self.loop.trace.operations[number]
-            if operation.name == "constant":
-                values[number] = operation.content
-            elif operation.name != "input":
-                arguments = (values[i] for i in operation.arguments)
-                values[number] = _FUNCTIONS[operation.name](*arguments)
-        return values
-
-    def filled(self, numbers: Iterable[int], values: dict[int, Any], like: Any) -> Values:
-        """Return some values, each as an array with an entry for every vehicle, like `like`."""
-        kinds = {number: bool if self.loop.is_logical(number) else like.dtype for number in numbers}
-        return tuple(jnp.broadcast_to(jnp.asarray(values[n], kinds[n]), like.shape) for n in numbers)
+def _computed(loop: TracedLoop, numbers: Iterable[int], known: dict[int, Any]) -> dict[int, Any]:
+    """Return values of a loop by their numbers, together with those known before."""
+    values = dict(known)
+    for number in numbers:
+        operation = loop.trace.operations[number]
+        if operation.name == "constant":
+            values[number] = operation.content
+        elif operation.name != "input":
+            arguments = (values[i] for i in operation.arguments)
+            values[number] = _FUNCTIONS[operation.name](*arguments)
+    return values
 
 
+def _filled(loop: TracedLoop, numbers: Iterable[int], values: dict[int, Any], like: Any) -> Values:
+    """Return some values, each as an array with an entry for every vehicle, like `like`."""
+    kinds = {number: bool if loop.is_logical(number) else like.dtype for number in numbers}
+    return tuple(jnp.broadcast_to(jnp.asarray(values[n], kinds[n]), like.shape) for n in numbers)
+
+
+# JAX compiles equal loops once: those with the same listing
 @partial(jax.jit, static_argnums=0)
-def _initialized(program: _Program, parameters: Values, row: Values) -> Values:
+def _initialized(loop: TracedLoop, parameters: Values, row: Values) -> Values:
     """Return the first carry."""
-    loop = program.loop
     known = dict(zip((*loop.parameters, *loop.inputs), (*parameters, *row), strict=True))
-    return program.filled(loop.first_carry, program.computed(loop.initialization, known), parameters[0])
+    return _filled(loop, loop.first_carry, _computed(loop, loop.initialization, known), parameters[0])
 
 
 @partial(jax.jit, static_argnums=0)
 def _scanned(
-    program: _Program, parameters: Values, carry: Values, inputs: Values, logged: Any
+    loop: TracedLoop, parameters: Values, carry: Values, inputs: Values, logged: Any
 ) -> tuple[Values, Values]:
     """Return the next carry, and the outputs (rows, vehicles) of the logged ticks, including the last."""
-    loop, like = program.loop, parameters[0]
-    prologue = program.computed(loop.prologue, dict(zip(loop.parameters, parameters, strict=True)))
+    like = parameters[0]
+    prologue = _computed(loop, loop.prologue, dict(zip(loop.parameters, parameters, strict=True)))
 
     def tick(index: Any, state: State) -> State:
         row = tuple(leaf[index] for leaf in inputs)
         known = dict(zip((*loop.carry, *loop.inputs), (*state[0], *row), strict=True))
-        values = program.computed(loop.body, prologue | known)
-        return program.filled(loop.next_carry, values, like), program.filled(loop.outputs, values, like)
+        values = _computed(loop, loop.body, prologue | known)
+        return _filled(loop, loop.next_carry, values, like), _filled(loop, loop.outputs, values, like)
 
     def stretch(state: State, ends: tuple[Any, Any]) -> tuple[State, Values]:
         """Run the ticks after one logged tick, up to and including the next."""
@@ -131,7 +123,7 @@ def _scanned(
         return state, state[1]
 
     nothing = dict.fromkeys(loop.outputs, 0)
-    start = carry, program.filled(loop.outputs, nothing, like)
+    start = carry, _filled(loop, loop.outputs, nothing, like)
     ends = logged + 1
     begins = jnp.concatenate([jnp.zeros_like(ends[:1]), ends[:-1]])
     (after, _), outputs = jax.lax.scan(stretch, start, (begins, ends))
