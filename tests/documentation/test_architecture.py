@@ -15,7 +15,8 @@ import pytest
 
 import aerobat as ab
 from aerobat import cli
-from aerobat.kernels.gates.progress import GatePlane, GateProgress
+from aerobat.kernels.gates.progress import GateProgress
+from aerobat.kernels.gates.section import GatePlane
 from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import PlacedStage, evidence
 from aerobat.problem import StageSequence

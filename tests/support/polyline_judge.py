@@ -101,12 +101,9 @@ class _Track:
         """Return the swath that the body sweeps in the plane during the stay of a crossing, leaves (1,)."""
         gate = self.planned.gate
         [(plane, ellipsoid)] = gate_places((self.planned,), bounding_ellipsoid(body))
-        normal, directions = plane.normal, plane.directions
         rows = self.rows
-        gaps = gap(
-            ArrayOps,
-            section(ArrayOps, ellipsoid, (normal, *directions[0][:2]), rows.position, rows.q_world_body),
-        )
+        across = plane.normal, *plane.directions[0][:2]
+        gaps = gap(ArrayOps, section(ArrayOps, ellipsoid, across, rows.position, rows.q_world_body))
         off_plane = (gaps > 0.0) & (np.abs(self.distance) > PASSAGE_DEPTH)
         reach = gate.opening.circumradius + extent(ArrayOps, ellipsoid)
         beside = np.linalg.norm(self.offset, axis=-1) > reach
@@ -120,7 +117,7 @@ class _Track:
         snapshots = _part(rows, slice(-1)), _part(rows, slice(1, None))
         crosses = np.arange(len(gaps) - 1) == crossing - stay.start
         met, swept = swept_between(
-            ArrayOps, (normal, directions), ellipsoid, snapshots, (gaps[:-1], gaps[1:]), crosses.astype(float)
+            ArrayOps, (plane, ellipsoid), snapshots, (gaps[:-1], gaps[1:]), crosses.astype(float)
         )
         farthest = [int(np.argmax(np.where(met, extreme.reach, -np.inf))) for extreme in swept]
         return tuple(_part(each, slice(k, k + 1)) for each, k in zip(swept, farthest, strict=True))

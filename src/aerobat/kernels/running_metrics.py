@@ -10,8 +10,8 @@ from typing import NamedTuple
 from aerobat.kernels.gates import approach, pointing, progress
 from aerobat.kernels.gates.approach import Approach, Target
 from aerobat.kernels.gates.pointing import Direction, Pointing
-from aerobat.kernels.gates.progress import GatePlane, GateProgress
-from aerobat.kernels.gates.section import BoundingEllipsoid
+from aerobat.kernels.gates.progress import GateProgress
+from aerobat.kernels.gates.section import BoundingEllipsoid, GatePlane
 from aerobat.kernels.gates.snapshot import Snapshot
 from aerobat.kernels.ops import Ops, PerRotor, Quaternion, Scalar, Vector
 from aerobat.kernels.quaternions import angle_between

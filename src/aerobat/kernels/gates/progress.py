@@ -6,25 +6,11 @@ from math import inf
 from typing import NamedTuple
 
 from aerobat.kernels.gates import swath
-from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
-from aerobat.kernels.gates.snapshot import PlaceMotion, Snapshot, interpolated, relative_to_moving
+from aerobat.kernels.gates.section import BoundingEllipsoid, GatePlane
+from aerobat.kernels.gates.snapshot import Snapshot, interpolated, relative_to_moving
 from aerobat.kernels.gates.swath import SwathProgress
-from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
+from aerobat.kernels.ops import Ops, Scalar, magnitude, select_tree
 from aerobat.kernels.vectors import ZERO, dot
-
-
-class GatePlane(NamedTuple):
-    """A gate as a plane to be crossed at a planned time."""
-
-    centre: Vector  # [m]
-    normal: Vector  # unit vector in the direction of passage
-    # directions in which a body is measured; empty for an unknown body
-    directions: tuple[PlaneDirection, ...]
-    radius: Scalar  # [m] radius of the circle around the opening
-    planned: Scalar  # [s] planned time of the crossing
-    window: Scalar  # [s] largest deviation of the crossing from that time
-    depth: Scalar  # [m] distance beyond the plane that makes a crossing a passage
-    motion: PlaceMotion | tuple[()] = ()  # motion of a moving gate
 
 
 class GateProgress(NamedTuple):
@@ -60,7 +46,7 @@ def step(
         snapshots: the snapshots at the last tick and at this tick.
         counted: whether there was a last tick, and whether this tick counts.
     """
-    plane, ellipsoid = gate
+    plane, _ = gate
     last, now = (relative_to_moving(ops, each, plane.centre, plane.motion) for each in snapshots)
     before, behind = dot(last.position, plane.normal), dot(now.position, plane.normal)
     both = counted[0] & counted[1]
@@ -79,8 +65,7 @@ def step(
     in_window = counted[1] & (magnitude(ops, now.time - plane.planned) <= plane.window)
     swept = progress.swath
     if plane.directions:
-        about = plane.normal, plane.directions, plane.radius, plane.depth, ellipsoid
-        swept = swath.step(ops, swept, about, (last, now), counted, crosses, (is_passing, passed))
+        swept = swath.step(ops, swept, gate, (last, now), counted, crosses, (is_passing, passed))
     return GateProgress(
         latest,
         select_tree(ops, passed, latest, progress.crossing),

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from aerobat.kernels.gates.snapshot import PlaceMotion
 from aerobat.kernels.ops import TINY, Ops, Quaternion, Scalar, Vector, clip, magnitude
 from aerobat.kernels.quaternions import axes, normalize, to_body
 from aerobat.kernels.vectors import dot, norm
@@ -32,6 +33,20 @@ class PlaneDirection(NamedTuple):
     beside: Vector  # also in the plane, a quarter turn further
     both_ways: Scalar  # 1 where the opposite direction counts too
     radial: Scalar  # 1 where the radial distance of the farthest point is measured, not its component
+
+
+class GatePlane(NamedTuple):
+    """A gate as a plane to be crossed at a planned time."""
+
+    centre: Vector  # [m]
+    normal: Vector  # unit vector in the direction of passage
+    # directions in which a body is measured; empty for an unknown body
+    directions: tuple[PlaneDirection, ...]
+    radius: Scalar  # [m] radius of the circle around the opening
+    planned: Scalar  # [s] planned time of the crossing
+    window: Scalar  # [s] largest deviation of the crossing from that time
+    depth: Scalar  # [m] distance beyond the plane that makes a crossing a passage
+    motion: PlaceMotion | tuple[()] = ()  # motion of a moving gate
 
 
 class Section(NamedTuple):

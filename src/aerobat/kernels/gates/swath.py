@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from aerobat.kernels.gates.section import (
     BoundingEllipsoid,
+    GatePlane,
     PlaneDirection,
     PlanePoint,
     extent,
@@ -59,7 +60,7 @@ def init(directions: int) -> SwathProgress:
 def step(
     ops: Ops,
     progress: SwathProgress,
-    parameters: tuple[Vector, tuple[PlaneDirection, ...], Scalar, Scalar, BoundingEllipsoid],
+    gate: tuple[GatePlane, BoundingEllipsoid],
     snapshots: tuple[Snapshot, Snapshot],
     counted: tuple[Scalar, Scalar],
     crosses: Scalar,
@@ -70,8 +71,7 @@ def step(
     Args:
         ops: the arithmetic of the engine.
         progress: the progress before the tick.
-        parameters: the plane's normal, directions in it, the radius [m] of the circle around the opening, the
-            depth [m] around the plane, and the ellipsoid around the vehicle.
+        gate: the gate's plane, and the ellipsoid around the vehicle.
         snapshots: the snapshots at the last tick and at this tick, positions relative to the opening's
             centre.
         counted: whether there was a last tick, and whether this tick counts.
@@ -79,18 +79,17 @@ def step(
         crossed: two flags: whether the centre has crossed the plane anywhere and is within the depth; and
             whether, with this tick, this stay or the last one has become the one that counts.
     """
-    normal, directions, radius, depth, ellipsoid = parameters
+    plane, ellipsoid = gate
     is_passing, passed = crossed
     now = snapshots[1]
-    gap_now = gap(ops, section(ops, ellipsoid, (normal, *directions[0][:2]), now.position, now.q_world_body))
-    distance = magnitude(ops, dot(now.position, normal))
-    beside = norm(ops, now.position) - radius - extent(ops, ellipsoid)
-    at_plane = counted[1] & (ops.minimum(gap_now, distance - depth) <= 0.0)
+    across = plane.normal, *plane.directions[0][:2]
+    gap_now = gap(ops, section(ops, ellipsoid, across, now.position, now.q_world_body))
+    distance = magnitude(ops, dot(now.position, plane.normal))
+    beside = norm(ops, now.position) - plane.radius - extent(ops, ellipsoid)
+    at_plane = counted[1] & (ops.minimum(gap_now, distance - plane.depth) <= 0.0)
     is_about = at_plane & (ops.select(is_passing, 0.0, beside) <= 0.0)
-    met, here = swept_between(
-        ops, (normal, directions), ellipsoid, snapshots, (progress.gap, gap_now), crosses
-    )
-    before = select_tree(ops, progress.is_about > 0.5, progress.stay, len(directions) * (NOWHERE,))
+    met, here = swept_between(ops, gate, snapshots, (progress.gap, gap_now), crosses)
+    before = select_tree(ops, progress.is_about > 0.5, progress.stay, len(plane.directions) * (NOWHERE,))
     stay = _wider(ops, counted[0] & counted[1] & met, here, before)
     is_crossing = ops.select(passed, 1.0, progress.is_crossing) > 0.5
     return SwathProgress(
@@ -104,8 +103,7 @@ def step(
 
 def swept_between(
     ops: Ops,
-    plane: tuple[Vector, tuple[PlaneDirection, ...]],
-    ellipsoid: BoundingEllipsoid,
+    gate: tuple[GatePlane, BoundingEllipsoid],
     snapshots: tuple[Snapshot, Snapshot],
     gaps: tuple[Scalar, Scalar],
     crosses: Scalar,
@@ -116,8 +114,7 @@ def swept_between(
 
     Args:
         ops: the arithmetic of the engine.
-        plane: the plane's normal, and directions in it.
-        ellipsoid: the ellipsoid around the vehicle.
+        gate: the gate's plane, and the ellipsoid around the vehicle.
         snapshots: the snapshots at both ticks, positions relative to the opening's centre.
         gaps: distances between body and plane at both ticks [m].
         crosses: 1 where the centre crosses the plane between the ticks.
@@ -128,8 +125,10 @@ def swept_between(
     edge = before / ops.select(changes, before - behind, 1.0)
     comes, leaves = changes & (before > 0.0), changes & (behind > 0.0)
     within = ops.select(comes, edge, 0.0), ops.select(leaves, edge, 1.0)
-    normal, directions = plane
-    extremes = tuple(_extreme(ops, normal, each, ellipsoid, snapshots, within) for each in directions)
+    plane, ellipsoid = gate
+    extremes = tuple(
+        _extreme(ops, plane.normal, each, ellipsoid, snapshots, within) for each in plane.directions
+    )
     return ops.select(meets, 1.0, crosses) > 0.5, extremes
 
 

@@ -25,8 +25,8 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import by_value
 from aerobat.engines.pytree import components, tree_map
-from aerobat.kernels.gates.progress import GatePlane, GateProgress
-from aerobat.kernels.gates.section import BoundingEllipsoid, PlaneDirection
+from aerobat.kernels.gates.progress import GateProgress
+from aerobat.kernels.gates.section import BoundingEllipsoid, GatePlane, PlaneDirection
 from aerobat.kernels.gates.snapshot import PlaceMotion, VelocityJump
 from aerobat.kernels.gates.swath import NOWHERE, Extreme, Swath
 from aerobat.problem.gate import Gate
