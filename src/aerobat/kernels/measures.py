@@ -38,8 +38,7 @@ def measures(ops: Ops, airframe: InertiaAndDrag, motion: BodyMotion, up: Vector)
         up: The vertical, in the axes of the motion.
     """
     if airframe.unequal is not None:
-        body = unequal_drag.DraggedBody(airframe.mass, airframe.unequal, airframe.inertia)
-        demand = unequal_drag.demand(ops.sqrt, body, motion)
+        demand = unequal_drag.demand(ops.sqrt, airframe.mass, airframe.inertia, airframe.unequal, motion)
         rate = ops.sqrt(dot(demand.omega, demand.omega) + RATE_SMOOTHING)
         return *demand.wrench, *demand.rate, demand.specific_thrust, rate, dot(demand.b3, up)
     drag, v, a = airframe.lateral_drag, motion.airspeed, motion.acceleration

@@ -127,14 +127,6 @@ def frame_spin(
     return -1.0 * (change[1] / norm * b1[2] + pitch * b3[1] - yaw_rate * b2[1]) / b1[0]
 
 
-class DraggedBody(NamedTuple):
-    """Mass, drag and inertia of a vehicle."""
-
-    mass: Scalar  # [kg]
-    drag: Vector  # [1/s] over the mass, along body x, y and z
-    inertia: Matrix  # [kg·m²]
-
-
 class BodyMotion(NamedTuple):
     """A motion at one instant, in axes near the body's."""
 
@@ -156,24 +148,33 @@ class Demand(NamedTuple):
     b3: Vector  # in the axes of the motion
 
 
-def demand(sqrt: Callable[[Scalar], Scalar], airframe: DraggedBody, motion: BodyMotion) -> Demand:
+def demand(
+    sqrt: Callable[[Scalar], Scalar], mass: Scalar, inertia: Matrix, drag: Vector, motion: BodyMotion
+) -> Demand:
     """Return the requirements of a motion; exact where the body has the axes of the motion.
 
     For other axes near the body's, the body's axes are `nearest_axes`. They are exact to first order except
     for the angle about b3.
+
+    Args:
+        sqrt: The square root of the arithmetic.
+        mass: Of the vehicle [kg].
+        inertia: [kg·m²].
+        drag: Over the mass, along body x, y and z [1/s].
+        motion: The motion.
     """
     lifted = add(motion.acceleration, motion.weight), motion.jerk, motion.snap, motion.crackle
     dragged = motion.airspeed, motion.acceleration, motion.jerk, motion.snap
     alpha, beta, gamma = (
         [add_scaled(x, coefficient, below) for x, below in zip(lifted, dragged, strict=True)]
-        for coefficient in airframe.drag
+        for coefficient in drag
     )
     body = nearest_axes(sqrt, alpha[0], beta[0])
     alpha, beta, gamma = ([to_body(body, vector) for vector in each] for each in (alpha, beta, gamma))
     inverse = 1.0 / alpha[0][2], 1.0 / beta[0][2]
     omega, omega_dot = body_rates(inverse, alpha, beta)
     jerk = angular_jerk(inverse, alpha, beta, omega, omega_dot)
-    thrust, thrust_rate = collective(airframe.mass, gamma[:2], omega)
-    moment, moment_rate = flatness.moment_and_rate(airframe.inertia, omega, omega_dot, jerk)
+    thrust, thrust_rate = collective(mass, gamma[:2], omega)
+    moment, moment_rate = flatness.moment_and_rate(inertia, omega, omega_dot, jerk)
     along = 0.5 * (alpha[0][2] + beta[0][2])
     return Demand((thrust, *moment), (thrust_rate, *moment_rate), along, omega, body[2])
