@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from aerobat.engines import choose, run_whole
 from aerobat.engines.floats import FloatOps
 from aerobat.engines.traced_loop import trace_loop
-from aerobat.engines.tracing import FUNCTIONS, BranchError, Symbol, Trace, TraceOps
+from aerobat.engines.tracing import FUNCTIONS, BranchError, Symbol, Trace
 
 NUMBERS = st.floats(-5.0, 5.0)
 
@@ -40,7 +40,7 @@ def kernel(ops: Any, x: Any, y: Any) -> Any:
 @given(NUMBERS, NUMBERS)
 def test_a_trace_computes_what_its_kernel_does_to_the_last_bit(x: float, y: float) -> None:
     trace = Trace()
-    result = kernel(TraceOps(trace), trace.input("x"), trace.input("y"))
+    result = kernel(trace, trace.input("x"), trace.input("y"))
     assert values(trace, {"x": x, "y": y})[result.number] == kernel(FloatOps, x, y)
 
 
@@ -76,16 +76,16 @@ def test_conditions_are_compared_and_counted_as_floats_do_it(engine: str) -> Non
 def test_what_is_common_is_computed_once() -> None:
     trace = Trace()
     x, y = trace.input("x"), trace.input("y")
-    first = x * y + TraceOps(trace).sqrt(x)
+    first = x * y + trace.sqrt(x)
     count = len(trace.operations)
-    assert (y * x + TraceOps(trace).sqrt(x)).number == first.number
+    assert (y * x + trace.sqrt(x)).number == first.number
     assert len(trace.operations) == count
     assert (x - y).number != (y - x).number
 
 
 def test_constants_are_folded_and_nothing_else_is() -> None:
     trace = Trace()
-    x, ops = trace.input("x"), TraceOps(trace)
+    x, ops = trace.input("x"), trace
     two = trace.symbol(2.0)
     assert trace.operations[(two * 3.0 + ops.sqrt(two * 2.0)).number].content == 8.0
     assert (x * 1.0).number == (1.0 * x).number == (x / 1.0).number == x.number

@@ -16,7 +16,7 @@ from aerobat.engines import choose
 from aerobat.engines.engine import first_row
 from aerobat.engines.floats import FloatOps
 from aerobat.engines.pytree import tree_leaves, tree_map
-from aerobat.engines.tracing import Trace, TraceOps
+from aerobat.engines.tracing import Trace
 from aerobat.estimation.replay import filter_loop
 from aerobat.kernels import ekf
 from aerobat.kernels.ekf import EkfParameters, EkfState, ImuSample, NominalState, Pose
@@ -353,7 +353,7 @@ def operations(function: Any, *trees: Any) -> int:
     """Operations that a compiler sees of a kernel."""
     trace = Trace()
     symbols = [tree_map(lambda _: trace.input(f"{len(trace.operations)}"), tree) for tree in trees]
-    results = tree_leaves(function(TraceOps(trace), *symbols))
+    results = tree_leaves(function(trace, *symbols))
     needed = trace.needed([trace.symbol(result).number for result in results])
     return sum(trace.operations[number].name not in ("input", "constant") for number in needed)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from aerobat.engines.tracing import Symbol, TraceOps
+from aerobat.engines.tracing import Symbol, Trace
 
 
 def gradient(output: Symbol, inputs: Sequence[Symbol]) -> list[Symbol]:
@@ -14,7 +14,7 @@ def gradient(output: Symbol, inputs: Sequence[Symbol]) -> list[Symbol]:
         output: The value to differentiate.
         inputs: The values to differentiate by; operations behind them are ignored.
     """
-    trace, ops = output.trace, TraceOps(output.trace)
+    trace = output.trace
     wanted = {symbol.number for symbol in inputs}
     needed, dependent = sorted(trace.needed([output.number])), set(wanted)
     for number in needed:
@@ -27,14 +27,14 @@ def gradient(output: Symbol, inputs: Sequence[Symbol]) -> list[Symbol]:
         operation = trace.operations[number]
         arguments = [Symbol(trace, i) for i in operation.arguments]
         slope = slopes[number]
-        for argument, term in _contributions(ops, operation.name, arguments, Symbol(trace, number), slope):
+        for argument, term in _contributions(trace, operation.name, arguments, Symbol(trace, number), slope):
             known = slopes.get(argument.number)
             slopes[argument.number] = term if known is None else known + term
     return [slopes.get(symbol.number, trace.symbol(0.0)) for symbol in inputs]
 
 
 def _contributions(
-    ops: TraceOps, name: str, arguments: list[Symbol], value: Symbol, slope: Symbol
+    trace: Trace, name: str, arguments: list[Symbol], value: Symbol, slope: Symbol
 ) -> list[tuple[Symbol, Symbol]]:
     """Return the arguments of an operation, each with its contribution to the derivative by that argument."""
     match name, arguments:
@@ -55,7 +55,7 @@ def _contributions(
             return [(x, slope * value)]
         case "maximum" | "minimum", [x, y]:
             takes_first = y < x if name == "maximum" else x < y
-            return [(x, ops.select(takes_first, slope, 0.0)), (y, ops.select(takes_first, 0.0, slope))]
+            return [(x, trace.select(takes_first, slope, 0.0)), (y, trace.select(takes_first, 0.0, slope))]
         case "select", [condition, x, y]:
-            return [(x, ops.select(condition, slope, 0.0)), (y, ops.select(condition, 0.0, slope))]
+            return [(x, trace.select(condition, slope, 0.0)), (y, trace.select(condition, 0.0, slope))]
     raise ValueError(f"no derivative of {name}")

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from aerobat.engines.engine import Init, Step
 from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
-from aerobat.engines.tracing import Symbol, Trace, TraceOps
+from aerobat.engines.tracing import Symbol, Trace
 
 MIN_GUARDED = 32  # smallest number of operations for which a branch pays off
 
@@ -171,13 +171,12 @@ class TracedLoop:
 def trace_loop(init: Init, step: Step, parameters: Tree, inputs: Tree) -> TracedLoop:
     """Return the loop of `init` and `step` for trees of these structures; see `engine.Compile`."""
     trace = Trace()
-    ops = TraceOps(trace)
     parameters, inputs = _symbols(trace, parameters, "parameter"), _symbols(trace, inputs, "input")
-    first_tree = init(ops, parameters, inputs)
+    first_tree = init(trace, parameters, inputs)
     first = [trace.symbol(leaf) for leaf in tree_leaves(first_tree)]
     kinds = [trace.operations[symbol.number].logical for symbol in first]
     carry = [trace.input(f"carry {i}", logical) for i, logical in enumerate(kinds)]
-    next_tree, row = step(ops, parameters, tree_unflatten(first_tree, carry), inputs)
+    next_tree, row = step(trace, parameters, tree_unflatten(first_tree, carry), inputs)
     following = [trace.symbol(leaf) for leaf in tree_leaves(next_tree)]
     row = tree_unflatten(row, [trace.symbol(leaf) for leaf in tree_leaves(row)])
     live = _live_parts(trace, _numbers(carry), _numbers(following), _numbers(tree_leaves(row)))

@@ -55,7 +55,7 @@ class Operation:
 
 @dataclass
 class Trace:
-    """A record of the operations on symbols."""
+    """A record of the operations on symbols, and the arithmetic by which kernels are recorded."""
 
     operations: list[Operation] = field(default_factory=list)
     _numbers: dict[Any, int] = field(default_factory=dict)
@@ -93,6 +93,26 @@ class Trace:
             numbers = tuple(sorted(numbers))
         logical = name in _LOGICAL or (name == "select" and known[1].logical)
         return Symbol(self, self._number(name, numbers, "", logical))
+
+    def sqrt(self, x: Any) -> Symbol:
+        """Return the square root."""
+        return self.apply("sqrt", x)
+
+    def exp(self, x: Any) -> Symbol:
+        """Return the exponential."""
+        return self.apply("exp", x)
+
+    def minimum(self, x: Any, y: Any) -> Symbol:
+        """Return the smaller of two."""
+        return self.apply("minimum", x, y)
+
+    def maximum(self, x: Any, y: Any) -> Symbol:
+        """Return the larger of two."""
+        return self.apply("maximum", x, y)
+
+    def select(self, condition: Any, x: Any, y: Any) -> Symbol:
+        """Return `x` if the condition holds, else `y`."""
+        return self.apply("select", condition, x, y)
 
     def needed(self, roots: Iterable[int], unless: int | None = None) -> set[int]:
         """Return the values from which `roots` are computed, including `roots`.
@@ -192,30 +212,3 @@ def _branch() -> BranchError:
         f"{line.filename}, line {line.lineno}: `{line.line}` needs the value of a symbol; "
         "kernels take ops.select where others branch"
     )
-
-
-@dataclass(frozen=True)
-class TraceOps:
-    """The operations of kernels on a trace's symbols."""
-
-    trace: Trace
-
-    def sqrt(self, x: Any) -> Symbol:
-        """Return the square root."""
-        return self.trace.apply("sqrt", x)
-
-    def exp(self, x: Any) -> Symbol:
-        """Return the exponential."""
-        return self.trace.apply("exp", x)
-
-    def minimum(self, x: Any, y: Any) -> Symbol:
-        """Return the smaller of two."""
-        return self.trace.apply("minimum", x, y)
-
-    def maximum(self, x: Any, y: Any) -> Symbol:
-        """Return the larger of two."""
-        return self.trace.apply("maximum", x, y)
-
-    def select(self, condition: Any, x: Any, y: Any) -> Symbol:
-        """Return `x` if the condition holds, else `y`."""
-        return self.trace.apply("select", condition, x, y)

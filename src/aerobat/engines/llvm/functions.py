@@ -19,7 +19,7 @@ from aerobat.engines.gradient import gradient
 from aerobat.engines.llvm.engine import address, lanes, machine_code
 from aerobat.engines.llvm.packing import ARRAYS, InputKind, Layout
 from aerobat.engines.traced_loop import TracedLoop
-from aerobat.engines.tracing import Symbol, Trace, TraceOps
+from aerobat.engines.tracing import Symbol, Trace
 from aerobat.kernels.ops import Ops, Scalar, Vector
 
 PlaceFunction = Callable[[Array, Array, Array], Array]
@@ -62,7 +62,7 @@ def smooth_functions(
     common, moving, fixed_symbols = inputs("shared", shared), inputs("moved", moved), inputs("fixed", fixed)
     directions, own = inputs("direction", moved), [*moving, *fixed_symbols]
     along = [*map(Dual, moving, directions)]
-    found = kernel(DualOps(TraceOps(trace)), [*map(Dual, common)], along, [*map(Dual, fixed_symbols)])
+    found = kernel(DualOps(trace), [*map(Dual, common)], along, [*map(Dual, fixed_symbols)])
     parts = zip(*map(value_and_tangent, found), strict=True)
     values, slopes = ([trace.symbol(part) for part in each] for each in parts)
     weights = inputs("weight", len(values))
