@@ -18,7 +18,7 @@ from aerobat.certification import quantities
 from aerobat.certification.attitude import ThrustDirectionRates
 from aerobat.certification.body_path import BodyPath
 from aerobat.certification.certificate import Certificate, Finding, Side
-from aerobat.certification.clearance import clearance_finding, frame_findings
+from aerobat.certification.clearance import clearance_finding, frame_finding
 from aerobat.certification.continuity import discontinuities, seam
 from aerobat.certification.enclosure.interpolation_error import error_bounds
 from aerobat.certification.enclosure.queries import (
@@ -115,7 +115,7 @@ def certify(
         findings += [clearance_finding(*bodies, environment.pieces)]
     findings += end_findings(trajectory, envelope.start, envelope.goal)
     findings += passage_findings(trajectory, envelope.passages, vehicle, environment)
-    findings += frame_findings(*bodies, envelope.passages) if bodies else []
+    findings += [frame_finding(*bodies, passage) for passage in envelope.passages] if bodies else []
     findings += waypoint_findings(trajectory, envelope.waypoints)
     jumps = discontinuities(curve, floor, series)
     if envelope.closed:

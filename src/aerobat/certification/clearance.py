@@ -18,7 +18,6 @@ without a break, near enough to touch the circle around the opening.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -84,21 +83,14 @@ def clearance_finding(attitude: BodyPath | None, ball: BodyPath, pieces: Pieces)
     return replace(found, obstacle=nearest.obstacle, field="environment.obstacles")
 
 
-def frame_findings(
-    attitude: BodyPath | None, ball: BodyPath, passages: Sequence[PlannedPassage]
-) -> list[Finding]:
-    """Return the findings about the body's smallest gap from the frame of each gate during its passage.
+def frame_finding(attitude: BodyPath | None, ball: BodyPath, passage: PlannedPassage) -> Finding:
+    """Return the finding about the body's smallest gap from the frame of a gate during its passage.
 
     Args:
         attitude: The body where its attitude is determined, or None if it never is.
         ball: The ball around the body, on the rest of the path.
-        passages: The passages of gates.
+        passage: The passage of the gate.
     """
-    return [_frame_finding(attitude, ball, passage) for passage in passages]
-
-
-def _frame_finding(attitude: BodyPath | None, ball: BodyPath, passage: PlannedPassage) -> Finding:
-    """Return the finding about one passage."""
     gate, reach = passage.gate, ball.body.reach
     around = gate.opening.circumradius + reach
     paths = [path for path in (attitude, ball) if path is not None]

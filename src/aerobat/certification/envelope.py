@@ -8,8 +8,6 @@ from aerobat.declaration import Limit, TiltLimit, declared
 from aerobat.problem import Condition, EndState, Limits
 from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 
-NO_LIMITS = Limits()
-
 
 @declared
 class Envelope:
@@ -24,7 +22,7 @@ class Envelope:
     tilt: TiltLimit = np.inf  # [rad] between the thrust axis and the vertical; beyond pi it limits nothing
     body_rate: Limit = np.inf  # [rad/s] |ω|
     moment: Limit = np.inf  # [N·m] |M|
-    limits: Limits = NO_LIMITS
+    limits: Limits = Limits()
     conditions: tuple[Condition, ...] = ()
     passages: tuple[PlannedPassage, ...] = ()
     waypoints: tuple[PlannedWaypoint, ...] = ()
