@@ -4,12 +4,4 @@ from aerobat.certification.certificate import Certificate, Discontinuity, Findin
 from aerobat.certification.certify import certify
 from aerobat.certification.envelope import Envelope
 
-__all__ = [
-    "Certificate",
-    "Discontinuity",
-    "Envelope",
-    "Finding",
-    "Side",
-    "Verdict",
-    "certify",
-]
+__all__ = ["Certificate", "Discontinuity", "Envelope", "Finding", "Side", "Verdict", "certify"]

@@ -19,15 +19,7 @@ _MODULES = {  # modules and names; each is imported when it is chosen
 ENGINE_NAMES = tuple(_MODULES)
 _TRACE_COST = 300  # vehicle-ticks that the engine `floats` computes in the time of a trace
 
-__all__ = [
-    "ENGINE_NAMES",
-    "FLOATS",
-    "CompiledLoop",
-    "Engine",
-    "choose",
-    "logged_ticks",
-    "run_whole",
-]
+__all__ = ["ENGINE_NAMES", "FLOATS", "CompiledLoop", "Engine", "choose", "logged_ticks", "run_whole"]
 
 
 def choose(name: str, vehicles: int, ticks: int) -> Engine:

@@ -88,12 +88,7 @@ def init_position_loop(ops: Ops, gains: Gains, body: Body, reference: ReferenceP
 
 
 def step_position_loop(
-    ops: Ops,
-    gains: Gains,
-    state: PositionLoopState,
-    body: Body,
-    reference: ReferencePoint,
-    elapsed: Scalar,
+    ops: Ops, gains: Gains, state: PositionLoopState, body: Body, reference: ReferencePoint, elapsed: Scalar
 ) -> PositionLoopState:
     """Return the state of the outer loop `elapsed` [s] after the last tick."""
     error = subtract(reference.position, body.position)

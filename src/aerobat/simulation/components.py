@@ -121,10 +121,7 @@ def _compensated(
     if not takes_moments:
         return reference
     ahead = reference.ahead._replace(omega_dot=subtract(reference.ahead.omega_dot, turn))
-    return reference._replace(
-        omega_dot=subtract(reference.omega_dot, turn),
-        ahead=ahead,
-    )
+    return reference._replace(omega_dot=subtract(reference.omega_dot, turn), ahead=ahead)
 
 
 class DelayedCommands(NamedTuple):

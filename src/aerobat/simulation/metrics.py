@@ -19,12 +19,7 @@ from aerobat.kernels import running_metrics
 from aerobat.kernels.gates import approach, pointing, progress
 from aerobat.kernels.gates.section import BoundingEllipsoid
 from aerobat.kernels.ops import Quaternion, Scalar, Vector
-from aerobat.kernels.running_metrics import (
-    Ground,
-    MetricsParameters,
-    RunningMetrics,
-    lowest_height,
-)
+from aerobat.kernels.running_metrics import Ground, MetricsParameters, RunningMetrics, lowest_height
 from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.simulation.components import rotor_commands
 from aerobat.simulation.flight import Flight

@@ -1,10 +1,6 @@
 """Vehicles, their rotors, and the effect of the rotors on the body."""
 
-from aerobat.vehicle.allocation import (
-    mixer,
-    rotor_thrusts,
-    wrench,
-)
+from aerobat.vehicle.allocation import mixer, rotor_thrusts, wrench
 from aerobat.vehicle.ellipsoid import Ellipsoid
 from aerobat.vehicle.files import as_vehicle, load_vehicle, vehicle_names, vehicle_text, write_vehicle
 from aerobat.vehicle.plausibility import implausibilities

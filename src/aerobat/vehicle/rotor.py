@@ -57,8 +57,7 @@ class Rotor:
             raise FieldError("min_thrust", f"must be 0 where max_thrust is, got {self.min_thrust:g} N")
         if not (self.is_dead or self.min_thrust < self.max_thrust):
             raise FieldError(
-                "min_thrust",
-                f"must be below max_thrust, got {self.min_thrust:g} N and {self.max_thrust:g} N",
+                "min_thrust", f"must be below max_thrust, got {self.min_thrust:g} N and {self.max_thrust:g} N"
             )
 
     @property

@@ -13,16 +13,7 @@ from aerobat.kernels.control_loops import thrust_demand
 from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
 from aerobat.kernels.quaternions import axes, to_body
 from aerobat.kernels.rigid_body import RotorWrench
-from aerobat.kernels.vectors import (
-    ZERO,
-    add,
-    add_scaled,
-    clamp_norm,
-    low_passed,
-    scale,
-    subtract,
-    transform,
-)
+from aerobat.kernels.vectors import ZERO, add, add_scaled, clamp_norm, low_passed, scale, subtract, transform
 
 
 class Increments(NamedTuple):

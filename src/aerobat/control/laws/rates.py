@@ -21,16 +21,7 @@ from aerobat.kernels.ops import Ops, Scalar, Vector
 from aerobat.kernels.quaternions import axes, to_body
 from aerobat.kernels.rate_loop import RateSetpoint, rate_gains, times
 from aerobat.kernels.rigid_body import RotorWrench
-from aerobat.kernels.vectors import (
-    ZERO,
-    add,
-    add_scaled,
-    clip_components,
-    norm,
-    scale,
-    subtract,
-    transform,
-)
+from aerobat.kernels.vectors import ZERO, add, add_scaled, clip_components, norm, scale, subtract, transform
 
 _MAX_YAW_RATIO = 1.0 / 3.0  # [-] largest yaw gain over that of the inner loop; a faster one is underdamped
 _MAX_TILT_RATIO = 0.215  # [-] largest tilt gain over the frequency of the inner loop's poles, likewise

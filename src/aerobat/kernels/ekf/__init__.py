@@ -8,14 +8,7 @@ which fuses a possibly late pose. The filter does not depend on the vehicle.
 
 from aerobat.kernels.ekf.fusion import carried_back, fuse
 from aerobat.kernels.ekf.prediction import predict_covariance, propagate
-from aerobat.kernels.ekf.states import (
-    EkfParameters,
-    EkfState,
-    NominalState,
-    estimated_body,
-    init,
-    pose_of,
-)
+from aerobat.kernels.ekf.states import EkfParameters, EkfState, NominalState, estimated_body, init, pose_of
 from aerobat.kernels.imu import ImuSample
 from aerobat.kernels.rigid_body import Pose
 

@@ -18,15 +18,7 @@ from aerobat.kernels.ekf.covariance import (
 from aerobat.kernels.ekf.prediction import anchored
 from aerobat.kernels.ekf.states import EkfParameters, EkfState, NominalState
 from aerobat.kernels.ops import Ops, Scalar, Vector, select_tree
-from aerobat.kernels.quaternions import (
-    axes,
-    conjugate,
-    exp_of_small,
-    multiply,
-    normalize,
-    to_body,
-    to_world,
-)
+from aerobat.kernels.quaternions import axes, conjugate, exp_of_small, multiply, normalize, to_body, to_world
 from aerobat.kernels.rigid_body import Pose
 from aerobat.kernels.vectors import ZERO, add, add_scaled, dot, scale, subtract
 

@@ -92,11 +92,7 @@ def transition(ops: Ops, parameters: EkfParameters, state: EkfState) -> tuple[Ch
     rate = 1.0 / ops.maximum(elapsed, _MIN_DURATION)
     force = to_body(body_axes, scale(rate, (x, y, z + parameters.gravity * elapsed)))
     turn_back = axes(multiply(conjugate(nominal.q_world_body), anchor.q_world_body))
-    scaled_axes = (
-        scale(elapsed, body_axes[0]),
-        scale(elapsed, body_axes[1]),
-        scale(elapsed, body_axes[2]),
-    )
+    scaled_axes = (scale(elapsed, body_axes[0]), scale(elapsed, body_axes[1]), scale(elapsed, body_axes[2]))
 
     def position(error: ErrorState) -> Vector:
         return add_scaled(error.position, elapsed, error.velocity)

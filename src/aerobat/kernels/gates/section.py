@@ -131,11 +131,7 @@ def farthest(ops: Ops, at: Section, both_ways: Scalar) -> PlanePoint:
 
 
 def fraction_of_farthest(
-    ops: Ops,
-    at: Section,
-    change: tuple[Scalar, Scalar],
-    within: tuple[Scalar, Scalar],
-    both_ways: Scalar,
+    ops: Ops, at: Section, change: tuple[Scalar, Scalar], within: tuple[Scalar, Scalar], both_ways: Scalar
 ) -> Scalar:
     """Return the fraction of a straight path, with end `at`, at which a section has its largest extent.
 

@@ -24,12 +24,7 @@ from aerobat.kernels.control_loops import Lookahead, ReferencePoint
 from aerobat.kernels.motors import VehicleState
 from aerobat.kernels.rigid_body import Body
 from aerobat.simulation.autopilot.braking import MIN_FLOOR, Braking, nearest_heading, point_reference
-from aerobat.simulation.autopilot.loop import (
-    COMMAND_HOLD_TIME,
-    RATE,
-    autopilot_inputs,
-    autopilot_setup,
-)
+from aerobat.simulation.autopilot.loop import COMMAND_HOLD_TIME, RATE, autopilot_inputs, autopilot_setup
 from aerobat.simulation.bodies import bodies
 from aerobat.simulation.loop import Signals
 from aerobat.states import BodyState, Setpoint, TimeInterval

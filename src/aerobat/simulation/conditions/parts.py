@@ -11,14 +11,7 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.control.parameters import airframe_parameters, environment_parameters
 from aerobat.engines.pytree import Tree, components
-from aerobat.environment import (
-    Battery,
-    Dispersion,
-    Gusts,
-    HandOff,
-    Imu,
-    MotionCapture,
-)
+from aerobat.environment import Battery, Dispersion, Gusts, HandOff, Imu, MotionCapture
 from aerobat.errors import SpecError
 from aerobat.kernels.battery import BatteryParameters
 from aerobat.kernels.imu import BiasParameters, ImuParameters, ImuSample
