@@ -132,7 +132,7 @@ def test_an_error_of_the_frames_angle_early_on_counts_in_all_that_follows() -> N
     start = np.append(0.0, np.arange(64) / 64)
     pieces = Subintervals(np.append(0, np.ones(64, dtype=int)), start, np.append(1.0, np.full(64, 1 / 64)))
     curve, truth = (ThrustCurve.of(both, VEHICLE, Environment(), degree) for degree in (COARSE, TRUTH))
-    rough, exact = (interpolated(each, pieces, everywhere=True) for each in (curve, truth))
+    rough, exact = (interpolated(each, pieces) for each in (curve, truth))
     off = np.abs(rough.ends() - exact.ends()).max(axis=1)[-1, :4]
     found = accuracy_of(curve, pieces)
     own = found.remainder + curve.basis.lebesgue * found.rounding
@@ -208,7 +208,7 @@ def test_errors_of_series_are_what_the_derivation_adds_up() -> None:
     found, factor = accuracy_of(curve, pieces), 1 + 2 / np.pi * np.log(21)
     turned = np.cumsum(found.twist_remainder + factor * found.twist_rounding)[:, None]
     expected = found.remainder + factor * (found.rounding + turned * found.per_radian)
-    error = interpolated(curve, pieces, everywhere=True).error
+    error = interpolated(curve, pieces).error
     np.testing.assert_allclose(error, expected, rtol=1e-12)
     assert (factor * turned * found.per_radian > 0.1 * expected).any()
 

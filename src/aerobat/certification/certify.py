@@ -35,7 +35,7 @@ from aerobat.certification.path.ends import end_findings
 from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
 from aerobat.certification.series_columns import SeriesColumns
-from aerobat.certification.subdivision import Subdivision, subdivide
+from aerobat.certification.subdivision import subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.certification.unequal_drag import interpolated_with_unequal_drag
 from aerobat.declaration import validated
@@ -51,8 +51,6 @@ from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.trajectory.subintervals import Subintervals
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.ellipsoid import Revolved
-
-INTERPOLATION_DEGREE = 20  # smallest degree of interpolation
 
 
 @validated
@@ -96,7 +94,7 @@ def certify(
     limits = limits_along(vehicle, environment, envelope.limits, envelope.conditions)
     on_measures = [limit for limit in limits if limit.is_proven and not limit.quantity.is_of_path]
     on_path = [limit for limit in limits if limit.quantity.is_of_path]
-    curve = ThrustCurve.of(trajectory, vehicle, environment, INTERPOLATION_DEGREE)
+    curve = ThrustCurve.of(trajectory, vehicle, environment)
     floor = UNDETERMINED * environment.gravity
     found = subdivide(curve, floor)
     findings: list[Finding] = []
@@ -106,7 +104,7 @@ def certify(
     has_obstacles = len(environment.pieces) > 0
     is_near = has_obstacles or len(envelope.passages) > 0
     columns = SeriesColumns(derived, on_thrust, with_axis=is_near)
-    series, unproven = _series(curve, found, columns)
+    series, unproven = _series(curve, found.pieces, columns)
     if series is not None:
         findings += series.findings(_queries(vehicle, envelope, on_measures, columns))
     findings += kinematic_findings(trajectory, envelope.speed, [x for x in on_path if x not in on_thrust])
@@ -125,15 +123,14 @@ def certify(
 
 
 def _series(
-    curve: ThrustCurve, found: Subdivision, columns: SeriesColumns
+    curve: ThrustCurve, pieces: Subintervals, columns: SeriesColumns
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
     """Return all quantities along the pieces, or None, and where unequal drag leaves the attitude open."""
-    whole = not found.vanishing
-    if not len(found.pieces):
+    if not len(pieces):
         return None, ()
     if has_unequal_drag(curve.vehicle):
-        return interpolated_with_unequal_drag(curve, found.pieces, whole, columns)
-    return interpolated(curve, found.pieces, whole, columns), ()
+        return interpolated_with_unequal_drag(curve, pieces, columns)
+    return interpolated(curve, pieces, columns), ()
 
 
 def _bodies(
@@ -202,14 +199,13 @@ def _nearest(query: ExtremumQuery, limits: Sequence[tuple[float, Limit]]) -> Ext
 
 
 def interpolated(
-    curve: ThrustCurve, pieces: Subintervals, everywhere: bool, columns: SeriesColumns | None = None
+    curve: ThrustCurve, pieces: Subintervals, columns: SeriesColumns | None = None
 ) -> ChebyshevSeries:
     """Return all quantities along consecutive pieces, in the frame without spin that is carried along them.
 
     Args:
         curve: The thrust curve of a vehicle without unequal drag.
         pieces: Consecutive pieces on which interpolation is accurate.
-        everywhere: Whether the pieces cover the whole trajectory.
         columns: Columns of the series, by default only those of `quantities.values`.
     """
     columns = SeriesColumns() if columns is None else columns
@@ -243,7 +239,7 @@ def interpolated(
         found.append(basis.analysis @ (thrust / np.linalg.norm(thrust, axis=-1, keepdims=True)))
         errors.append(np.tile(error[:, len(vehicle.rotors) + 1, None], 3))
     series, error = (np.concatenate(each, axis=-1) for each in (found, errors))
-    return ChebyshevSeries(curve.trajectory, pieces, series, error, columns.scale(vehicle), everywhere)
+    return ChebyshevSeries(curve.trajectory, pieces, series, error, columns.scale(vehicle))
 
 
 def _weighted(weights: Sequence[Array], values: Array, rates: Array) -> Array:

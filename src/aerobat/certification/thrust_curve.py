@@ -38,7 +38,7 @@ class ThrustCurve:
 
     @classmethod
     def of(
-        cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, degree: int
+        cls, trajectory: Trajectory, vehicle: Vehicle, environment: Environment, degree: int = 20
     ) -> ThrustCurve:
         """Return the curve of a vehicle on a trajectory.
 

@@ -44,14 +44,13 @@ MAX_ATTITUDE_ERROR = 1e-3
 
 
 def interpolated_with_unequal_drag(
-    curve: ThrustCurve, pieces: Subintervals, everywhere: bool, columns: SeriesColumns
+    curve: ThrustCurve, pieces: Subintervals, columns: SeriesColumns
 ) -> tuple[ChebyshevSeries | None, tuple[TimeInterval, ...]]:
     """Return the series of `certify.interpolated`, and the intervals without a proven attitude.
 
     Args:
         curve: The thrust curve of the vehicle.
         pieces: Consecutive pieces on which the quantities for the mean drag are interpolated accurately.
-        everywhere: Whether the pieces cover the whole trajectory.
         columns: Columns of the series.
     """
     pieces = pieces.halves()
@@ -73,8 +72,8 @@ def interpolated_with_unequal_drag(
     if count == 0:
         return None, unproven
     known, series = motion.pieces[:count], motion.basis.analysis @ values[:count]
-    scale, everywhere = columns.scale(curve.vehicle), everywhere and not unproven
-    return ChebyshevSeries(curve.trajectory, known, series, error[:count], scale, everywhere), unproven
+    scale = columns.scale(curve.vehicle)
+    return ChebyshevSeries(curve.trajectory, known, series, error[:count], scale), unproven
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,7 +70,6 @@ class ChebyshevSeries:
     series: Array  # (P, K + 1, Q)
     error: Array  # largest error of the series, (P, Q)
     scale: Array  # a large value of each function, (Q,)
-    everywhere: bool  # whether the pieces cover the whole trajectory
     tightness: float = TIGHTNESS  # tightness of enclosures, see `SeriesBatch`
 
     def ends(self) -> Array:
@@ -94,10 +93,9 @@ class ChebyshevSeries:
         )
         found = enclose_maximum(batch)
         times = self.pieces[found.member // len(queries)].times(self.trajectory, found.position)
+        everywhere = not len(self.pieces.rest(self.trajectory.segments))
         ranges = zip(queries, found.min.tolist(), found.max.tolist(), times.tolist(), strict=True)
-        return [
-            query.finding(reached, bound, time, self.everywhere) for query, reached, bound, time in ranges
-        ]
+        return [query.finding(reached, bound, time, everywhere) for query, reached, bound, time in ranges]
 
 
 def both_sides(quantity: str, unit: str, column: int, lower: float, upper: float) -> list[ExtremumQuery]:

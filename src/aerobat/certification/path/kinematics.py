@@ -46,7 +46,7 @@ class PolynomialCurve:
         error = self.basis.lebesgue * np.stack([column.error for column in columns], axis=-1)
         whole = Subintervals.whole(self.trajectory.segments)
         scale = np.abs(series).sum(axis=1).max(axis=0)
-        return ChebyshevSeries(self.trajectory, whole, series, error, scale, True, KINEMATIC_TIGHTNESS)
+        return ChebyshevSeries(self.trajectory, whole, series, error, scale, KINEMATIC_TIGHTNESS)
 
 
 @dataclass(frozen=True)
