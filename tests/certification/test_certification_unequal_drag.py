@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat import so3
-from aerobat.certification import Certificate, Envelope, Side, certify
+from aerobat.certification import Certificate, Envelope, Side, certify, unequal_drag
 from aerobat.flatness import reference, reference_of
 from aerobat.problem import Condition
 from aerobat.trajectory import Trajectory
@@ -136,6 +136,16 @@ def test_a_difference_that_is_next_to_nothing_changes_next_to_nothing(seed):
     assert len(values) == len(another.findings)
     for finding in another.findings:
         assert finding.value == pytest.approx(values[finding.name, finding.side], rel=1e-3, abs=1e-6)
+
+
+def test_pieces_that_stay_rough_are_certified_with_the_errors_that_they_have(monkeypatch):
+    for name in ("MAX_REMAINDER", "MAX_COMMAND_REMAINDER"):
+        monkeypatch.setattr(unequal_drag, name, 1e-17)
+    monkeypatch.setattr(unequal_drag, "HALVINGS", 1)
+    flight = unequal_flight(0)
+    certificate = certify(flight.trajectory, flight.vehicle, flight.environment)
+    assert certificate.too_unequal is None
+    assert max(outside(certificate, exactly(flight, 40)).values()) < 1e-6
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -67,7 +67,7 @@ def interpolated_with_unequal_drag(
         error = np.stack([_remainder(x, motion) + motion.basis.lebesgue * x.error for x in bounded], axis=1)
     values = np.stack([x.values for x in bounded], axis=-1)
     proven = np.isfinite(error).all(axis=1) & np.isfinite(values).all(axis=(1, 2))
-    count = len(pieces) if proven.all() else int(np.argmin(proven))
+    count = len(motion.pieces) if proven.all() else int(np.argmin(proven))
     unproven = _from(curve, motion.pieces, count)
     if count == 0:
         return None, unproven
