@@ -26,7 +26,6 @@ from random_flights import irregular, random_flight, with_lags
 
 FINE = np.linspace(-1.0, 1.0, 2001)
 VEHICLE = with_lags(load_vehicle("agile-quad"), 0.0)
-FLOOR = 1e-3 * 9.81  # [m/s²] of thrust, below which there is no attitude
 
 
 TRUTH = 60  # the degree of interpolation that stands for the truth; its nodes hold those of COARSE
@@ -54,9 +53,7 @@ def coarse(trajectory: Trajectory) -> tuple[ThrustCurve, ThrustCurve, Subinterva
 
 
 def accuracy_of(curve: ThrustCurve, pieces: Subintervals) -> InterpolationError:
-    norms = curve.norms(curve.series(curve.on(pieces)), pieces)
-    seconds = pieces.seconds(curve.trajectory)
-    return interpolation_error.error_bounds(norms, seconds, curve.sums[pieces.interval], curve.vehicle)
+    return curve.error_bounds(curve.norms(curve.series(curve.on(pieces)), pieces), pieces)
 
 
 def turning(curve: ThrustCurve, pieces: Subintervals) -> ThrustDirectionRates:
@@ -204,7 +201,7 @@ def test_errors_of_series_are_what_the_derivation_adds_up() -> None:
     """Section 4: remainder + Λ (rounding + Σ (twist remainder + Λ twist rounding) · per radian)."""
     flight = random_flight(3)
     curve = ThrustCurve.of(flight.trajectory, flight.vehicle, flight.environment, 20)
-    pieces = subdivide(curve, FLOOR).pieces
+    pieces = subdivide(curve).pieces
     found, factor = accuracy_of(curve, pieces), 1 + 2 / np.pi * np.log(21)
     turned = np.cumsum(found.twist_remainder + factor * found.twist_rounding)[:, None]
     expected = found.remainder + factor * (found.rounding + turned * found.per_radian)
@@ -230,7 +227,7 @@ def is_accurate(curve: ThrustCurve, pieces: Subintervals) -> np.ndarray:
 def test_pieces_are_as_fine_as_accuracy_asks_and_no_finer(seed: int, lags: bool) -> None:
     flight = random_flight(seed, lags)
     curve = ThrustCurve.of(flight.trajectory, flight.vehicle, flight.environment, 20)
-    pieces = subdivide(curve, FLOOR).pieces
+    pieces = subdivide(curve).pieces
     assert is_accurate(curve, pieces).all()
     halved = pieces[pieces.length < 1.0]
     twice = 2 * halved.length

@@ -10,7 +10,6 @@ from aerobat.certification.certify import interpolated
 from aerobat.certification.subdivision import subdivide
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.flatness import reference
-from aerobat.flatness.inverse_dynamics import UNDETERMINED
 from aerobat.planning import Miqp, plan
 from aerobat.planning.rotor_margin import RotorMargin
 from aerobat.problem import load_problem
@@ -68,7 +67,7 @@ def test_series_of_commands_are_as_near_to_those_of_a_far_higher_degree_as_they_
     coarse, truth = (
         ThrustCurve.of(flight.trajectory, flight.vehicle, flight.environment, degree) for degree in (14, 40)
     )
-    pieces = subdivide(coarse, UNDETERMINED * flight.environment.gravity).pieces
+    pieces = subdivide(coarse).pieces
     near, exact = (interpolated(curve, pieces) for curve in (coarse, truth))
     s = np.linspace(-1, 1, 41)
     values = [

@@ -131,9 +131,7 @@ def test_interpolation_is_as_near_as_its_bound_says_on_coarse_pieces_too(seed, d
         pieces, norms = pieces[usable], norms[usable]
         if not len(pieces):
             continue
-        found = interpolation_error.error_bounds(
-            norms, pieces.seconds(flight.trajectory), coarse.sums[pieces.interval], flight.vehicle
-        )
+        found = coarse.error_bounds(norms, pieces)
         middle = truth.at(pieces.interval, (pieces.start + pieces.length / 2)[:, None])[:, 0, 1]
         interpolants, exact = (piecewise(curve, pieces, middle) for curve in (coarse, truth))
         nodes = npcheb.chebvander(truth.basis.nodes, coarse.basis.degree)

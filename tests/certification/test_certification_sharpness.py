@@ -13,7 +13,6 @@ from random_flights import with_lags
 
 FINE = np.linspace(-1.0, 1.0, 2001)
 VEHICLE = with_lags(load_vehicle("agile-quad"), 0.0)
-FLOOR = 1e-3 * 9.81  # [m/s²] of thrust, below which there is no attitude
 
 
 # of Chebyshev series

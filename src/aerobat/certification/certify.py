@@ -20,7 +20,6 @@ from aerobat.certification.body_path import BodyPath
 from aerobat.certification.certificate import Certificate, Finding, Side
 from aerobat.certification.clearance import clearance_finding, frame_finding
 from aerobat.certification.continuity import discontinuities, seam
-from aerobat.certification.enclosure.interpolation_error import error_bounds
 from aerobat.certification.enclosure.queries import (
     SUMMATION_ROUNDING,
     ChebyshevSeries,
@@ -41,7 +40,6 @@ from aerobat.certification.unequal_drag import interpolated_with_unequal_drag
 from aerobat.declaration import validated
 from aerobat.environment import Environment
 from aerobat.flatness import Planned, environment_of, has_unequal_drag, vehicle_of
-from aerobat.flatness.inverse_dynamics import UNDETERMINED
 from aerobat.limits.along import limits_along
 from aerobat.limits.limit import Limit
 from aerobat.limits.quantity import BODY_RATE, UPRIGHT, WRENCH, WRENCH_RATE
@@ -95,8 +93,7 @@ def certify(
     on_measures = [limit for limit in limits if limit.is_proven and not limit.quantity.is_of_path]
     on_path = [limit for limit in limits if limit.quantity.is_of_path]
     curve = ThrustCurve.of(trajectory, vehicle, environment)
-    floor = UNDETERMINED * environment.gravity
-    found = subdivide(curve, floor)
+    found = subdivide(curve)
     findings: list[Finding] = []
     unequal = has_unequal_drag(vehicle)
     on_thrust = [limit for limit in on_path if unequal and _is_of_thrust(limit, envelope.conditions)]
@@ -112,12 +109,12 @@ def certify(
     if bodies and has_obstacles:
         findings += [clearance_finding(*bodies, environment.pieces)]
     findings += end_findings(trajectory, envelope.start, envelope.goal)
-    findings += passage_findings(trajectory, envelope.passages, vehicle, environment)
+    findings += passage_findings(curve, envelope.passages)
     findings += [frame_finding(*bodies, passage) for passage in envelope.passages] if bodies else []
     findings += waypoint_findings(trajectory, envelope.waypoints)
-    jumps = discontinuities(curve, floor, series)
+    jumps = discontinuities(curve, series)
     if envelope.closed:
-        jumps += seam(trajectory, vehicle, environment)
+        jumps += seam(curve)
     too_unequal = next((span.start for span in unproven), None)
     return Certificate(tuple(findings), found.vanishing + unproven, jumps, too_unequal)
 
@@ -216,8 +213,7 @@ def interpolated(
     rates = ThrustDirectionRates.along(values[..., 1:, :], series[:, 0, 1], seconds, basis)
     angle, yaw = rates.carried(curve.trajectory.heading), curve.yaw_on(pieces)
     omega, omega_dot = rates.body(angle) if yaw is None else rates.with_yaw(angle, yaw)
-    sums = curve.sums[pieces.interval]
-    bound = error_bounds(curve.norms(series, pieces), seconds, sums, vehicle, curve.yaw_bounds(pieces))
+    bound = curve.error_bounds(curve.norms(series, pieces), pieces)
     # errors of the frame's angle accumulate from piece to piece
     own_error = (bound.twist_remainder + basis.lebesgue * bound.twist_rounding)[:, None]
     angle_error = np.cumsum(own_error, axis=0)

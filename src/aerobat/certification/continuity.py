@@ -19,11 +19,9 @@ from aerobat.certification.enclosure.interpolation_error import first_order
 from aerobat.certification.enclosure.queries import ChebyshevSeries
 from aerobat.certification.quantities import MagnitudeBounds
 from aerobat.certification.thrust_curve import ThrustCurve
-from aerobat.environment import Environment
 from aerobat.flatness import has_unequal_drag, reference
 from aerobat.flatness.unequal_drag import UnequalDrag
 from aerobat.trajectory import Trajectory, polynomial
-from aerobat.vehicle import Vehicle
 
 NEGLIGIBLE_JUMP = 1e-6  # of the largest value at knots; no controller or solver resolves less
 NEGLIGIBLE_SEAM = 1e-6  # of the largest value, or of 1 rad or 1 rad/s, where a lap closes
@@ -32,20 +30,17 @@ COMMAND_RESOLUTION = 1 / 1000
 CANCELLATION = 1e3  # rounding error of fitted segments, in units in the last place of the largest coefficient
 
 
-def discontinuities(
-    curve: ThrustCurve, floor: float, found: ChebyshevSeries | None
-) -> tuple[Discontinuity, ...]:
+def discontinuities(curve: ThrustCurve, found: ChebyshevSeries | None) -> tuple[Discontinuity, ...]:
     """Return the jump of lowest order at every inner knot with one that cannot be flown.
 
-    Thrust directions are compared where the thrust is above the floor. Rates are compared as b3' in the world
-    frame: where b3 is continuous, its jump is that of the body rate.
+    Thrust directions are compared where the thrust is above the curve's floor. Rates are compared as b3' in
+    the world frame: where b3 is continuous, its jump is that of the body rate.
 
     Args:
         curve: The thrust curve of the vehicle.
-        floor: |f| [m/s²] below which no attitude is determined.
         found: Series with the rotors' thrusts as the first columns; None if the attitude is never determined.
     """
-    trajectory = curve.trajectory
+    trajectory, floor = curve.trajectory, curve.floor
     ends = curve.at(np.arange(trajectory.segments), np.tile([0.0, 1.0], (trajectory.segments, 1)))
     position = trajectory.on_segments([0.0, 1.0]) - trajectory.coefficients[0, 0]
     velocity, f, df = np.moveaxis(ends[:, :, :3], 2, 0)
@@ -110,17 +105,13 @@ def _unequal_directions(curve: ThrustCurve, ends: Array) -> tuple[Array, Array]:
     return b3, db3
 
 
-def seam(trajectory: Trajectory, vehicle: Vehicle, environment: Environment) -> tuple[Discontinuity, ...]:
+def seam(curve: ThrustCurve) -> tuple[Discontinuity, ...]:
     """Return the first jump from the end to the start of a lap that is flown repeatedly, if there is one.
 
     Full attitudes are compared: a body carried around the lap without spin may return rotated.
-
-    Args:
-        trajectory: The lap.
-        vehicle: The vehicle that flies the lap.
-        environment: The environment of the lap.
     """
-    flat = reference(trajectory, vehicle, [0.0, trajectory.duration], environment=environment)
+    trajectory, vehicle = curve.trajectory, curve.vehicle
+    flat = reference(trajectory, vehicle, [0.0, trajectory.duration], environment=curve.environment)
     state = flat.setpoint
     checks = (
         ("position", "m", state.flat.position, np.ptp(trajectory.on_segments([0.0]), axis=0)),

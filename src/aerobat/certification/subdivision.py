@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification import quantities
-from aerobat.certification.enclosure import interpolation_error
-from aerobat.certification.enclosure.interpolation_error import MAX_COMMAND_REMAINDER, MAX_REMAINDER
+from aerobat.certification.enclosure.interpolation_error import (
+    MAX_COMMAND_REMAINDER,
+    MAX_REMAINDER,
+    regular,
+)
 from aerobat.certification.thrust_curve import MIN_DURATION, ThrustCurve
 from aerobat.states import TimeInterval
 from aerobat.trajectory.subintervals import Subintervals
@@ -26,8 +29,8 @@ class Subdivision:
     vanishing: tuple[TimeInterval, ...]  # where |f| is below the floor
 
 
-def subdivide(curve: ThrustCurve, floor: float) -> Subdivision:
-    """Halve segments until |f| >= floor [m/s²] and interpolation is accurate on each piece.
+def subdivide(curve: ThrustCurve) -> Subdivision:
+    """Halve segments until |f| is above the curve's floor and interpolation is accurate on each piece.
 
     Pieces below the floor, or too close to it to decide, are left out.
     """
@@ -38,9 +41,9 @@ def subdivide(curve: ThrustCurve, floor: float) -> Subdivision:
         norms = curve.norms(curve.series(curve.on(pending)), pending)
         mean = norms[:, 0, 1]
         spread = norms[:, 1:, 1].sum(axis=1)
-        good = (mean - spread >= floor) & interpolation_error.regular(norms)
+        good = (mean - spread >= curve.floor) & regular(norms)
         good[good] = _accurate(curve, pending[good], norms[good])
-        hopeless = (mean + spread < floor) | (pending.seconds(curve.trajectory) < MIN_DURATION)
+        hopeless = (mean + spread < curve.floor) | (pending.seconds(curve.trajectory) < MIN_DURATION)
         hopeless |= len(good) > MAX_PIECES + 4 * count
         done.append(pending[good])
         excluded.append(pending[hopeless & ~good])
@@ -50,10 +53,7 @@ def subdivide(curve: ThrustCurve, floor: float) -> Subdivision:
 
 
 def _accurate(curve: ThrustCurve, pieces: Subintervals, norms: Array) -> NDArray[np.bool_]:
-    seconds = pieces.seconds(curve.trajectory)
-    found = interpolation_error.error_bounds(
-        norms, seconds, curve.sums[pieces.interval], curve.vehicle, curve.yaw_bounds(pieces)
-    )
+    found = curve.error_bounds(norms, pieces)
     allowed = MAX_REMAINDER * np.maximum(quantities.scales(curve.vehicle), found.magnitude)
     small = (found.remainder <= allowed).all(axis=1)
     lags = curve.vehicle.lags

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.certification.enclosure import chebyshev
-from aerobat.certification.enclosure.interpolation_error import YawBounds
+from aerobat.certification.enclosure.interpolation_error import InterpolationError, YawBounds, error_bounds
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.flatness.inverse_dynamics import lateral_drag
+from aerobat.flatness.inverse_dynamics import UNDETERMINED, lateral_drag
 from aerobat.kernels import flatness
 from aerobat.trajectory import Trajectory, polynomial
 from aerobat.trajectory.subintervals import Subintervals
@@ -66,6 +66,11 @@ class ThrustCurve:
         flat = rates.reshape(*rates.shape[:2], 12)
         return cls(trajectory, vehicle, environment, flat, sums, basis, turned)
 
+    @property
+    def floor(self) -> float:
+        """The norm of f [m/s²] below which no attitude is determined."""
+        return UNDETERMINED * self.environment.gravity
+
     def at(self, segment: NDArray[np.intp], s: Array) -> Array:
         """Return v, f, f', f'' at normalised times s (..., k) of segments (...), (..., k, 4, 3)."""
         rates = polynomial.evaluate(self.rates[segment][..., None, :, :], s)
@@ -105,6 +110,11 @@ class ThrustCurve:
         padding = self.basis.lebesgue * chebyshev.EVALUATION_ROUNDING * self.sums[pieces.interval]
         norms[:, 1 : self.rates.shape[1]] += padding[:, None]
         return np.asarray(norms)
+
+    def error_bounds(self, norms: Array, pieces: Subintervals) -> InterpolationError:
+        """Bound the interpolation error on regular pieces, from the `norms` of their series."""
+        seconds, sums = pieces.seconds(self.trajectory), self.sums[pieces.interval]
+        return error_bounds(norms, seconds, sums, self.vehicle, self.yaw_bounds(pieces))
 
 
 def _check(trajectory: Trajectory) -> None:

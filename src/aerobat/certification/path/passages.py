@@ -13,30 +13,18 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.certification.certificate import Finding, Side, Verdict
-from aerobat.environment import Environment
+from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.flatness import force_balance, has_unequal_drag, reference
-from aerobat.flatness.inverse_dynamics import UNDETERMINED
 from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.trajectory import Trajectory
-from aerobat.vehicle import Vehicle
 
 PASSAGE_TOLERANCE = 1e-6  # [m, m/s, rad] violation of a passage that is accepted: the accuracy of solvers
 PLANE_DISTANCE = 1e-3  # [m] largest distance from the gate's plane of a point in it
 
 
-def passage_findings(
-    trajectory: Trajectory, passages: Sequence[PlannedPassage], vehicle: Vehicle, environment: Environment
-) -> list[Finding]:
-    """Return the findings about each passage: in the gate's plane, inside the opening, speed, attitude.
-
-    Args:
-        trajectory: The path.
-        passages: The planned passages of gates.
-        vehicle: The vehicle; its drag is included.
-        environment: Gravity and wind.
-    """
-    instants = [_Instant.of(trajectory, passage, vehicle, environment) for passage in passages]
-    return [finding for instant in instants for finding in instant.findings()]
+def passage_findings(curve: ThrustCurve, passages: Sequence[PlannedPassage]) -> list[Finding]:
+    """Return the findings about each passage: in the gate's plane, inside the opening, speed, attitude."""
+    return [finding for passage in passages for finding in _Instant.of(curve, passage).findings()]
 
 
 def waypoint_findings(trajectory: Trajectory, waypoints: Sequence[PlannedWaypoint]) -> list[Finding]:
@@ -63,10 +51,9 @@ class _Instant:
     floor: float  # [m/s²] |thrust| below which no attitude is determined
 
     @classmethod
-    def of(
-        cls, trajectory: Trajectory, passage: PlannedPassage, vehicle: Vehicle, environment: Environment
-    ) -> _Instant:
-        """Return the state of a vehicle on a trajectory."""
+    def of(cls, curve: ThrustCurve, passage: PlannedPassage) -> _Instant:
+        """Return the state of the curve's vehicle, its drag included."""
+        trajectory, vehicle, environment = curve.trajectory, curve.vehicle, curve.environment
         time = np.array([min(passage.time, trajectory.duration)])
         position, velocity, acceleration = (trajectory.evaluate(time, k)[0] for k in range(3))
         thrust = force_balance(environment, vehicle).specific_thrust(velocity, acceleration)
@@ -74,11 +61,10 @@ class _Instant:
             found = reference(trajectory, vehicle, time, environment=environment)
             axis = so3.thrust_axis(found.setpoint.q_world_body[0])
             thrust = (axis @ thrust) * axis
-        floor = UNDETERMINED * environment.gravity
         gate = passage.gate
         if gate.motion is not None:
             velocity = velocity - gate.motion.velocity_at(float(time[0]))
-        return cls(passage, position - gate.places(time)[0], velocity, thrust, floor)
+        return cls(passage, position - gate.places(time)[0], velocity, thrust, curve.floor)
 
     def findings(self) -> list[Finding]:
         """Return the findings about the passage, compared with what it requires."""
