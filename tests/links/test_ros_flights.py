@@ -287,7 +287,7 @@ def test_a_maneuver_begins_where_the_odometry_sees_the_vehicle() -> None:
     sky.run_for(0.01)
     flown = sky.node._flown
     assert flown is not None
-    start = flown.plan.trajectory.evaluate(0.0) + flown.offset
+    start = flown.plan.trajectory.evaluate(0.0) + flown.stream.offset
     np.testing.assert_allclose(start, sky.position, atol=2e-3)
     assert start[0] > 9.9
     seen = sky.node.commander.observed
@@ -328,7 +328,7 @@ def test_a_node_killed_at_any_instant_of_the_flip_leaves_a_hover(instant: float)
     assert sky.vehicle.mode is Mode.HOLD
     flown = sky.node._flown
     assert flown is not None
-    expected = ab.recoveries(flown.plan, times=[instant], ground=-3.0).lowest[0] + flown.offset[2]
+    expected = ab.recoveries(flown.plan, times=[instant], ground=-3.0).lowest[0] + flown.stream.offset[2]
     assert min(sky.heights[-1500:]) > min(expected, 3.0) - 0.3
 
 

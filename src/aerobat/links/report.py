@@ -9,7 +9,6 @@ from math import degrees
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import Array
 from aerobat.links.goals import Observed
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan, planned_passages
@@ -67,7 +66,6 @@ def link_report(
     stream: SetpointStream,
     log: Sequence[Observed],
     *,
-    offset: Array,
     aborted: str,
     ended: str,
     delay: float,
@@ -79,7 +77,6 @@ def link_report(
         plan: the plan that was flown.
         stream: its set-points.
         log: states observed during the plan, with times since its start [s].
-        offset: position of the plan's origin [m], (3,).
         aborted: the reason of an abort, empty where there was none.
         ended: the last stage reached.
         delay: one-way delay of a message [s].
@@ -96,7 +93,8 @@ def link_report(
     points = [stream.at(t) for t in times]
     off = np.linalg.norm(position - [point.position for point in points], axis=-1)
     turned = so3.angle_between(q, np.array([point.q_world_body for point in points]))
-    rows = log_rows(times, position - offset, velocity, q)
+    place = position - stream.offset
+    rows = log_rows(times, place, velocity, q)
     body = None if plan.vehicle is None else plan.vehicle.bounding_ellipsoid
     stop = np.array([times[-1] if aborted else np.nan])
     flown = passages_in_log(rows, planned_passages(plan.stages, plan.problem), body, stop)
@@ -110,5 +108,5 @@ def link_report(
         max_attitude_error_deg=degrees(float(turned.max())),
         longest_silence_s=float(np.diff(times).max()),
         passages=tuple(passage.of_flight(0) for passage in flown),
-        nearest=nearest_in_log(plan.problem.surroundings.pieces, times, position - offset, q, body),
+        nearest=nearest_in_log(plan.problem.surroundings.pieces, times, place, q, body),
     )

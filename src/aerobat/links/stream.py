@@ -34,7 +34,7 @@ class SetpointStream:
             offset: position of the path's origin [m], world, (3,).
         """
         self.trajectory = trajectory
-        self._offset = np.asarray(offset, dtype=float)
+        self.offset = np.asarray(offset, dtype=float)  # [m] position of the path's origin, world, (3,)
         rows = reference(trajectory, vehicle, rate=_RATE, environment=environment).setpoint
         ticks = len(rows.q_world_body)
         following = rows_of(rows, np.minimum(np.arange(1, ticks + 1), ticks - 1))
@@ -50,7 +50,7 @@ class SetpointStream:
     def flat(self, time: float) -> FlatState:
         """Return position to snap [m/s^k] at a time [s] since the start, (3,) each."""
         flat = self.trajectory.flat(min(max(time, 0.0), self.duration))
-        return FlatState(flat.position + self._offset, flat.velocity, flat.acceleration, flat.jerk, flat.snap)
+        return FlatState(flat.position + self.offset, flat.velocity, flat.acceleration, flat.jerk, flat.snap)
 
     def goal(self, time: float) -> PathGoal:
         """Return the path's point at a time [s] since the start, for a vehicle that tracks it by itself."""
@@ -68,5 +68,5 @@ class SetpointStream:
         values = self._rows[row] + fraction * (self._rows[row + 1] - self._rows[row])
         point: ReferencePoint = tree_unflatten(self._tree, values.tolist())
         x, y, z = point.position
-        dx, dy, dz = self._offset.tolist()
+        dx, dy, dz = self.offset.tolist()
         return point._replace(position=(x + dx, y + dy, z + dz))

@@ -89,7 +89,7 @@ class Client:
         stream = SetpointStream(plan.trajectory, plan.vehicle, environment, offset)
         follower = PathFollower(stream, plan.vehicle, environment)
         self.mission = Mission(plan, mission, stream, follower.command)
-        self._plan, self._offset = plan, offset
+        self._plan = plan
         self.link = AutopilotLink(connection, settings.system, say)
         self.stage = ClientStage.CONNECTING
         self.settings = settings
@@ -137,7 +137,6 @@ class Client:
             self._plan,
             self.mission.stream,
             self.mission.log,
-            offset=self._offset,
             aborted=self.mission.reason or self._lost,
             ended=str(self.stage),
             delay=self.link.delay,

@@ -100,7 +100,7 @@ class Crazyflie:
     def _upload(self, flown: Prepared) -> None:
         assert flown.pieces is not None, "asked of plans that have them"
         moved = flown.pieces.copy()
-        moved["polynomials"][:, :3, 0] += flown.offset
+        moved["polynomials"][:, :3, 0] += flown.stream.offset
         pieces = [
             self._messages.make(
                 "crazyflie_interfaces/msg/TrajectoryPolynomialPiece",

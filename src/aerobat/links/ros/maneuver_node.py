@@ -153,7 +153,6 @@ class ManeuverNode:
                 self._flown.plan,
                 self._flown.stream,
                 mission.log,
-                offset=self._flown.offset,
                 aborted=mission.reason,
                 ended=str(self.commander.doing),
                 delay=0.0,
@@ -247,7 +246,7 @@ class ManeuverNode:
     def _publish_markers(self, planned: Prepared) -> None:
         """Publish markers of the path, its gates and the vehicle along it, in place of earlier markers."""
         stamp = self.origin + round(self._now * NANOSECONDS)
-        shown = PlanMessages(self._messages, planned.plan, stamp, planned.offset)
+        shown = PlanMessages(self._messages, planned.plan, stamp, planned.stream.offset)
         kind = "visualization_msgs/msg/Marker"
         wipe = self._messages.make(kind, header=self._messages.header(stamp), action=3)  # DELETEALL
         lines = shown.lines(reference(planned.plan, rate=50.0))

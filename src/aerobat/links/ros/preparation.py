@@ -47,8 +47,7 @@ class Prepared:
     """A plan that is ready to be flown."""
 
     plan: Plan
-    offset: Array  # [m] position of its origin in the world, (3,)
-    stream: SetpointStream
+    stream: SetpointStream  # from where the vehicle hovers
     announcement: str
     pieces: Pieces | None = None  # for a Crazyflie that flies them by itself, from the plan's origin
 
@@ -88,7 +87,7 @@ def _prepared(request: ManeuverRequest) -> Prepared:
     assert found.vehicle is not None, "it was planned for one"
     stream = SetpointStream(found.trajectory, found.vehicle, problem.environment, offset)
     pieces = fitted_pieces(found)[0] if request.in_pieces else None
-    return Prepared(found, offset, stream, announcement, pieces)
+    return Prepared(found, stream, announcement, pieces)
 
 
 def _from_here(request: ManeuverRequest) -> tuple[Problem, Array]:
