@@ -201,7 +201,7 @@ def test_errors_of_series_are_what_the_derivation_adds_up() -> None:
     """Section 4: remainder + Λ (rounding + Σ (twist remainder + Λ twist rounding) · per radian)."""
     flight = random_flight(3)
     curve = ThrustCurve.of(flight.trajectory, flight.vehicle, flight.environment, 20)
-    pieces = subdivide(curve).pieces
+    pieces = subdivide(curve)
     found, factor = accuracy_of(curve, pieces), 1 + 2 / np.pi * np.log(21)
     turned = np.cumsum(found.twist_remainder + factor * found.twist_rounding)[:, None]
     expected = found.remainder + factor * (found.rounding + turned * found.per_radian)
@@ -227,7 +227,7 @@ def is_accurate(curve: ThrustCurve, pieces: Subintervals) -> np.ndarray:
 def test_pieces_are_as_fine_as_accuracy_asks_and_no_finer(seed: int, lags: bool) -> None:
     flight = random_flight(seed, lags)
     curve = ThrustCurve.of(flight.trajectory, flight.vehicle, flight.environment, 20)
-    pieces = subdivide(curve).pieces
+    pieces = subdivide(curve)
     assert is_accurate(curve, pieces).all()
     halved = pieces[pieces.length < 1.0]
     twice = 2 * halved.length

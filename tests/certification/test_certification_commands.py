@@ -67,7 +67,7 @@ def test_series_of_commands_are_as_near_to_those_of_a_far_higher_degree_as_they_
     coarse, truth = (
         ThrustCurve.of(flight.trajectory, flight.vehicle, flight.environment, degree) for degree in (14, 40)
     )
-    pieces = subdivide(coarse).pieces
+    pieces = subdivide(coarse)
     near, exact = (interpolated(curve, pieces) for curve in (coarse, truth))
     s = np.linspace(-1, 1, 41)
     values = [

@@ -34,7 +34,7 @@ from aerobat.certification.path.ends import end_findings
 from aerobat.certification.path.kinematics import kinematic_findings
 from aerobat.certification.path.passages import passage_findings, waypoint_findings
 from aerobat.certification.series_columns import SeriesColumns
-from aerobat.certification.subdivision import subdivide
+from aerobat.certification.subdivision import subdivide, vanishing
 from aerobat.certification.thrust_curve import ThrustCurve
 from aerobat.certification.unequal_drag import interpolated_with_unequal_drag
 from aerobat.declaration import validated
@@ -93,7 +93,7 @@ def certify(
     on_measures = [limit for limit in limits if limit.is_proven and not limit.quantity.is_of_path]
     on_path = [limit for limit in limits if limit.quantity.is_of_path]
     curve = ThrustCurve.of(trajectory, vehicle, environment)
-    found = subdivide(curve)
+    pieces = subdivide(curve)
     findings: list[Finding] = []
     unequal = has_unequal_drag(vehicle)
     on_thrust = [limit for limit in on_path if unequal and _is_of_thrust(limit, envelope.conditions)]
@@ -101,7 +101,7 @@ def certify(
     has_obstacles = len(environment.pieces) > 0
     is_near = has_obstacles or len(envelope.passages) > 0
     columns = SeriesColumns(derived, on_thrust, with_axis=is_near)
-    series, unproven = _series(curve, found.pieces, columns)
+    series, unproven = _series(curve, pieces, columns)
     if series is not None:
         findings += series.findings(_queries(vehicle, envelope, on_measures, columns))
     findings += kinematic_findings(trajectory, envelope.speed, [x for x in on_path if x not in on_thrust])
@@ -116,7 +116,8 @@ def certify(
     if envelope.closed:
         jumps += seam(curve)
     too_unequal = next((span.start for span in unproven), None)
-    return Certificate(tuple(findings), found.vanishing + unproven, jumps, too_unequal)
+    undetermined = vanishing(trajectory, pieces) + unproven
+    return Certificate(tuple(findings), undetermined, jumps, too_unequal)
 
 
 def _series(

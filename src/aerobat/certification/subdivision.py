@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,27 +14,19 @@ from aerobat.certification.enclosure.interpolation_error import (
 )
 from aerobat.certification.thrust_curve import MIN_DURATION, ThrustCurve
 from aerobat.states import TimeInterval
+from aerobat.trajectory import Trajectory
 from aerobat.trajectory.subintervals import Subintervals
 
 MAX_PIECES = 20_000  # limit of the pieces at a time, besides four a segment; no known flight needs as many
 
 
-@dataclass(frozen=True)
-class Subdivision:
-    """The pieces of a curve in order, and the intervals that are left out."""
-
-    pieces: Subintervals
-    vanishing: tuple[TimeInterval, ...]  # where |f| is below the floor
-
-
-def subdivide(curve: ThrustCurve) -> Subdivision:
-    """Halve segments until |f| is above the curve's floor and interpolation is accurate on each piece.
+def subdivide(curve: ThrustCurve) -> Subintervals:
+    """Halve segments until |f| is above the curve's floor and interpolation is accurate; return the pieces.
 
     Pieces below the floor, or too close to it to decide, are left out.
     """
     count = curve.trajectory.segments
-    pending = Subintervals.whole(count)
-    done, excluded = [pending[:0]], [pending[:0]]
+    pending, done = Subintervals.whole(count), [Subintervals.whole(0)]
     while len(pending):
         norms = curve.norms(curve.series(curve.on(pending)), pending)
         mean = norms[:, 0, 1]
@@ -46,10 +36,8 @@ def subdivide(curve: ThrustCurve) -> Subdivision:
         hopeless = (mean + spread < curve.floor) | (pending.seconds(curve.trajectory) < MIN_DURATION)
         hopeless |= len(good) > MAX_PIECES + 4 * count
         done.append(pending[good])
-        excluded.append(pending[hopeless & ~good])
         pending = pending[~(good | hopeless)].halves()
-    pieces, rest = (Subintervals.joined(parts).in_order() for parts in (done, excluded))
-    return Subdivision(pieces, _time_intervals(curve, rest))
+    return Subintervals.joined(done).in_order()
 
 
 def _accurate(curve: ThrustCurve, pieces: Subintervals, norms: Array) -> NDArray[np.bool_]:
@@ -62,11 +50,12 @@ def _accurate(curve: ThrustCurve, pieces: Subintervals, norms: Array) -> NDArray
     return np.asarray(small & np.isfinite(found.magnitude).all(axis=1))
 
 
-def _time_intervals(curve: ThrustCurve, pieces: Subintervals) -> tuple[TimeInterval, ...]:
-    """Return the intervals covered by consecutive pieces."""
-    if not len(pieces):
+def vanishing(trajectory: Trajectory, pieces: Subintervals) -> tuple[TimeInterval, ...]:
+    """Return the intervals that pieces leave out, where the thrust vanishes."""
+    rest = pieces.rest(trajectory.segments)
+    if not len(rest):
         return ()
-    start, end = pieces.spans(curve.trajectory)
+    start, end = rest.spans(trajectory)
     apart = start[1:] - end[:-1] > MIN_DURATION
     firsts = start[np.append(True, apart)]
     lasts = end[np.append(apart, True)]
