@@ -76,12 +76,11 @@ class ControlLaw(ABC):
         """
 
 
-_ROOM = "aerobat.control.laws"
 CONTROL_LAWS: Registry[ControlLaw] = Registry(
     ControlLaw,  # type: ignore[type-abstract]
     "controller",
     "aerobat.controllers",
-    {name: f"{_ROOM}.{name}" for name in ("lee", "lqr", "indi", "rates")},
+    {name: f"aerobat.control.laws.{name}" for name in ("lee", "lqr", "indi", "rates")},
 )
 
 

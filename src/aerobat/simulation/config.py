@@ -11,13 +11,13 @@ from pydantic import Field, PlainValidator
 from aerobat.control import ControlLaw, Controller, as_controller, named_controller
 from aerobat.declaration import AS_IT_IS, FieldError, Seed, declared, shown
 from aerobat.environment import Dispersion, as_dispersion
+from aerobat.environment.sensors import SensorRate
 from aerobat.errors import SpecError
 from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot
 from aerobat.simulation.plants import PLANTS, Plant
 from aerobat.states import BodyState
 from aerobat.vehicle import Vehicle, as_vehicle
 
-ControlRate = Annotated[float, Field(ge=1, le=1e6, description="number from 1 to 1e6")]
 MAX_FLIGHTS = 10_000_000  # under conditions
 LogRate = Annotated[float, Field(ge=1e-3, le=1e6, description="number from 0.001 to 1e6")]
 
@@ -72,7 +72,7 @@ class FlightConfig:
 
     # controller settings, a control law, or a name (full, paper, lee, …); by default the nominal vehicle's
     controller: Annotated[Controller | ControlLaw | str | None, PlainValidator(as_controller)] = None
-    rate: ControlRate = 500.0  # [1/s] of the controller, unless the conditions set it
+    rate: SensorRate = 500.0  # [1/s] of the controller, unless the conditions set it
     # realistic variations, disturbances and sensors; left out, the flight is ideal
     conditions: Annotated[Dispersion | None, _or_named(Dispersion, as_dispersion)] = None
     seed: Seed = 0  # of the draws from conditions

@@ -27,11 +27,10 @@ from aerobat.documents import file_name
 from aerobat.environment.obstacles.cloud_file import read_values
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.obstacle import Obstacle, obstacle
+from aerobat.environment.obstacles.shapes import CORNERS
 
 MAX_BOXES = 10_000  # limit of boxes; more take minutes to plan around
 FARTHEST = 2**31  # largest distance from the origin, in cells
-# which coordinates of a box's corners are the upper ones
-UPPER = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 
 
 def _boxes(value: Any) -> Array:
@@ -152,5 +151,5 @@ class Grid(Obstacle):
     def pieces(self) -> tuple[ConvexPiece, ...]:
         """The boxes."""
         lower, upper = self.boxes[:, None, :3], self.boxes[:, None, 3:]
-        corners = self.origin + self.cell * (lower + UPPER * (upper - lower))
+        corners = self.origin + self.cell * np.where(CORNERS > 0.0, upper, lower)
         return tuple(ConvexPiece(each, name=self.name) for each in corners)

@@ -66,10 +66,9 @@ class Plant(ABC):
         """
 
 
-_ROOM = "aerobat.simulation.plants"
 PLANTS: Registry[Plant] = Registry(
     Plant,  # type: ignore[type-abstract]
     "plant",
     "aerobat.plants",
-    {"mujoco": f"{_ROOM}.mujoco", "rotorpy": f"{_ROOM}.rotorpy"},
+    {name: f"aerobat.simulation.plants.{name}" for name in ("mujoco", "rotorpy")},
 )
