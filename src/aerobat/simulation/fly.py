@@ -96,9 +96,9 @@ def _flight(setup: FlightSetup, log: LogRow, engine: str, contact: Array | None 
     if contact is not None:
         series["contact"] = contact
     ends, outcomes, sentences = _endings(series, times)
-    length = ends.max() + 1
+    rows = ends.max() + 1
     # a diverged vehicle repeats its last row for as long as another one flies
-    shown = np.minimum(np.arange(length), ends[:, None])
+    shown = np.minimum(np.arange(rows), ends[:, None])
     series |= {
         "min_thrusts": setup.fleet.min_thrusts,
         "max_thrusts": setup.fleet.max_thrusts,
@@ -109,12 +109,12 @@ def _flight(setup: FlightSetup, log: LogRow, engine: str, contact: Array | None 
             continue
         values = series[one.name]
         if one.per_vehicle and one.over_time:
-            values = values[:, :length] if (ends == ends.max()).all() else _taken(values, shown)
+            values = values[:, :rows] if (ends == ends.max()).all() else _taken(values, shown)
         elif one.over_time:
-            values = values[:length]
+            values = values[:rows]
         series[one.name] = values[0] if one.per_vehicle and not setup.is_batch else values
     return Flight(
-        times=times[:length],
+        times=times[:rows],
         series=series,
         vehicles=setup.fleet.names,
         outcomes=outcomes,

@@ -27,11 +27,12 @@ class PointReference(NamedTuple):
 
     def reference(self, times: Array, gravity: float) -> ReferencePoint:
         """Return references at times [s], leaves (T,)."""
-        goal, ones = self.goal, np.ones((len(times), 1))
+        goal = self.goal
         age = np.clip(times - self.arrived, 0.0, COMMAND_HOLD_TIME)[:, None]
         position = goal.position + age * goal.velocity
-        velocity, acceleration = ones * goal.velocity, ones * goal.acceleration
-        return point_reference(position, velocity, acceleration, 0.0 * ones * velocity, goal.yaw, gravity)
+        velocity = np.broadcast_to(goal.velocity, position.shape)
+        acceleration = np.broadcast_to(goal.acceleration, position.shape)
+        return point_reference(position, velocity, acceleration, np.zeros_like(position), goal.yaw, gravity)
 
 
 class PathReference(NamedTuple):

@@ -1,4 +1,4 @@
-"""Connections for MAVLink messages by pymavlink, and a connection with losses and delays for tests."""
+"""Connections for MAVLink messages by pymavlink, and one that loses and delays some of them."""
 
 from __future__ import annotations
 

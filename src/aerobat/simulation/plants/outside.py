@@ -132,7 +132,7 @@ def fly_outside(setup: FlightSetup, gates: tuple[Gate, ...]) -> tuple[LogRow, ND
     """
     plant, autopilot = setup.config.plant, setup.config.autopilot
     if len(setup.fleet) != 1:
-        name = autopilot.kind if plant is None and autopilot else plant.kind if plant else ""
+        name = next(each.kind for each in (plant, autopilot) if each is not None)
         raise SpecError(f"plant: {name} flies one vehicle at a time, not {len(setup.fleet)}")
     parameters: PlantParameters = setup.parts[-1].parameters
     inner = setup.parts[:-1]
