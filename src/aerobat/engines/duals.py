@@ -9,6 +9,8 @@ At a kink the tangent is one-sided; the tangent of the square root at zero is de
 
 from __future__ import annotations
 
+import operator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -16,6 +18,11 @@ from typing import Any
 from aerobat.engines.engine import Init, Step
 from aerobat.engines.pytree import Tree, tree_leaves, tree_unflatten
 from aerobat.kernels.ops import Ops, Scalar
+
+
+def _compared(compare: Callable[[Any, Any], Any]) -> Callable[[Dual, Any], Any]:
+    """Return the comparison of a dual number by its value."""
+    return lambda self, other: compare(self.value, _parts(other)[0])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,25 +70,10 @@ class Dual:
     def __pow__(self, exponent: int) -> Dual:
         return Dual(self.value**exponent, _product(self.tangent, exponent * self.value ** (exponent - 1)))
 
-    def __eq__(self, other: Any) -> Any:
-        return self.value == _parts(other)[0]
-
-    def __ne__(self, other: Any) -> Any:
-        return self.value != _parts(other)[0]
-
+    __eq__, __ne__ = _compared(operator.eq), _compared(operator.ne)
+    __lt__, __le__ = _compared(operator.lt), _compared(operator.le)
+    __gt__, __ge__ = _compared(operator.gt), _compared(operator.ge)
     __hash__ = object.__hash__
-
-    def __lt__(self, other: Any) -> Any:
-        return self.value < _parts(other)[0]
-
-    def __le__(self, other: Any) -> Any:
-        return self.value <= _parts(other)[0]
-
-    def __gt__(self, other: Any) -> Any:
-        return self.value > _parts(other)[0]
-
-    def __ge__(self, other: Any) -> Any:
-        return self.value >= _parts(other)[0]
 
 
 def dual(x: Any) -> Dual:
