@@ -129,11 +129,10 @@ def _gains(vehicle: Vehicle) -> Iterator[tuple[str, int]]:
     One unit is `scale` thousandths of a motor's range for 1°/s, 1° and 1°/s². Source: its
     src/main/flight/pid.h, for the integral of yaw pid_init.c.
     """
-    fleet = Fleet.of([vehicle])
-    gains = rate_gains(FloatOps, first_numbers(airframe_parameters(fleet)))
-    span = fleet.max_thrusts[0] - fleet.min_thrusts[0]
-    torque = np.abs(fleet.allocation[0, 1:]) @ span  # [N·m] torque with every motor at its limit for an axis
-    authority = torque / np.diagonal(fleet.inertia[0])  # [rad/s²]
+    gains = rate_gains(FloatOps, first_numbers(airframe_parameters(Fleet.of([vehicle]))))
+    # [N·m] torque with every motor at its limit for an axis
+    torque = np.abs(vehicle.allocation[1:]) @ vehicle.thrust_ranges
+    authority = torque / np.diag(vehicle.inertia)  # [rad/s²]
     for k, axis in enumerate(("roll", "pitch", "yaw")):
         for letter, kind, scale in (
             ("p", gains.proportional, 0.032029),

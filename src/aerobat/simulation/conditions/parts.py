@@ -130,7 +130,7 @@ def battery_part(battery: Battery, flights: DispersedFlights) -> LoopPart:
     """Return the part for a battery that hover of the nominal vehicle empties within its endurance."""
     vehicle = flights.reference.vehicle
     weight = vehicle.mass * flights.reference.environment.gravity
-    hover = weight * np.abs(Fleet.of([vehicle]).mixer[0, :, 0])
+    hover = weight * np.abs(vehicle.mixer[:, 0])
     radii = np.array([rotor.radius for rotor in vehicle.rotors])
     hover_power = np.sum(hover**1.5 / radii)
     usage = flights.effectiveness**1.5 / radii / hover_power / battery.endurance
