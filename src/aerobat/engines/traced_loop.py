@@ -133,7 +133,7 @@ class TracedLoop:
         for number in place:
             for argument in self.trace.operations[number].arguments:
                 users.setdefault(argument, set()).add(number)
-        asked_at_the_end = {*self.outputs, *self.next_carry}
+        used_at_the_end = {*self.outputs, *self.next_carry}
         found: list[dict[int, int]] = [{} for _ in blocks]
         for now, then in zip(self.carry, self.next_carry, strict=True):
             operation = self.trace.operations[then]
@@ -143,10 +143,10 @@ class TracedLoop:
             block = place.get(chosen, -1)
             if block < 0 or blocks[block].guard != guard:
                 continue
-            is_seen_later = any(place[user] > block for user in users[now] - {then})
-            is_asked = then in users or then in self.outputs or now in asked_at_the_end
-            is_asked = is_asked or self.next_carry.count(then) > 1
-            if not is_seen_later and not is_asked:
+            is_used_later = any(place[user] > block for user in users[now] - {then})
+            is_needed = then in users or then in self.outputs or now in used_at_the_end
+            is_needed = is_needed or self.next_carry.count(then) > 1
+            if not is_used_later and not is_needed:
                 found[block][now] = chosen
         return found
 

@@ -57,7 +57,7 @@ class PathGoal(NamedTuple):
 
     @classmethod
     def upright(cls, goal: PositionGoal, gravity: float) -> PathGoal:
-        """Return a point of a route near a hover, tilted for its acceleration; its rates change slowly."""
+        """Return the goal with the attitude and the rates that its acceleration and jerk require."""
         thrust = goal.acceleration + gravity * so3.UP
         size = float(np.linalg.norm(thrust))
         heading = so3.about_axis(so3.UP, goal.yaw)

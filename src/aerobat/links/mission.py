@@ -114,7 +114,7 @@ class Mission(Generic[GoalT]):
         self._set_out(now, observed, Phase.CLIMB, here, above)
 
     def join(self, now: float, observed: Observed) -> None:
-        """Fly to the plan's start from the hover that `observed` is."""
+        """Fly to the plan's start from a hover, whose state is `observed`."""
         self._set_out(now, observed, Phase.APPROACH, np.array(observed.body.position))
 
     def observe(self, observed: Observed) -> None:

@@ -97,7 +97,7 @@ class LoopParameters(NamedTuple):
 
 
 class Due(NamedTuple):
-    """The turn of a component that does not step at every tick."""
+    """The steps of a component with a period of more than one tick."""
 
     now: Scalar  # 1 at a tick at which the component steps, else 0
     clock: StepClock  # about the latest of these ticks: since the one before, until the next

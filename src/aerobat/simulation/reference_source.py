@@ -78,7 +78,7 @@ class ReferenceSource:
         )
 
     def due(self, every: int, begin: int, end: int) -> Due:
-        """Return at which of these ticks a component steps that steps every `every` ticks."""
+        """Return at which of these ticks a component with period `every` steps, and its step clock."""
         return Due(due_ticks(every, begin, end), self.clock(begin, end, every))
 
     def _period_after(self, steps: NDArray[np.intp], every: int) -> Array:

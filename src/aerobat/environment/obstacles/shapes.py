@@ -23,8 +23,8 @@ CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))  # corners of a box of 
 def _size(value: Any) -> Array:
     size = finite(value, 3)
     if not (size > 0.0).all():
-        told = ", ".join(f"{each:g}" for each in size)
-        raise FieldError("", f"must be three positive numbers, got {told}")
+        given = ", ".join(f"{each:g}" for each in size)
+        raise FieldError("", f"must be three positive numbers, got {given}")
     return size
 
 
