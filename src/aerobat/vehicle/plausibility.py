@@ -17,20 +17,11 @@ from aerobat.vehicle.files import as_vehicle
 from aerobat.vehicle.rotor import Rotor
 from aerobat.vehicle.vehicle import Vehicle
 
-MAX_ARM = 10.0  # [m] the largest passenger multirotors have rotors 5 m from their centre
-MAX_LAG = 1.0  # [s] propellers of a metre and more take 0.3 s; with more lag no vehicle hovers stably
-MAX_TORQUE_PER_RADIUS = 10.0  # [-] c/R is the ratio C_Q/C_T, often 0.05 to 0.3; Section V of the paper has 8
-MAX_RADIUS_PER_ARM = 2.0  # [-] neighbours on a cross touch at 0.7 of the arm; at 2 all propellers overlap
 MAX_GYRATION = 1.0  # [-] radius of gyration over the reach of arm and propeller: 1 if all mass is at the tips
 MIN_GYRATION = 0.03  # [-] over the arm: motors alone, a fifth of the mass at the arms' ends, give 0.3
 MAX_THRUST_TO_WEIGHT = 40.0  # [-] record racers reach 25
 MIN_THRUST_TO_WEIGHT = 0.1  # [-] on Earth: too little even for the Moon
-# typical values, to choose between units that are all plausible
-TYPICAL_ARM = 0.2  # [m]
-TYPICAL_LAG = 0.03  # [s]
-TYPICAL_TORQUE_PER_RADIUS = 0.1
-TYPICAL_RADIUS_PER_ARM = 0.6
-TYPICAL_GYRATION = 0.35  # [-] over the reach
+TYPICAL_GYRATION = 0.35  # [-] over the reach, to choose between units that are all plausible
 
 LENGTHS = (("mm", 1e-3), ("cm", 1e-2), ("inches", 0.0254))
 TIMES = (("ms", 1e-3), ("µs", 1e-6))
@@ -40,7 +31,7 @@ Units = Sequence[tuple[str, float]]  # names of units, each with its size in the
 
 @dataclass(frozen=True)
 class _Check:
-    """A length or a time of a rotor, its largest plausible value, and its typical value."""
+    """A length or a time of a rotor, its largest plausible value, and a typical one to choose units by."""
 
     field: str
     value: float
@@ -89,13 +80,16 @@ def _of_rotors(rotors: Sequence[Rotor]) -> Iterator[str]:
 
 def _checks(rotor: Rotor) -> tuple[_Check, ...]:
     """Return all checks of one rotor."""
-    arm, radius = _arm(rotor), rotor.radius
-    torque, most_torque = rotor.torque_coefficient, MAX_TORQUE_PER_RADIUS * radius
+    arm, radius, torque = _arm(rotor), rotor.radius, rotor.torque_coefficient
     return (
-        _Check("position_body", arm, MAX_ARM, TYPICAL_ARM, "m from the centre", LENGTHS),
-        _Check("lag", rotor.lag, MAX_LAG, TYPICAL_LAG, "s", TIMES),
-        _Check("radius", radius, MAX_RADIUS_PER_ARM * arm, TYPICAL_RADIUS_PER_ARM * arm, "m", LENGTHS),
-        _Check("torque_coefficient", torque, most_torque, TYPICAL_TORQUE_PER_RADIUS * radius, "m", LENGTHS),
+        # the largest passenger multirotors have rotors 5 m from their centre
+        _Check("position_body", arm, 10.0, 0.2, "m from the centre", LENGTHS),
+        # propellers of a metre and more take 0.3 s; with more lag no vehicle hovers stably
+        _Check("lag", rotor.lag, 1.0, 0.03, "s", TIMES),
+        # neighbours on a cross touch at 0.7 of the arm; at 2 all propellers overlap
+        _Check("radius", radius, 2.0 * arm, 0.6 * arm, "m", LENGTHS),
+        # c/R is the ratio C_Q/C_T, often 0.05 to 0.3; Section V of the paper has 8
+        _Check("torque_coefficient", torque, 10.0 * radius, 0.1 * radius, "m", LENGTHS),
     )
 
 
