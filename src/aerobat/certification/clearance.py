@@ -35,10 +35,6 @@ from aerobat.problem import Gate
 from aerobat.problem.planned_passage import PASSAGE_DEPTH, PlannedPassage
 from aerobat.trajectory.subintervals import Subintervals
 
-CLEARANCE_TIGHTNESS = 3e-4  # [m] largest distance between the proven bound and the smallest gap found
-NEAR_TIGHTNESS = 0.5  # this distance as a fraction of the gap, where that is smaller
-OVERLAP_TIGHTNESS = 0.02  # this distance as a fraction of an overlap's depth, where that is larger
-FINEST_TIGHTNESS = 1e-6  # [m] smallest value of this distance, for tiny gaps
 FIRST_PIECES = 64  # pieces considered first: any small gap found prunes many others
 HALVINGS = 3  # halvings between searches for planes; these cost little more for 100 pairs than for one
 ROUNDS = 14  # rounds of searching planes and halving
@@ -56,10 +52,14 @@ class ClearanceEnclosure:
 
     @property
     def enough(self) -> float:
-        """The bound [m] at which the enclosure is tight enough."""
+        """The bound [m] at which the enclosure is tight enough.
+
+        It lies below the gap by 0.3 mm, or by half of a smaller gap, at least by 1 µm. Below an overlap, it
+        lies by 2 % of the depth, where that is more than 0.3 mm.
+        """
         if self.value < 0.0:
-            return self.value - max(-OVERLAP_TIGHTNESS * self.value, CLEARANCE_TIGHTNESS)
-        return self.value - min(max(NEAR_TIGHTNESS * self.value, FINEST_TIGHTNESS), CLEARANCE_TIGHTNESS)
+            return self.value - max(-0.02 * self.value, 3e-4)
+        return self.value - min(max(0.5 * self.value, 1e-6), 3e-4)
 
 
 def clearance_finding(attitude: BodyPath | None, ball: BodyPath, pieces: Pieces) -> Finding:
