@@ -12,9 +12,8 @@ import pytest
 
 from aerobat.engines import FLOATS, Engine, run_whole
 from aerobat.engines.engine import available_cores
-from aerobat.engines.llvm import ENGINE
 from aerobat.engines.llvm.codegen import module
-from aerobat.engines.llvm.engine import MachineLoop, machine_code, target_machine
+from aerobat.engines.llvm.engine import ENGINE, MachineLoop, machine_code, target_machine
 from aerobat.engines.llvm.packing import InputKind, Layout
 from aerobat.engines.traced_loop import trace_loop
 from aerobat.simulation import fly

@@ -12,7 +12,7 @@ from aerobat.errors import BackendMissing, SpecError
 
 _MODULES = {  # modules and names; each is imported when it is chosen
     "floats": ("floats", "FLOATS"),
-    "compiled": ("llvm", "ENGINE"),
+    "compiled": ("llvm.engine", "ENGINE"),
     "jax": ("jax", "ENGINE"),
     "jax-float32": ("jax", "SINGLE"),
 }
