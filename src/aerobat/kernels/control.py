@@ -105,7 +105,7 @@ def track_attitude(
     state: ControllerState,
     body_axes: Axes,
     pursuit: AttitudePursuit,
-    rates: ReferencePoint,
+    reference: ReferencePoint,
     elapsed: Scalar,
 ) -> ControllerState:
     """Return the state, including new commands, of the inner loop, which turns the body to an attitude.
@@ -117,7 +117,7 @@ def track_attitude(
         state: state after the last tick, with an outer loop that is already updated.
         body_axes: present axes of the body.
         pursuit: the attitude error, and the collective thrust.
-        rates: the reference; its rates and their change give the feed-forward moment.
+        reference: the reference; its rates and their change give the feed-forward moment.
         elapsed: time since the last tick [s].
     """
     mass_properties, rotors = model.airframe
@@ -127,10 +127,10 @@ def track_attitude(
     integral = integrate_attitude_error(ops, model.gains, state.attitude_integral, error, integration_time)
     moment, change = feedback_moment(model.gains, mass_properties.inertia, error, integral), ZERO
     if flags.moment_feedforward:
-        now, change = moment_and_change(mass_properties.inertia, body_axes, rates)
+        now, change = moment_and_change(mass_properties.inertia, body_axes, reference)
         moment = add(moment, now)
     load = RotorWrench(pursuit.thrust, moment)
-    ahead = RotorWrench(mass_properties.mass * rates.ahead.thrust_change, change)
+    ahead = RotorWrench(mass_properties.mass * reference.ahead.thrust_change, change)
     decay_factors = motors.decay_factors(ops, rotors, elapsed)
     thrusts = motors.first_order_response(state.thrusts, state.commands.thrusts, decay_factors)
     commands = rotor_commands(ops, flags, model, (load, ahead), thrusts, decay_factors, elapsed)
