@@ -109,7 +109,7 @@ def collective(mass: Scalar, gamma: Sequence[Vector], omega: Vector) -> tuple[Sc
 
 
 def frame_spin(
-    thrust: tuple[Scalar, Vector], alpha: tuple[Vector, Vector], body: Axes, yaw_rate: Scalar = 0.0
+    thrust: tuple[Scalar, Vector], alpha: tuple[Vector, Vector], body: Axes, yaw_rate: Scalar
 ) -> Scalar:
     """Return the rate [rad/s] at which the given axes turn about the mean-drag thrust, relative to a body.
 
