@@ -50,11 +50,7 @@ def sampled_values(flight, condition: Condition, count: int = 100_000) -> np.nda
 
 
 @examples(30, few=4)
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    quantity=st.sampled_from(QUANTITIES),
-    share=st.floats(-0.2, 1.2),
-)
+@given(seed=st.integers(0, 2**32 - 1), quantity=st.sampled_from(QUANTITIES), share=st.floats(-0.2, 1.2))
 def test_of_100_000_samples_none_violates_a_condition_that_is_proven(seed, quantity, share):
     rng = np.random.default_rng(seed)
     flight = random_flight(seed % 1000)

@@ -55,8 +55,7 @@ def any_attitudes(rng: np.random.Generator, copies: int = COPIES) -> Array:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.slow) if n == "hexarotor" else n for n in vehicle_names()],
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n == "hexarotor" else n for n in vehicle_names()]
 )
 def test_every_vehicle_gets_level_from_any_attitude_and_to_a_hover_from_any_motion(name: str) -> None:
     rng = np.random.default_rng(3)

@@ -65,10 +65,7 @@ class ThrustByEquality(ThrustAlone):
 
 
 @pytest.mark.parametrize("law", [*LAWS, ThrustAlone(0.9), ThrustByEquality()], ids=str)
-@pytest.mark.parametrize(
-    "engine",
-    ["compiled", pytest.param("jax", marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize("engine", ["compiled", pytest.param("jax", marks=pytest.mark.slow)])
 def test_every_engine_flies_a_law_to_the_same_numbers(law: Any, engine: str) -> None:
     starts = near(2)
     flights = (ab.fly(SHORT, QUAD, start=starts, controller=law, engine=e) for e in ("floats", engine))

@@ -106,10 +106,7 @@ def test_no_multiplication_is_fused_with_an_addition(width: int) -> None:
     text = module(
         loop,
         Layout(
-            width,
-            shared_parameters=(False,),
-            inputs=(InputKind(shared=False),),
-            piecewise_constant=(False,),
+            width, shared_parameters=(False,), inputs=(InputKind(shared=False),), piecewise_constant=(False,)
         ),
     )
     assembly = target_machine().emit_assembly(llvm.parse_assembly(text))

@@ -190,10 +190,7 @@ def small_log(**changes: Any) -> SensorLog:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        (
-            {"omega": np.full((10, 3), np.nan)},
-            "omega must be numbers; it contains a NaN",
-        ),
+        ({"omega": np.full((10, 3), np.nan)}, "omega must be numbers; it contains a NaN"),
         (
             {"omega": np.zeros((10, 2))},
             "omega must have the shape (10, 3), a row for each of imu_times, got (10, 2)",

@@ -13,15 +13,7 @@ from aerobat.kernels import rigid_body
 from aerobat.kernels.allocation import Mixer, desaturate, mix, within_limits
 from aerobat.kernels.motors import Rotors, clamp
 from aerobat.states import Wrench
-from aerobat.vehicle import (
-    Rotor,
-    Vehicle,
-    load_vehicle,
-    mixer,
-    rotor_thrusts,
-    vehicle_names,
-    wrench,
-)
+from aerobat.vehicle import Rotor, Vehicle, load_vehicle, mixer, rotor_thrusts, vehicle_names, wrench
 from aerobat.vehicle.fleet import Fleet
 from random_vehicles import (
     SAMPLES,

@@ -30,14 +30,7 @@ def slow(*values: object) -> object:
     return pytest.param(*values, marks=pytest.mark.slow)
 
 
-@pytest.mark.parametrize(
-    ("engine", "rotors"),
-    [
-        ("compiled", 4),
-        slow("compiled", 6),
-        slow("jax", 6),
-    ],
-)
+@pytest.mark.parametrize(("engine", "rotors"), [("compiled", 4), slow("compiled", 6), slow("jax", 6)])
 def test_engines_agree_with_floats_to_rounding_over_3000_steps(engine: str, rotors: int) -> None:
     vehicle = {4: QUAD, 6: HEXA}[rotors]
     flights = [by_floats(vehicle, 6.0), fly(loops(6.0), vehicle, engine=engine)]
@@ -163,10 +156,7 @@ def test_a_slow_controller_does_not_coarsen_the_physics() -> None:
         ({"vehicle": [QUAD, HEXA]}, "need as many rotors"),
         ({"nominal": HEXA}, "need as many rotors"),
         ({"vehicle": [QUAD, replace(QUAD, drag_body=np.ones(3))]}, "differ in drag per mass"),
-        (
-            {"engine": "abacus"},
-            "engine must be one of auto, floats, compiled, jax, jax-float32",
-        ),
+        ({"engine": "abacus"}, "engine must be one of auto, floats, compiled, jax, jax-float32"),
         ({"rate": 0.0}, r"^FlightConfig\.rate must be 1 or more, got "),
         ({"rate": np.nan}, r"^FlightConfig\.rate must be a finite number"),
         ({"seed": -1}, "seed must be"),

@@ -71,10 +71,7 @@ def changed(**arrays: object) -> Callable[[Path], None]:
         (lambda path: np.save(path.open("wb"), np.zeros(3)), "not a whole .npz"),
         (lambda path: np.savez(path, a=np.zeros(3)), "holds something else"),
         (lambda path: np.savez(path, format=np.array([{}], dtype=object)), "not a whole .npz"),
-        (
-            changed(format="aerobat-flight-1"),
-            "holds aerobat-flight-1, not aerobat-flight-2; fly it again",
-        ),
+        (changed(format="aerobat-flight-1"), "holds aerobat-flight-1, not aerobat-flight-2; fly it again"),
         (changed(outcomes=["LANDED"]), "outcomes must be names of outcomes, got 'LANDED'"),
         (changed(thrusts=None), "no array 'thrusts'"),
         (changed(setpoint_jerk=None), "no array 'setpoint_jerk'"),

@@ -195,10 +195,7 @@ def test_where_it_flies_is_the_problems_matter_unless_said_otherwise() -> None:
 
 @pytest.mark.parametrize(
     ("vehicle", "environment", "sentence"),
-    [
-        (None, None, "vehicle is missing"),
-        (QUAD, Environment(gravity=90.0), "rotors cannot"),
-    ],
+    [(None, None, "vehicle is missing"), (QUAD, Environment(gravity=90.0), "rotors cannot")],
 )
 def test_what_cannot_fly_is_refused(vehicle: Any, environment: Any, sentence: str) -> None:
     with pytest.raises(SpecError, match=sentence):

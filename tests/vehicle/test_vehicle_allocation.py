@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from aerobat.vehicle import (
-    load_vehicle,
-    mixer,
-    rotor_thrusts,
-    vehicle_names,
-    wrench,
-)
+from aerobat.vehicle import load_vehicle, mixer, rotor_thrusts, vehicle_names, wrench
 from random_vehicles import SAMPLES, span, thrusts_within_limits, vehicles
 
 

@@ -215,10 +215,7 @@ MALFORMED: dict[str, tuple[Callable[[], Any], str]] = {
     "a rotor a number": (put("rotors", 1, value=3), "rotors[1] must be a Rotor, in a file a table, got 3"),
     "three rotors": (without("rotors", 3), "rotors must be 4 or more, got 3"),
     "spin of three": (put("rotors", 2, "spin", value=3), "rotors[2].spin must be 1 or -1, got 3"),
-    "spin a fraction": (
-        put("rotors", 2, "spin", value=0.5),
-        "rotors[2].spin must be 1 or -1, got 0.5",
-    ),
+    "spin a fraction": (put("rotors", 2, "spin", value=0.5), "rotors[2].spin must be 1 or -1, got 0.5"),
     "no spin": (without("rotors", 2, "spin"), "rotors[2].spin is missing; add it"),
     "spins alike": (put("rotors", 1, "spin", value=-1), "rotors cannot hold a level hover"),
     "position flat": (

@@ -11,13 +11,7 @@ from pathlib import Path
 import pytest
 
 from aerobat import cli
-from aerobat.vehicle import (
-    Vehicle,
-    implausibilities,
-    load_vehicle,
-    vehicle_names,
-    write_vehicle,
-)
+from aerobat.vehicle import Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
 
 QUAD = load_vehicle("agile-quad")
 
