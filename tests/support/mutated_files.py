@@ -194,7 +194,7 @@ def sweep_chunk(path: Path) -> None:
 
 def kept_parts(path: Path) -> KeptParts:
     """The folder of a file, as parts of a sweep."""
-    return KeptParts.of(path.parent, ("flights", "sweep"), lambda: {"seed": 0})
+    return KeptParts.of(path.parent, "flights", "sweep", lambda: {"seed": 0})
 
 
 def described(path: Path) -> str:

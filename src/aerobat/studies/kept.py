@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,9 @@ from aerobat.provenance import installed_versions
 from aerobat.storage import digest_of, read_arrays, whole_file, write_whole
 from aerobat.studies.workers import LIBRARIES
 
-FINGERPRINT = "fingerprint.json"
+_FINGERPRINT = "fingerprint.json"  # the file that tells which study a folder belongs to
+_FLIGHTS = re.compile(r"flights-(\d+)-(\d+)\.npz")
+_PART = re.compile(r"(flights|cell)-.*\.npz")
 
 
 @dataclass(frozen=True)
@@ -33,22 +36,23 @@ class KeptParts:
 
     @classmethod
     def of(
-        cls, folder: PathName | None, what: tuple[str, str], inputs_summary: Callable[[], Mapping[str, Any]]
+        cls, folder: PathName | None, parts: str, study: str, inputs_summary: Callable[[], Mapping[str, Any]]
     ) -> KeptParts:
         """Return the folder, which is new or belongs to the same study.
 
         Args:
             folder: Where parts are kept; None to keep none.
-            what: The names of the parts and of the study, for messages.
+            parts: The word for the parts, for messages.
+            study: The word for the study, for messages and for the format.
             inputs_summary: Returns a summary of everything that the parts' numbers depend on.
 
         Raises SpecError, one sentence, for a folder of any other study.
         """
         if folder is None:
             return cls(None)
-        folder, (parts, study) = Path(folder), what
+        folder = Path(folder)
         own = {"format": f"aerobat-{study}-1", **inputs_summary(), "versions": installed_versions(LIBRARIES)}
-        path = folder / FINGERPRINT
+        path = folder / _FINGERPRINT
         try:
             is_new = not folder.exists() or not any(folder.iterdir())
         except OSError as error:
@@ -84,9 +88,30 @@ class KeptParts:
             np.savez(file, **arrays, digest=digest_of(arrays))
 
 
-def names_of_parts(folder: Path) -> list[str]:
-    """Return the names of the parts that a folder keeps."""
-    return [path.stem for path in folder.glob("*.npz")]
+def flights_name(flights: range) -> str:
+    """Return the name of the part that holds these flights of a sweep."""
+    return f"flights-{flights.start}-{flights.stop}"
+
+
+def cell_name(values: Sequence[float]) -> str:
+    """Return the name of the part that holds the cell of a map at these values."""
+    return "-".join(["cell", *map(str, values)])
+
+
+def kept_flights(folder: Path) -> int:
+    """Return the number of flights that a folder keeps; files of others do not count."""
+    spans = (_FLIGHTS.fullmatch(path.name) for path in folder.glob("flights-*.npz"))
+    return sum(int(span[2]) - int(span[1]) for span in spans if span)
+
+
+def kept_cells(folder: Path) -> int:
+    """Return the number of cells that a folder keeps."""
+    return len(list(folder.glob("cell-*.npz")))
+
+
+def is_kept_file(name: str) -> bool:
+    """Return True for the name of a file that a study keeps."""
+    return name == _FINGERPRINT or _PART.fullmatch(name) is not None
 
 
 def fingerprint(table: Any) -> str:

@@ -19,8 +19,8 @@ from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.reporting.feasibility.facts import requirements
 from aerobat.studies.feasibility import Axis, feasibility_map, min_requirements
-from aerobat.studies.feasibility.feasibility_map import finished_cells
 from aerobat.studies.feasibility.probe import TIME_LIMIT
+from aerobat.studies.kept import kept_cells
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +112,7 @@ def run_map(record: RunRecord, options: OutputOptions, workers: str | None = Non
     count = prod(len(axis.values) for axis in axes)
     name = f"map.{record.flight.table}"
     unfinished = Unfinished.beside(options.out or record.folder)
-    with unfinished.kept("cells", count, finished_cells) as kept:
+    with unfinished.kept("cells", count, kept_cells) as kept:
         with showing(Progress("cells", count, kept=kept)) as progress:
             found = feasibility_map(
                 record.problem,

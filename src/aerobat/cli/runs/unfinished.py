@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,12 +11,11 @@ from pathlib import Path
 from aerobat.cli.runs.record import RECORD, beside
 from aerobat.cli.terminal import say
 from aerobat.storage import require_replaceable
-from aerobat.studies.kept import FINGERPRINT
+from aerobat.studies.kept import is_kept_file
 from aerobat.studies.workers import WorkerEnded
 
 PARTS = "finished"  # the folder of the finished parts
 PLAN = "sweep.plan"  # what a sweep flies
-PART = re.compile(rf"(flights|cell)-.*\.npz|{re.escape(FINGERPRINT)}")  # the names of what it holds
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class Unfinished:
         """
         found = cls(beside(folder, "-unfinished"))
         require_replaceable(found.folder, (PARTS, PLAN, RECORD).__contains__)
-        require_replaceable(found.parts, lambda name: PART.fullmatch(name) is not None)
+        require_replaceable(found.parts, is_kept_file)
         return found
 
     @property

@@ -8,7 +8,6 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from itertools import product
 from math import isnan, nan, prod
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -23,7 +22,7 @@ from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.axis import MAX_CELLS, Axis
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, ProbedTask, least_reserve, probe
 from aerobat.studies.flights import Flights, FlightTask, fly_scores, passed
-from aerobat.studies.kept import KeptParts, fingerprint, names_of_parts
+from aerobat.studies.kept import KeptParts, cell_name, fingerprint
 from aerobat.studies.lens import Lens, Scenario, lens
 from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool, Workers, pool
@@ -154,7 +153,7 @@ def feasibility_map(
     fields = _fields(axes, scenario)
     task = ProbedTask(scenario, fields, time_limit, range(flights), seed)
     places = list(product(*(axis.values for axis in axes)))
-    kept = KeptParts.of(keep, ("cells", "map"), lambda: _inputs_summary(axes, task))
+    kept = KeptParts.of(keep, "cells", "map", lambda: _inputs_summary(axes, task))
     cells: dict[tuple[float, ...], Cell] = {}
     planned = 0
 
@@ -166,26 +165,17 @@ def feasibility_map(
             progress(len(cells), planned)
 
     for values in places:
-        known = Cell.of(values, kept.read(_name(values)))
+        known = Cell.of(values, kept.read(cell_name(values)))
         if known is not None:
             take(values, known)
     missing = [values for values in places if values not in cells]
     with pool(workers, executor, len(missing)) as planning:
         for values, cell in planning.results(_cell, task, missing):
-            kept.write(_name(values), cell.arrays)
+            kept.write(cell_name(values), cell.arrays)
             take(values, cell)
     axes = tuple(replace(axis, unit=field.unit) for axis, field in zip(axes, fields, strict=True))
     found = tuple(cells[values] for values in places)
     return FeasibilityMap(scenario.problem, scenario.vehicle, axes, found)
-
-
-def finished_cells(folder: Path) -> int:
-    """Return the number of cells that a folder keeps."""
-    return len(names_of_parts(folder))
-
-
-def _name(values: tuple[float, ...]) -> str:
-    return "-".join(["cell", *map(str, values)])
 
 
 def _inputs_summary(axes: Sequence[Axis], task: ProbedTask) -> dict[str, Any]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,7 +17,7 @@ from aerobat.flatness import vehicle_of
 from aerobat.planning import Plan
 from aerobat.simulation import Outcome
 from aerobat.studies.flights import CHUNK, CHUNKS_PER_GROUP, FlightTask, cut
-from aerobat.studies.kept import KeptParts, fingerprint, names_of_parts
+from aerobat.studies.kept import KeptParts, fingerprint, flights_name
 from aerobat.studies.sweep.flights import SAMPLED, STRIDE, Chunk, fly_chunk
 from aerobat.studies.sweep.result import Sweep
 from aerobat.studies.workers import Workers, pool
@@ -75,7 +73,7 @@ def sweep(
     if isinstance(controller, str):
         controller = named_controller(controller, vehicle.controller)
     task = FlightTask(plan, vehicle, conditions, seed, controller or vehicle.controller, engine, batch)
-    kept = KeptParts.of(keep, ("flights", "sweep"), lambda: _inputs_summary(task))
+    kept = KeptParts.of(keep, "flights", "sweep", lambda: _inputs_summary(task))
     spans = cut(range(runs))
     chunks: dict[range, Chunk] = {}
     done = well = 0
@@ -89,14 +87,14 @@ def sweep(
             progress(done, well)
 
     for flights in spans:
-        found = Chunk.of(kept.read(_name(flights)), len(flights))
+        found = Chunk.of(kept.read(flights_name(flights)), len(flights))
         if found is not None:
             take(flights, found)
     missing = [flights for flights in spans if flights not in chunks]
     with pool(workers, executor, len(missing)) as flying:
         flown = flying.results(fly_chunk, task, missing, together=CHUNKS_PER_GROUP, compiles=True)
         for flights, chunk in flown:
-            kept.write(_name(flights), chunk.arrays)
+            kept.write(flights_name(flights), chunk.arrays)
             take(flights, chunk)
     whole = Chunk.joined([chunks[flights] for flights in spans])
     return Sweep(
@@ -109,16 +107,6 @@ def sweep(
         position_error=whole.position_error,
         attitude_error=whole.attitude_error,
     )
-
-
-def finished_flights(folder: Path) -> int:
-    """Return the number of flights that a folder keeps; files of others do not count."""
-    spans = (re.fullmatch(r"flights-(\d+)-(\d+)", name) for name in names_of_parts(folder))
-    return sum(int(span[2]) - int(span[1]) for span in spans if span)
-
-
-def _name(flights: range) -> str:
-    return f"flights-{flights.start}-{flights.stop}"
 
 
 def _inputs_summary(task: FlightTask) -> dict[str, Any]:
