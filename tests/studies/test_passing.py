@@ -16,7 +16,7 @@ import aerobat as ab
 from aerobat.planning.result import FLYING_RESERVE
 from aerobat.studies.passing import Passing, Round, proving
 from aerobat.studies.passing.causes import main_failure_cause
-from aerobat.studies.passing.proving import Proving
+from aerobat.studies.passing.proving import proven
 from aerobat.studies.passing.spread import with_more_thrust
 from aerobat.studies.passing.steadying import steadier
 from aerobat.studies.passing.task import FlownPlan, PassingTask
@@ -159,9 +159,8 @@ def test_a_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened(monkeypa
     changed["is_proof"] = lambda share: share.fraction == 1.0
     for name, value in changed.items():
         object.__setattr__(task, name, value)
-    search = Proving(task)
-    object.__setattr__(search, "_proven", lambda first, done, share, fresh: (done.plan, fresh))
-    assert search.passing() == ("tightened", range(14, 24))
+    monkeypatch.setattr(proving, "_with_proof", lambda task, first, best, share, fresh: (best.plan, fresh))
+    assert proven(task) == ("tightened", range(14, 24))
     assert started == [1.0, 0.0]
 
 

@@ -14,7 +14,7 @@ from aerobat.evaluation.opening import Probability
 from aerobat.planning import Attempt, Planner, as_planner
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.flights import Flights, cut
-from aerobat.studies.passing.proving import Proving
+from aerobat.studies.passing.proving import proven
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.task import PassingTask
 from aerobat.studies.share import CONFIDENCE
@@ -97,7 +97,7 @@ def plan_to_pass(
             flying=flying,
             tried=tried,
         )
-        return Proving(task).passing()
+        return proven(task)
 
 
 def _least_flights(probability: float) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from aerobat.errors import Infeasible
 from aerobat.planning import plan
@@ -21,65 +21,60 @@ TRIES = 20  # further plans that are tried for each proof
 DURATION_PRICE = 0.05  # of a duration e times as long, as a fraction of the flights: less than of commands
 
 
-@dataclass(frozen=True, eq=False)
-class Proving:
-    """The search for a plan that is proven on fresh flights."""
+def proven(task: PassingTask) -> Passing:
+    """Search a plan that passes, and return it with its proof. Raises Infeasible where there is none."""
+    found = plan(task.problem, task.planner, task.vehicle, task.progress)
+    kept = reserve_kept(found, task.planner.reserve)
+    first = best = FlownPlan(found, task.selecting(found), kept, task.problem)
+    task.note(first)
+    for attempt in range(PROOFS):
+        best = steadier(task, first, best, TRIES, DURATION_PRICE)
+        if best.share.fraction < task.probability:
+            raise _unreachable(task, best, task.flights)
+        start = len(task.flights) + attempt * task.proving
+        fresh = range(start, start + task.proving)
+        scores = task.scores(best.plan, fresh)
+        if task.is_proof(passed(scores)):
+            return _with_proof(task, first, best, passed(scores), fresh)
+        best = replace(best, scores=scores)
+    raise _unreachable(task, best, fresh)
 
-    task: PassingTask
 
-    def passing(self) -> Passing:
-        """Return the plan that passes, with its proof. Raises Infeasible where there is none."""
-        task = self.task
-        found = plan(task.problem, task.planner, task.vehicle, task.progress)
-        kept = reserve_kept(found, task.planner.reserve)
-        first = done = FlownPlan(found, task.selecting(found), kept, task.problem)
-        task.note(first)
-        for attempt in range(PROOFS):
-            done = steadier(task, first, done, TRIES, DURATION_PRICE)
-            if done.share.fraction < task.probability:
-                raise self._unreachable(done, task.flights)
-            start = len(task.flights) + attempt * task.proving
-            fresh = range(start, start + task.proving)
-            scores = task.scores(done.plan, fresh)
-            if task.is_proof(passed(scores)):
-                return self._proven(first, done, passed(scores), fresh)
-            done = replace(done, scores=scores)
-        raise self._unreachable(done, fresh)
+def _with_proof(task: PassingTask, first: FlownPlan, best: FlownPlan, share: Share, fresh: range) -> Passing:
+    """Return the best plan with the share of its fresh flights that pass, and their tube."""
+    tube = Tube(
+        conditions=task.conditions.name,
+        seed=task.seed,
+        level=LEVEL,
+        **tube_series(task, best.plan, fresh),
+        reserve=best.reserve,
+        plain_duration=first.plan.duration,
+        probability=task.probability,
+        passed=share.count,
+        flights=share.of,
+        lower_bound=share.interval[0],
+    )
+    return Passing(
+        plan=replace(best.plan, tube=tube),
+        plain=first.plan,
+        before=share if best is first else task.share(first.plan, fresh),
+        after=share,
+        probability=task.probability,
+        fresh=fresh,
+        rounds=tuple(task.rounds),
+    )
 
-    def _proven(self, first: FlownPlan, done: FlownPlan, share: Share, fresh: range) -> Passing:
-        task = self.task
-        tube = Tube(
-            conditions=task.conditions.name,
-            seed=task.seed,
-            level=LEVEL,
-            **tube_series(task, done.plan, fresh),
-            reserve=done.reserve,
-            plain_duration=first.plan.duration,
-            probability=task.probability,
-            passed=share.count,
-            flights=share.of,
-            lower_bound=share.interval[0],
-        )
-        return Passing(
-            plan=replace(done.plan, tube=tube),
-            plain=first.plan,
-            before=share if done is first else task.share(first.plan, fresh),
-            after=share,
-            probability=task.probability,
-            fresh=fresh,
-            rounds=tuple(task.rounds),
-        )
 
-    def _unreachable(self, best: FlownPlan, flights: range) -> Infeasible:
-        """Return the error with the best share of passing flights and the main cause of failures."""
-        task, share = self.task, self.task.share(best.plan, flights)
-        why = main_failure_cause(
-            task.conditions, task.probability, lambda without: task.share(best.plan, flights, without)
-        )
-        return Infeasible(
-            f"'{task.problem.name}' on {task.vehicle.name} is not proven to pass as often as asked, "
-            f"{percent(task.probability)} %: under {task.conditions.name} {share} pass at best, with a "
-            f"reserve of {best.reserve:g}{f'; {why}' if why else ''}; ask for less, or better that",
-            [attempt for done in task.rounds for attempt in done.plan.attempts],
-            remedy="",
-        )
+def _unreachable(task: PassingTask, best: FlownPlan, flights: range) -> Infeasible:
+    """Return the error with the best share of passing flights and the main cause of failures."""
+    share = task.share(best.plan, flights)
+    why = main_failure_cause(
+        task.conditions, task.probability, lambda without: task.share(best.plan, flights, without)
+    )
+    return Infeasible(
+        f"'{task.problem.name}' on {task.vehicle.name} is not proven to pass as often as asked, "
+        f"{percent(task.probability)} %: under {task.conditions.name} {share} pass at best, with a "
+        f"reserve of {best.reserve:g}{f'; {why}' if why else ''}; ask for less, or better that",
+        [attempt for done in task.rounds for attempt in done.plan.attempts],
+        remedy="",
+    )

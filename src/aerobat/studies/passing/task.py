@@ -48,11 +48,6 @@ class FlownPlan:
         """The share of the flights that succeed."""
         return passed(self.scores)
 
-    @property
-    def round(self) -> Round:
-        """The plan, its reserve, and the share of its flights that succeed."""
-        return Round(self.reserve, self.plan, self.share)
-
 
 @dataclass(frozen=True, eq=False)
 class PassingTask:
@@ -75,9 +70,10 @@ class PassingTask:
 
     def note(self, flown: FlownPlan) -> None:
         """Record a plan and its flights as a round, and report it."""
-        self.rounds.append(flown.round)
+        found = Round(flown.reserve, flown.plan, flown.share)
+        self.rounds.append(found)
         if self.tried is not None:
-            self.tried(flown.round)
+            self.tried(found)
 
     def tightened(
         self, first: FlownPlan, start: FlownPlan, tightening: Tightening, required: Problem
