@@ -7,7 +7,7 @@ messages.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -28,24 +28,6 @@ NED_ENU = np.array([0.0, -np.sqrt(0.5), -np.sqrt(0.5), 0.0])  # ENU to NED: swap
 FLU_FRD = np.array([0.0, 1.0, 0.0, 0.0])  # FRD to FLU, or back: half a turn about x
 
 
-def _indexed(name: str, count: int) -> Sequence[str]:
-    return [f"{name}[{i}]" for i in range(count)]
-
-
-HEADERS: Mapping[str, Sequence[str]] = {
-    ATTITUDE: ["yaw_sp_move_rate", *_indexed("q_d", 4), *_indexed("thrust_body", 3)],
-    RATES: ["roll", "pitch", "yaw", *_indexed("thrust_body", 3)],
-    PATH: [
-        *_indexed("position", 3),
-        *_indexed("velocity", 3),
-        *_indexed("acceleration", 3),
-        *_indexed("jerk", 3),
-        "yaw",
-        "yawspeed",
-    ],
-}
-
-
 def px4_setpoints(plan: Plan, rate: float) -> Content:
     """Return the set-points of a plan with a vehicle at `rate` [1/s] and at the end.
 
@@ -61,18 +43,24 @@ def px4_setpoints(plan: Plan, rate: float) -> Content:
     q_d = _float32(so3.multiply(so3.multiply(NED_ENU, found.setpoint.q_world_body), FLU_FRD))
     rates = _float32(found.setpoint.omega_body * np.array([1.0, -1.0, -1.0]))
     thrust = _float32(_thrust_body(found, plan))
-    zero = _float32(np.zeros((len(timestamps), 1)))
-    yaw = _float32(_yaw(q_d)[:, None])
-    columns: Mapping[str, Sequence[Array]] = {
-        ATTITUDE: [zero, q_d, thrust],
-        RATES: [rates, thrust],
-        PATH: [position, velocity, acceleration, jerk, yaw, np.full_like(zero, np.nan)],
+    zero = _float32(np.zeros(len(timestamps)))
+    messages: Mapping[str, Mapping[str, Array]] = {
+        ATTITUDE: {"yaw_sp_move_rate": zero, "q_d": q_d, "thrust_body": thrust},
+        RATES: {"roll": rates[:, 0], "pitch": rates[:, 1], "yaw": rates[:, 2], "thrust_body": thrust},
+        PATH: {
+            "position": position,
+            "velocity": velocity,
+            "acceleration": acceleration,
+            "jerk": jerk,
+            "yaw": _float32(_yaw(q_d)),
+            "yawspeed": np.full_like(zero, np.nan),
+        },
     }
     q_world_body = so3.multiply(
         so3.multiply(so3.conjugate(NED_ENU), so3.normalize(q_d)), so3.conjugate(FLU_FRD)
     )
     rows = ExportRows(found.times, ned(position), ned(velocity), q_world_body)
-    files = tuple(_table(timestamps, HEADERS[name], columns[name]) for name in SETPOINTS)
+    files = tuple(_table(timestamps, messages[name]) for name in SETPOINTS)
     return Content(files, rows.loss(plan, held=True))
 
 
@@ -100,8 +88,10 @@ def _float32(values: Array) -> Array:
     return np.asarray(np.asarray(values, dtype=np.float32) + np.float32(0.0))
 
 
-def _table(timestamps: Array, header: Sequence[str], columns: Sequence[Array]) -> bytes:
-    """Return a table of timestamps [µs] and columns of float32."""
-    times, rows = timestamps.astype(int), np.concatenate(columns, axis=1)
-    table = [["timestamp", *header], *([time, *row] for time, row in zip(times, rows, strict=True))]
-    return csv_text(table).encode()
+def _table(timestamps: Array, fields: Mapping[str, Array]) -> bytes:
+    """Return a table of timestamps [µs] and a message's fields, numbers (T,) or arrays (T, n), of float32."""
+    header = ["timestamp"]
+    for name, values in fields.items():
+        header += [name] if values.ndim == 1 else [f"{name}[{i}]" for i in range(values.shape[1])]
+    rows = zip(timestamps.astype(int), np.column_stack(list(fields.values())), strict=True)
+    return csv_text([header, *([time, *row] for time, row in rows)]).encode()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from string import ascii_lowercase
 from textwrap import wrap
@@ -155,30 +154,30 @@ class Kind:
     """Cells of one feasibility that the same limits bind."""
 
     letter: str
-    feasibility: Feasibility
-    limits: tuple[str, ...]
     count: int
     first: Cell
 
     @property
     def name(self) -> str:
         """The name of the kind in a few words: its feasibility and the limits that bind."""
-        return f"{self.feasibility}: {', '.join(self.limits) or 'no limit named'}"
+        return f"{self.first.feasibility}: {', '.join(self.first.limits) or 'no limit named'}"
 
 
-def kinds_of(found: FeasibilityMap) -> dict[tuple[Feasibility, tuple[str, ...]], Kind]:
-    """The kinds of a map's cells: the planned ones first, of each the most frequent first."""
-    counts = Counter((cell.feasibility, cell.limits) for cell in found.cells)
-    order = list(Feasibility)
-    keys = sorted(counts, key=lambda key: (order.index(key[0]), -counts[key], key[1]))
-    first: dict[tuple[Feasibility, tuple[str, ...]], Cell] = {}
+Kinds = dict[tuple[Feasibility, tuple[str, ...]], Kind]  # by feasibility and limits
+
+
+def kinds_of(found: FeasibilityMap) -> Kinds:
+    """Return the kinds of a map's cells, in the order of feasibility, of each the most frequent first."""
+    alike: dict[tuple[Feasibility, tuple[str, ...]], list[Cell]] = {}
     for cell in found.cells:
-        first.setdefault((cell.feasibility, cell.limits), cell)
-    return {key: Kind(_letter(i), *key, counts[key], first[key]) for i, key in enumerate(keys)}
+        alike.setdefault((cell.feasibility, cell.limits), []).append(cell)
+    order = list(Feasibility)
+    keys = sorted(alike, key=lambda key: (order.index(key[0]), -len(alike[key]), key[1]))
+    return {key: Kind(_letter(i), len(alike[key]), alike[key][0]) for i, key in enumerate(keys)}
 
 
-def letter_of(cell: Cell, kinds: dict[tuple[Feasibility, tuple[str, ...]], Kind]) -> str:
-    """The letter of a cell's kind."""
+def letter_of(cell: Cell, kinds: Kinds) -> str:
+    """Return the letter of a cell's kind."""
     return kinds[cell.feasibility, cell.limits].letter
 
 
