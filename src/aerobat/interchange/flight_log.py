@@ -28,8 +28,8 @@ MIN_STEP = 1e-6  # [s] between rows
 MAX_VALUE = 1e6  # [m], [m/s], [rad/s] or [N]; no multirotor reaches that
 ESTIMATED_POSITION = ("est_x", "est_y", "est_z")
 ESTIMATED_VELOCITY = ("est_vx", "est_vy", "est_vz")
-_GROUPS = tuple(NAMES[name] for name in ("time", "position", "attitude", "velocity", "rates"))
-_KNOWN = frozenset(chain(*_GROUPS, ESTIMATED_POSITION, ESTIMATED_VELOCITY))  # beside f0, u0 and so on
+_GROUPS = ("time", "position", "attitude", "velocity", "rates")
+_USED = {*chain(*(NAMES[group] for group in _GROUPS)), *ESTIMATED_POSITION, *ESTIMATED_VELOCITY}
 
 
 @validated
@@ -88,16 +88,16 @@ def _columns(path: Path, duration: float) -> dict[str, Array]:
             f"line {line}: t rises by {steps.max():.3g} s, where rows are {np.median(steps):.2g} s apart; "
             "give a part without gaps"
         )
-    used = {name: column[flown] for name, column in columns.items() if _is_known(name)}
+    used = {
+        name: column[flown]
+        for name, column in columns.items()
+        if name in _USED or (name[0] in "fu" and name[1:].isdecimal())
+    }
     for name, column in used.items():
         if np.abs(column).max() > MAX_VALUE:
             line = 2 + int(np.argmax(np.abs(columns[name]) * flown))
             raise SpecError(f"line {line}: the column {name} is beyond {MAX_VALUE:g}; see its unit")
     return used
-
-
-def _is_known(name: str) -> bool:
-    return name in _KNOWN or (name[0] in "fu" and name[1:].isdecimal())
 
 
 def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Flight:

@@ -27,7 +27,7 @@ from aerobat.problem.gate import Gate
 from aerobat.vehicle import Vehicle
 
 Floats = NDArray[np.float32]
-FLOAT, UNSIGNED_INT, LINES, LINE_STRIP, TRIANGLES = 5126, 5125, 1, 3, 4  # as the format numbers them
+FLOAT, LINES, LINE_STRIP, TRIANGLES = 5126, 1, 3, 4  # as the format numbers them
 COLORS: Mapping[str, Sequence[float]] = {  # red, green, blue, opacity
     "rotor": (0.05, 0.2, 0.6, 1.0),
     "arm": (0.1, 0.1, 0.1, 1.0),
