@@ -18,7 +18,6 @@ from aerobat.viewer.live.sliders import Setting, Slider, moved
 from aerobat.viewer.scene import Scene, scene_of
 
 MAX_PAGES = 1000  # whose last questions are known: a browser has fewer open
-
 PATIENCE = 30.0  # [s] of planning: users who move a slider wait no longer
 FLIGHTS = 20  # under conditions: enough to see how they spread, few enough to be drawn quickly
 POSES = 6000  # rows shown of all flights together; more would delay the drawing
@@ -122,9 +121,6 @@ def _capitalized(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-Answering = Callable[[Mapping[str, float], Callable[[], bool]], Answer]
-
-
 class Desk:
     """Answers the questions of many threads in one worker thread, one after another.
 
@@ -132,7 +128,7 @@ class Desk:
     page has closed the connection.
     """
 
-    def __init__(self, answering: Answering) -> None:
+    def __init__(self, answering: Callable[[Mapping[str, float], Callable[[], bool]], Answer]) -> None:
         self._answering = answering
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="aerobat-planning")
         self._last: dict[str, int] = {}  # number of its last question, by the page that asks, the latest last

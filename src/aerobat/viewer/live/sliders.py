@@ -12,7 +12,6 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import Array
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
 from aerobat.planning import Plan, Planner
@@ -55,15 +54,15 @@ class Slider:
     step: float
     value: float
     axis: tuple[float, ...] | None = None  # of a gate's turn, (3,)
-    turn: Callable[[Setting, float], Setting] | None = None  # instead of the field that the key names
+    move: Callable[[Setting, float], Setting] | None = None  # instead of the field that the key names
 
     def moved(self, setting: Setting, value: float) -> Setting:
         """Return the setting with the slider at `value`. Raise SpecError for a value that makes no sense."""
-        return lens(self.key, setting).set(setting, value) if self.turn is None else self.turn(setting, value)
+        return lens(self.key, setting).set(setting, value) if self.move is None else self.move(setting, value)
 
     def record(self) -> dict[str, Any]:
         """Return the slider as plain data for the page."""
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "turn"}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "move"}
 
 
 def sliders_of(setting: Setting, plan: Plan) -> tuple[Slider, ...]:
@@ -108,32 +107,21 @@ def _gate_sliders(problem: Problem, k: int) -> Iterator[Slider]:
 def _tilt_slider(problem: Problem, k: int) -> Slider:
     """Return the slider of a gate's tilt about the axis of the maneuver's turn, else about its normal."""
     gate, turn_axis = problem.gates[k], problem.maneuver.turn_axis
-    tilt = degrees(gate.angles[2])
-    axis = gate.normal
+    axis, tilt, low, high = gate.normal, degrees(gate.angles[2]), -180.0, 180.0
     if turn_axis is not None:
-        axis = turn_axis
+        axis, low, high = turn_axis, 0.0, 360.0
         tilt = degrees(np.arctan2(gate.up @ np.cross(axis, UP), gate.up @ UP)) % 360.0
     tilt = round(tilt, 6)
-    low, high = (-180.0, 180.0) if turn_axis is None else (0.0, 360.0)
-    key, turn = f"gates[{k}].tilt", partial(_with_turned, k, axis, tilt)
-    return Slider(key, gate.name, "tilt", "°", low, high, 1.0, tilt, tuple(axis.tolist()), turn)
 
+    def turned(setting: Setting, value: float) -> Setting:
+        turn = so3.about_axis(axis, np.asarray(radians(value - tilt)))
+        gates = list(setting.problem.gates)
+        normal, up = (so3.rotate(turn, side) for side in (gates[k].normal, gates[k].up))
+        gates[k] = replace(gates[k], normal=normal, up=up)
+        return replace(setting, problem=replace(setting.problem, gates=tuple(gates)))
 
-def _with_turned(k: int, axis: Array, stands: float, setting: Setting, tilt: float) -> Setting:
-    """Return the setting with gate k turned about an axis through its centre.
-
-    Args:
-        k: The index of the gate.
-        axis: The axis of the turn.
-        stands: The present tilt [deg].
-        setting: The setting before the turn.
-        tilt: The new tilt [deg].
-    """
-    turn = so3.about_axis(axis, np.asarray(radians(tilt - stands)))
-    gates = list(setting.problem.gates)
-    normal, up = (so3.rotate(turn, side) for side in (gates[k].normal, gates[k].up))
-    gates[k] = replace(gates[k], normal=normal, up=up)
-    return replace(setting, problem=replace(setting.problem, gates=tuple(gates)))
+    key = f"gates[{k}].tilt"
+    return Slider(key, gate.name, "tilt", "°", low, high, 1.0, tilt, tuple(axis.tolist()), turned)
 
 
 def _obstacle_sliders(problem: Problem, k: int) -> Iterator[Slider]:
@@ -142,35 +130,25 @@ def _obstacle_sliders(problem: Problem, k: int) -> Iterator[Slider]:
     fields_of_place = [name for name in PLACES if hasattr(obstacles[k], name)]
     if not fields_of_place:
         return
+
+    def shifted(axis: int, stands: float, setting: Setting, value: float) -> Setting:
+        environment = setting.problem.environment
+        changed: list[Any] = list(environment.obstacles)
+        shift = (value - stands) * np.eye(3)[axis]
+        places = {name: getattr(changed[k], name) + shift for name in fields_of_place}
+        changed[k] = replace(changed[k], **places)
+        world = replace(environment, obstacles=tuple(changed))
+        return replace(setting, problem=replace(setting.problem, environment=world))
+
     name = getattr(obstacles[k], "name", obstacles[k].kind)
     is_one_of_many = sum(getattr(each, "name", each.kind) == name for each in obstacles) > 1
+    group = f"{name} {k}" if is_one_of_many else name
     reach, step = _range(problem)
-    stands = np.atleast_2d(getattr(obstacles[k], fields_of_place[0]))[0]
+    place = np.atleast_2d(getattr(obstacles[k], fields_of_place[0]))[0]
     for i, axis in enumerate("xyz"):
-        value = float(stands[i])
-        key, shift = f"environment.obstacles[{k}].{axis}", partial(_with_shifted, k, i, value)
-        group = f"{name} {k}" if is_one_of_many else name
-        yield Slider(key, group, axis, "m", value - reach, value + reach, step, value, turn=shift)
-
-
-def _with_shifted(k: int, axis: int, stands: float, setting: Setting, place: float) -> Setting:
-    """Return the setting with obstacle k shifted along an axis.
-
-    Args:
-        k: The index of the obstacle.
-        axis: 0, 1 or 2.
-        stands: The present coordinate [m].
-        setting: The setting before the shift.
-        place: The new coordinate [m].
-    """
-    environment = setting.problem.environment
-    obstacles = list(environment.obstacles)
-    changed: Any = obstacles[k]
-    shift = (place - stands) * np.eye(3)[axis]
-    moved_fields = {name: getattr(changed, name) + shift for name in PLACES if hasattr(changed, name)}
-    obstacles[k] = replace(changed, **moved_fields)
-    world = replace(environment, obstacles=tuple(obstacles))
-    return replace(setting, problem=replace(setting.problem, environment=world))
+        value, key = float(place[i]), f"environment.obstacles[{k}].{axis}"
+        move = partial(shifted, i, value)
+        yield Slider(key, group, axis, "m", value - reach, value + reach, step, value, move=move)
 
 
 def _range(problem: Problem) -> tuple[float, float]:
