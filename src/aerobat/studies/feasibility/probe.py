@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import inf
-from typing import Protocol
 
 from aerobat.certification import Finding
 from aerobat.errors import Infeasible, SpecError, limits_of
@@ -15,7 +14,8 @@ from aerobat.planning import Plan, plan
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.problem.limits import UNITS
-from aerobat.studies.lens import Scenario
+from aerobat.studies.feasibility.quantities import NeededQuantity
+from aerobat.studies.lens import Lens, Scenario
 
 BINDING_TOLERANCE = 0.01  # of a limit's size, tolerance within which limits bind equally
 TIME_LIMIT = 30.0  # [s] default time limit of planning: most scenarios take 1 s
@@ -46,19 +46,12 @@ class Probe:
         return self.feasibility is Feasibility.PLANNED
 
 
-class Variable(Protocol):
-    """A quantity of a scenario that can be set to a number."""
-
-    def set(self, whole: Scenario, value: float) -> Scenario:
-        """Return the scenario with the quantity at a value. Raises SpecError for an impossible value."""
-
-
 @dataclass(frozen=True, eq=False)
 class ProbedTask:
     """A scenario with the variables that are changed, and the settings of planning and flights."""
 
     scenario: Scenario
-    variables: tuple[Variable, ...]
+    variables: tuple[Lens | NeededQuantity, ...]
     time_limit: float  # [s] for each plan
     flights: range = range(0)  # of each plan, under the scenario's conditions
     seed: int = 0  # of the flights

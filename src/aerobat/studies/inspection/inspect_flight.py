@@ -41,7 +41,7 @@ def responses(
     found: Disturbances,
     loop: PositionLoop,
     unsaturated: str,
-    fault: str | None = None,
+    fault: str | None,
 ) -> dict[str, Array]:
     """Return the errors [m] by cause, (T, 3) each.
 

@@ -166,19 +166,21 @@ class Inspection:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences on the limits of the result."""
-        place = self.alignment
-        shift = f"the log's clock reads {place.time_shift:.3f} s when the plan begins"
-        moved = f"its axes are turned by {np.rad2deg(place.yaw):.2f}° and moved by {length(place.moved)}"
-        blind = (
-            "the log does not hold what an observer saw: hand-offs and other errors of sensors do not show"
-        )
-        asked = {
-            str(self.fault): self.fault is not None and self.fault.cause == self._main_cause,
-            f"{shift}; {moved}": not place.is_none,
-            blind: not self.observed,
-        }
-        return tuple(remark for remark, is_said in asked.items() if is_said)
+        """Sentences on the main cause's evidence, on how the log was aligned, and on what it lacks."""
+        place, remarks = self.alignment, []
+        if self.fault is not None and self.fault.cause == self._main_cause:
+            remarks.append(str(self.fault))
+        if not place.is_none:
+            remarks.append(
+                f"the log's clock reads {place.time_shift:.3f} s when the plan begins; its axes are turned "
+                f"by {np.rad2deg(place.yaw):.2f}° and moved by {length(place.moved)}"
+            )
+        if not self.observed:
+            remarks.append(
+                "the log does not hold what an observer saw: hand-offs and other errors of sensors do not "
+                "show"
+            )
+        return tuple(remarks)
 
     @property
     def verdict(self) -> str:
