@@ -1,4 +1,4 @@
-"""A flight controller's own log beside its plan: rates that were planned, asked and measured, and motors."""
+"""A flight controller's own log beside its plan: planned, commanded and measured rates, and the motors."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 @validated
 def blackbox_figure(log: Blackbox, plan: Plan) -> Figure:
-    """Draw the body rates that a plan has, those that the sticks asked and the gyro measured, and the motors.
+    """Draw the planned body rates, those that the sticks commanded and the gyro measured, and the motors.
 
-    The log's clock is laid on the plan's where the measured rates fit best. Raises SpecError for a log that
-    is shorter than the plan.
+    The log's clock is aligned with the plan's where the measured rates fit best. Raises SpecError for a log
+    that is shorter than the plan.
     """
     planned = reference(plan, rate=500.0)
     begin = log.begin(planned.times, planned.setpoint.omega_body)

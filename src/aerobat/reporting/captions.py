@@ -1,4 +1,4 @@
-"""Plans and flights in a line each, as they stand under a page's title."""
+"""Captions: lines on a plan, a flight and its score, which stand under the title of a page."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def _(comparison: Comparison) -> Iterator[Fact]:
 
 
 def _row(comparison: Comparison, entry: Entry) -> Facts:
-    """A planner's result; None where there is no plan, and for ratios where none is time-optimal."""
+    """Return the facts of a planner's result; numbers that follow from a plan are None without one."""
     plan = entry.plan
     error = None if entry.score is None else entry.score.max_position_error_m
     return Facts(
@@ -87,9 +87,9 @@ def _row(comparison: Comparison, entry: Entry) -> Facts:
 
 @validated
 def comparison_figure(comparison: Comparison) -> Figure:
-    """One page: all paths in one picture, then each planner's rotor thrusts on a common time axis.
+    """Draw a page: all paths in one picture, then each planner's rotor thrusts on a common time axis.
 
-    Thrusts are what flatness asks, limits are dashed. A planner without a plan has its reason instead.
+    Thrusts are those of the plan by flatness, and limits are dashed. A planner without a plan has its reason.
     """
     entries = comparison.entries
     colours = [colour for colour, _ in zip(cycle(COLOURS), entries, strict=False)]
@@ -129,7 +129,7 @@ def _name(entry: Entry) -> str:
 
 
 def _drawn(comparison: Comparison, entry: Entry) -> list[Fact]:
-    """The facts of a planner's result that stand beside its timeline."""
+    """Return the facts of a planner's result that stand beside its timeline."""
     return [fact for fact in _row(comparison, entry) if fact.key in DRAWN]
 
 
@@ -139,12 +139,12 @@ def _path(entry: Entry, plan: Plan, colour: str) -> NamedPath:
 
 
 def _pitch(entry: Entry) -> float:
-    """The height of a planner's row with its name [in]; less where there is no plan."""
+    """Return the height of a planner's row with its name [in]; less where there is no plan."""
     return 0.75 if entry.plan is None else 1.3
 
 
 def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], top: float) -> None:
-    """A row a planner from `top` [in] downward: its timeline and facts, or why it has no plan."""
+    """Draw a row for each planner, from `top` [in] downward: timeline and facts, or why it has no plan."""
     timelines: list[Axes] = []
     for x, fact in zip(PLACES, _drawn(comparison, comparison.entries[0]), strict=True):
         write(figure, x, top, fact.label, size=SMALL, color=MUTED)
@@ -162,7 +162,7 @@ def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], t
 
 
 def _draw_thrusts(axes: Axes, plan: Plan, vehicle: Vehicle, colour: str) -> None:
-    """Thrusts that flatness asks of all rotors, up to the plan's end."""
+    """Draw the thrusts of all rotors by flatness, up to the end of the plan."""
     reference = plan_reference(plan, vehicle)
     axes.plot(reference.times, reference.rotor_thrusts, color=colour, linewidth=1.1)
     axes.axvline(plan.duration, color=colour, linewidth=2.4)
@@ -173,7 +173,7 @@ def _draw_thrusts(axes: Axes, plan: Plan, vehicle: Vehicle, colour: str) -> None
 
 
 def _share_scales(timelines: Sequence[Axes]) -> None:
-    """One scale of time and one of thrust for all."""
+    """Give all timelines the same scales of time and of thrust."""
     ends = np.array([[*axes.get_xlim(), *axes.get_ylim()] for axes in timelines])
     for axes in timelines:
         axes.set(xlim=(0.0, ends[:, 1].max()), ylim=(ends[:, 2].min(), ends[:, 3].max()))
@@ -182,7 +182,7 @@ def _share_scales(timelines: Sequence[Axes]) -> None:
 
 
 def _write_facts(figure: Figure, comparison: Comparison, entry: Entry, bottom: float) -> None:
-    """Numbers beside a timeline, and what became of the flight below them."""
+    """Write the facts of a plan beside its timeline, and below them a note on planning and flight."""
     for x, fact in zip(PLACES, _drawn(comparison, entry), strict=True):
         wrong = fact.key == "certified" and not entry.certified
         write(figure, x, bottom + 0.6, fact.words, size=TITLE, color=RED if wrong else INK)

@@ -31,9 +31,9 @@ def _(measured: ErrorCauses) -> Iterator[Fact]:
 
 
 def _row(measured: ErrorCauses, result: TrialResult) -> Iterator[Fact]:
-    """A trial's numbers: medians over its flights, unless a name says otherwise.
+    """Yield the facts of a trial. Errors are medians over its flights, unless the key says otherwise.
 
-    None stands where no gate was crossed, or flights are too few.
+    Infinite numbers, None in JSON, mean that flights did not cross a gate, or are too few.
     """
     cost, is_none = measured.cost(result.cause), result is measured.none
     low, middle, high = (f"{100 * value:z.1f}" for value in (cost.low, cost.median, cost.high))

@@ -1,4 +1,4 @@
-"""Facts: a result told once, from which tables, JSON, data frames and notebooks' views follow.
+"""Facts: the content of a result, from which tables, JSON, data frames and notebooks' views follow.
 
 A kind of result has one function here or elsewhere, registered with `@facts.register`, and where it can be
 drawn one more, registered with `@picture.register`.
@@ -60,7 +60,7 @@ class Fact:
 
     @property
     def words(self) -> str:
-        """The fact in words."""
+        """The text of the fact in tables."""
         if self.text is not None:
             return self.text
         if self.value is None:
@@ -72,7 +72,7 @@ class Fact:
 
 
 class Facts(tuple[Fact, ...]):
-    """Several facts as one result, without a class of its own."""
+    """Several facts that are one result, without a class of its own."""
 
     __slots__ = ()
 
@@ -82,7 +82,7 @@ class Columns(dict[str, Any]):
 
 
 class Rows(tuple[Any, ...]):
-    """A table by its rows, each a result; there may be none."""
+    """A table by its rows, each a result; a table without rows is a table too."""
 
     __slots__ = ()
 

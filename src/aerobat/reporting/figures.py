@@ -49,7 +49,7 @@ def draw(flight: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str
 
 
 def _bare_page(subject: Subject, flight: Flight) -> Figure:
-    """A page on a flight whose plan is not known: path and attitude, errors, rotor thrusts."""
+    """Draw a page on a flight whose plan is not known: path and attitude, errors, rotor thrusts."""
     foot = AXIS + PITCH + ROW + TITLES
     many = f"{len(flight.vehicles)} flights" if flight.is_batch else "flight"
     title, path_height = f"{many} of {subject.vehicle.name}", 5.2  # [in]
@@ -72,13 +72,13 @@ def report_figure(
 ) -> Figure:
     """Draw a page on a plan and its flight: path, stages, errors, thrusts.
 
-    Without a flight, what the plan asks of the vehicle, rotor thrusts by flatness.
+    Without a flight, the thrusts are those of the plan by flatness.
 
     Args:
         plan: The plan.
         vehicle: The vehicle that it is for.
         flight: One flight of the plan, or a batch.
-        score: That flight's score, told under the title; without it, the largest errors.
+        score: The score of that flight, for the lines under the title; without it, the largest errors.
     """
     with house_style():
         return _plan_page(plan, vehicle) if flight is None else _flight_page(plan, vehicle, flight, score)
@@ -115,7 +115,7 @@ def _plan_page(plan: Plan, vehicle: Vehicle) -> Figure:
 def _clearance_panel(
     figure: Figure, rows: Sequence[float], plan: Plan, vehicle: Vehicle, poses: PoseHistory
 ) -> list[Axes]:
-    """The clearance as planned, in the first column of the row that is left; none without obstacles."""
+    """Draw the planned clearance in the first column of the rows that are left: none without obstacles."""
     panels = [panel(figure, COLUMNS[0], y, WIDTH, ROW) for y in rows]
     for axes in panels:
         timelines.draw_clearance(axes, poses, vehicle, plan.problem.surroundings.pieces)
@@ -130,9 +130,9 @@ def _pictures(
     rows: int,
     facts: Sequence[str],
 ) -> tuple[Figure, list[float]]:
-    """A page with its two pictures, and the bottoms [in] of its rows of timelines, top row first.
+    """Return a page with its pictures of path and stages, and the bottoms [in] of its rows of timelines.
 
-    Where there are obstacles it has a row more.
+    The top row is the first. Obstacles add a row, for the clearance.
     """
     subject = Subject(plan, plan, vehicle)
     rows += bool(subject.pieces)

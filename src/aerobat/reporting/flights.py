@@ -1,4 +1,4 @@
-"""Facts of flights: what a flight came to, its errors, its passages; the columns of flights and of scores."""
+"""Facts of flights: outcome, errors and passages of a flight; the columns of flights and of scores."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _report(score: Score) -> Iterator[Fact]:
 
 
 def _span(values: Sequence[float], unit: str) -> str:
-    """One value, or the least and the greatest of several."""
+    """Return the least and the greatest of values as text, once if they are the same."""
     low, high = f"{min(values):.1f}", f"{max(values):.1f}"
     return f"{low} {unit}" if low == high else f"{low} to {high} {unit}"
 
@@ -163,12 +163,12 @@ def _observer(found: ObserverScore) -> str:
 
 
 def _of_lap(name: str, lap: int, several: bool) -> str:
-    """The name of what is passed, with its lap where there are several."""
+    """Return the name of a gate or waypoint, with the lap if there are several laps."""
     return f"{name}, lap {lap}" if several else name
 
 
 def _passed(passage: Passage) -> str:
-    """A gate's passage in words."""
+    """Return the passage of a gate in words."""
     if isnan(passage.time):
         return "not passed"
     clearance = "" if isnan(passage.clearance) else f", {_clearance(passage)}"
@@ -178,14 +178,14 @@ def _passed(passage: Passage) -> str:
 
 
 def _clearance(passage: Passage) -> str:
-    """The least clearance in words, with its edge and its instant."""
+    """Return the least clearance in words, with the nearest edge and the time."""
     centimetres = 100 * passage.clearance
     found = f"{-centimetres:.1f} cm into" if centimetres < 0.0 else f"{centimetres:.1f} cm clear of"
     return f"{found} the {passage.closest_edge} edge at {passage.closest_time:.2f} s"
 
 
 def _nearest(found: NearestObstacle) -> str:
-    """The nearest obstacle in words, with the clearance and its instant."""
+    """Return the nearest obstacle in words, with the clearance and the time."""
     if not found.obstacle:
         return NONE
     apart = "touched" if found.clearance < 0.0 else length(found.clearance)
@@ -217,7 +217,7 @@ def _columns(flight: Flight) -> dict[str, Array]:
 
 
 def _components(series: Mapping[str, Array], is_in_space: bool = True) -> dict[str, Array]:
-    """The columns of series over time: of vectors and quaternions by their letters, of others by number."""
+    """Return a column for each component of series, named by its letter in space, else by its number."""
     columns = {}
     for name, values in series.items():
         if values.ndim == 1:
@@ -230,7 +230,7 @@ def _components(series: Mapping[str, Array], is_in_space: bool = True) -> dict[s
 
 
 def _flights_of(scores: Score) -> dict[str, Any]:
-    """The columns of many flights' scores."""
+    """Return the columns of the scores of many flights."""
     columns: dict[str, Any] = {name: getattr(scores, name) for name in METRICS}
     columns["outcome"] = [outcome.name.lower() for outcome in scores.outcomes]
     for begin, passage in zip(passage_names(scores.passages), scores.passages, strict=True):

@@ -1,4 +1,4 @@
-"""An inspection: its facts, and a picture of a flight's position error and each cause's part in it."""
+"""Facts and figure of an inspection: a flight's position error and the part of each cause."""
 
 from __future__ import annotations
 

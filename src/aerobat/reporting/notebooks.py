@@ -1,4 +1,4 @@
-"""Values in notebooks: the tables of a terminal as HTML, above them the pictures of reports."""
+"""Results in notebooks: the tables of a terminal as HTML, below their figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The layout of pages, drawn by matplotlib without pyplot, its window manager."""
+"""The layout of pages, drawn by matplotlib without pyplot."""
 
 from __future__ import annotations
 

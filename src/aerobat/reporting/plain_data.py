@@ -52,7 +52,7 @@ def to_dataframe(result: Any, table: str | None = None) -> DataFrame:
 
 
 def _is_table(value: Any) -> bool:
-    """True for columns, and for a sequence of results, an empty one too; arrays are values."""
+    """Return True for columns, and for a sequence of results, even an empty one; arrays are no tables."""
     if isinstance(value, list | tuple) and not isinstance(value, Facts):
         return all(isinstance(plain(each), dict) for each in value[:1])
     return isinstance(value, Columns)
@@ -68,9 +68,9 @@ def _cells(row: dict[str, Any], begin: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def plain(value: Any) -> Any:
-    """A result, or a value of a fact, as numbers, strings, lists and dictionaries.
+    """Return a result, or a value of a fact, as numbers, strings, lists and dictionaries.
 
-    None stands for what is not known or not limited, as JSON has neither NaN nor infinity.
+    NaN and infinity, which JSON does not have, become None: unknown, or not limited.
     """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
@@ -91,5 +91,5 @@ def plain(value: Any) -> Any:
 
 
 def to_json(result: Any) -> str:
-    """A result, or a list of results, as JSON text."""
+    """Return a result, or a list of results, as JSON text."""
     return json.dumps(plain(result), indent=2, ensure_ascii=False, allow_nan=False)

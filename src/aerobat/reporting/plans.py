@@ -1,4 +1,4 @@
-"""Facts of plans: what was planned, its proof, its own flights, and its place beside what is possible."""
+"""Facts of plans: the plan, its certificate, its own flights, and its assessment."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _(plan: Plan) -> Iterator[Fact]:
 
 
 def evidence(plan: Plan | None) -> Iterator[Fact]:
-    """Yield the facts of a plan beside its proof; their values are None without a plan."""
+    """Yield the facts of a plan's recoveries and assessment; their values are None without a plan."""
     yield Fact("recoveries", plan and plan.recoveries)
     found = None if plan is None else plan.assessment
     another = "" if plan is None or plan.planner == "free-knots" else ", --planner free-knots plans anew"
@@ -163,10 +163,10 @@ def _(found: Assessment) -> Iterator[Fact]:
 
 @facts.register
 def _(found: Certificate) -> Iterator[Fact]:
-    """Tell proven limits, one a row, and the largest values of quantities without a limit.
+    """Yield proven limits, a row for each, and the largest values of quantities without a limit.
 
-    People read, of all rotors' thrusts and of all their commands, those nearest to either limit; a gate that
-    is passed as it is asked has one row.
+    Of all rotors' thrusts and commands, the table has those nearest to a limit; a gate that is passed as
+    required has one row.
     """
     yield Fact("", text="certificate")
     yield from record(certified=found.certified, margin_n=found.margin, findings=found.findings)
@@ -183,7 +183,10 @@ def _(found: Finding) -> Iterator[Fact]:
 
 
 def _finding_rows(findings: Iterable[Finding]) -> list[Facts]:
-    """Findings for people: along the path, then a row a passage, or for all of it that is not as asked."""
+    """Return the rows of a table: findings along the path, then a row for each passage.
+
+    A passage whose requirements do not all hold has a row for each of these instead.
+    """
     along = _nearest_rotors(finding for finding in findings if finding.place is None)
     rows = [_row(each) for each in along if each.limit is not None or each.side is Side.MAX]
     placed = (finding for finding in findings if finding.place is not None)
@@ -197,7 +200,7 @@ def _finding_rows(findings: Iterable[Finding]) -> list[Facts]:
 
 
 def _nearest_rotors(findings: Iterable[Finding]) -> Iterable[Finding]:
-    """The findings, of all rotors' thrusts and commands those with the smallest margin on either side."""
+    """Return the finding with the smallest margin for each quantity and side, of all rotors."""
     nearest: dict[tuple[str, Side], Finding] = {}
     for finding in findings:
         key = finding.quantity, finding.side
@@ -224,7 +227,7 @@ def _of_finding(*texts: str) -> Facts:
 
 
 def _limiting(found: Certificate) -> Iterator[Fact]:
-    """The rotor nearest to its limit, and what else is next to its own; or why a plan is not certified."""
+    """Yield the rotor nearest to its limit and the next binding limit, or why a plan is not certified."""
     worst, binding = found.worst, found.binding
     if not found.certified or worst is None or worst.limit is None:
         yield line("not proven", found.why, level=REPORT, style="red")
@@ -263,13 +266,13 @@ def _margin(found: Flyability) -> str:
 
 
 def rough_length(metres: float) -> str:
-    """A length with the digits that mean something: in mm, in cm from a centimetre on, then in m."""
+    """Return a length as text with two digits, in mm, cm or m, of 0.1 mm at least."""
     unit, size = ("m", 1.0) if metres >= 1.0 else ("cm", 1e-2) if metres >= 1e-2 else ("mm", 1e-3)
     return f"{max(metres, SMALL) / size:.2g} {unit}"
 
 
 def _tube(tube: Tube, duration: float) -> Iterator[Fact]:
-    """The proof that flights pass, what it costs a plan of that duration [s], and their tube over time."""
+    """Yield the proof that flights pass, its price for a plan of this duration [s], and the tube."""
     price = tube.price(duration)
     yield from record(conditions=tube.conditions, seed=tube.seed, probability=tube.probability)
     yield from record(passed=tube.passed, flights=tube.flights, lower_bound=tube.lower_bound)

@@ -72,7 +72,7 @@ def _of_trials(trials: Trials) -> Fact:
 
 
 def _verdict(report: Report) -> str:
-    """The outcome of a run in a few words."""
+    """Return the outcome of a run in a few words."""
     if not report.plan.certified:
         return "not certified"
     if not report.plan.flies:

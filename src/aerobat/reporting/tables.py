@@ -1,4 +1,4 @@
-"""Results as tables for a terminal: their facts, one a row, those of many of a kind a row each."""
+"""Results as tables for a terminal: a row for each fact, or for each result of a list."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def table(result: Any, least: int = REPORT, most: int = EXPLAIN, title: str = ""
 
 
 def print_table(table: Table | Group) -> None:
-    """Print a table to standard output, full width in a pipe."""
+    """Print a table to standard output; a pipe has 120 columns."""
     console = Console()
     (console if console.is_terminal else Console(width=120)).print(table)
 
@@ -73,7 +73,7 @@ def _parts(headed: Iterable[HeadedFact]) -> Iterator[Table | Text]:
 
 
 def _kind(fact: Fact) -> str:
-    """The form of a fact: a line of its own, a table of rows, or a row."""
+    """Return the form of a fact: a line of its own, a table of rows, or a row."""
     if not fact.label:
         return "line"
     return "rows" if fact.text is None and isinstance(fact.value, list | tuple) else "row"

@@ -1,4 +1,4 @@
-"""Facts of vehicles, with what looks wrong about them, and of problems."""
+"""Facts of vehicles, with doubts about their numbers, and facts of problems."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _(problem: Problem) -> Iterator[Fact]:
 
 
 def vehicle_row(vehicle: Vehicle) -> Facts:
-    """The facts by which a vehicle is chosen from many."""
+    """Return the facts of a vehicle in a list of many."""
     return Facts(
         (
             Fact("vehicle", vehicle.name, "vehicle"),
@@ -96,7 +96,7 @@ def _weaknesses(vehicle: Vehicle, hover: float, bandwidth: float) -> Iterator[st
 
 
 def _why_grounded(vehicle: Vehicle) -> str:
-    """Why a vehicle cannot hover, in a sentence; empty where it can."""
+    """Return why a vehicle cannot hover, a sentence; empty where it can."""
     try:
         vehicle.require_hover(STANDARD_GRAVITY)
     except SpecError as error:
@@ -105,13 +105,13 @@ def _why_grounded(vehicle: Vehicle) -> str:
 
 
 def _hover(vehicle: Vehicle) -> float:
-    """The largest part of a rotor's thrust that a level hover takes [-]."""
+    """Return the largest fraction of a rotor's thrust that a level hover takes [-]."""
     hover = vehicle.mass * STANDARD_GRAVITY * vehicle.mixer[:, 0]
     return float((hover / vehicle.max_thrusts).max())
 
 
 def _place(rotor: Rotor) -> str:
-    """Where a rotor is, as seen by the vehicle, and how it spins."""
+    """Return the place of a rotor, as seen from the vehicle, and its sense of rotation."""
     x, y, _ = rotor.position_body.tolist()
     along = "front" if x > _NAMED else "back" if x < -_NAMED else ""
     aside = "left" if y > _NAMED else "right" if y < -_NAMED else ""

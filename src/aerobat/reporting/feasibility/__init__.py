@@ -1,1 +1,1 @@
-"""Feasible problems and the requirements of a problem, as figures, tables for people and plain data."""
+"""Maps of feasibility and the requirements of a problem: their facts and figures."""

@@ -1,4 +1,4 @@
-"""Facts of maps of what is feasible, and of what a problem needs."""
+"""Facts of feasibility maps and of the smallest values that a problem needs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ WIDE = 14  # values across: of more, letters alone fit
 
 @facts.register
 def _(found: FeasibilityMap) -> Iterator[Fact]:
-    """Tell each cell; of two fields, people read a grid with a letter for each kind, and a legend."""
+    """Yield a row for each cell. The table of a map over two fields is a grid of letters, with a legend."""
     title = f"{found.problem.name} · {found.vehicle.name}"
     is_grid = len(found.axes) > 1
     if is_grid:
@@ -35,12 +35,12 @@ picture.register(FeasibilityMap, map_figure)
 
 
 def requirements(problem: str, vehicle: str, found: Iterable[Requirement]) -> Facts:
-    """The least that a problem needs of each quantity.
+    """Return the facts of the smallest values that a problem needs.
 
     Args:
-        problem: Its name.
-        vehicle: The name of what flies it.
-        found: The answers.
+        problem: The name of the problem.
+        vehicle: The name of the vehicle.
+        found: The requirements, one for each quantity.
     """
     each = (Fact(one.quantity, one, one.quantity) for one in found)
     return Facts(
@@ -54,7 +54,7 @@ def requirements(problem: str, vehicle: str, found: Iterable[Requirement]) -> Fa
 
 @facts.register
 def _(found: Requirement) -> Iterator[Fact]:
-    """Tell the least; None for a quantity of which none will do, and for no limit."""
+    """Yield the smallest value; it is None where no value suffices, and where no limit is needed."""
     refused = found.shown(found.refused)
     least = f"none will do, {refused} neither"
     if found.value is not None:
@@ -70,7 +70,7 @@ def _(found: Requirement) -> Iterator[Fact]:
 
 
 def _sizes(found: Requirement) -> str:
-    """The openings of the gates of a plan, where those were made smaller."""
+    """Return the openings of a plan's gates as text, for quantities that reduce them."""
     if found.quantity not in ("gate", "gate-height") or found.plan is None:
         return ""
     sizes = (
@@ -80,7 +80,7 @@ def _sizes(found: Requirement) -> str:
 
 
 def _cell(found: FeasibilityMap, cell: Cell) -> Facts:
-    """A cell; None where there is no plan."""
+    """Return the facts of a cell; duration and reserve are None where there is no plan."""
     limits = ", ".join(cell.limits)
     said = limits if cell.is_planned else f"{limits}: {cell.sentence}".removeprefix(": ")
     reserve = NONE if cell.reserve is None else f"{100 * cell.reserve:.2g} %"
@@ -101,7 +101,7 @@ def _cell(found: FeasibilityMap, cell: Cell) -> Facts:
 
 
 def _grid(found: FeasibilityMap) -> list[Facts]:
-    """The rows of a grid for people: the durations and letters of its cells."""
+    """Return the rows of a grid: the durations and letters of its cells."""
     down, across = found.axes
     kinds, width = kinds_of(found), len(across.values)
     rows = []
@@ -118,14 +118,14 @@ def _grid(found: FeasibilityMap) -> list[Facts]:
 
 
 def _style(cell: Cell) -> str:
-    """Faint where there is no plan, red where one is not as it should be."""
+    """Return the style of a cell: faint without a plan, red for a plan that is not flyable."""
     if cell.feasibility is Feasibility.NOT_FLYABLE:
         return "red"
     return "" if cell.is_planned else "dim"
 
 
 def _legend(found: FeasibilityMap, kind: Kind) -> str:
-    """A letter's meaning, with its number of cells; of refusals the first one's sentence."""
+    """Return the meaning of a kind's letter, its number of cells, and why the first cell has no plan."""
     cells = "1 cell" if kind.count == 1 else f"{kind.count} cells"
     where = ", ".join(
         f"{axis.name} {value:g}" for axis, value in zip(found.axes, kind.first.values, strict=True)

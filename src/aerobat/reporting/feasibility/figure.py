@@ -1,4 +1,4 @@
-"""A map of what is feasible as a picture: durations of plans as colours, or as a line, letters for limits."""
+"""The figure of a feasibility map: durations as colours or as a line, and letters for limits that bind."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ ROW = 0.2  # [in] of the legend
 def map_figure(found: FeasibilityMap) -> Figure:
     """Draw for which values there is a plan, how long it takes, and which limits bind.
 
-    Of two fields a grid, the first one's values upward; of one a line. What has no plan is grey; a plan that
-    is not flyable is red.
+    A map over two fields is a grid, with the first field upward; a map over one field is a line. Cells
+    without a plan are grey, and plans that are not flyable are red.
     """
     texts = [f"{kind.letter}   {kind.name} ({kind.count})" for kind in kinds_of(found).values()]
     legend = [line for text in texts for line in wrap(text, 150)]  # letters fit the page
@@ -56,13 +56,13 @@ def map_figure(found: FeasibilityMap) -> Figure:
 
 
 def _height(found: FeasibilityMap) -> float:
-    """About the height of the axes [in]: as high as the rows of a grid ask."""
+    """Return about the height of the axes [in], which follows from the number of a grid's rows."""
     rows = len(found.axes[0].values) if len(found.axes) > 1 else 1
     return float(np.clip(0.5 * rows, 2.6, 6.5))
 
 
 def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
-    """Draw a cell a value of each field, and the scale of durations beside them."""
+    """Draw the cells of a map over two fields, and the scale of durations beside them."""
     rows, columns = (len(axis.values) for axis in found.axes)
     durations = np.array([c.duration if c.is_planned else np.nan for c in found.cells], dtype=float)
     scale, colours = _colours(found, durations)
@@ -93,7 +93,7 @@ def _write_cells(axes: Axes, found: FeasibilityMap, durations: Array) -> None:
 
 
 def _colours(found: FeasibilityMap, durations: Array) -> tuple[Colormap, Array]:
-    """The scale of durations, and the colour of each cell, (cells, 4)."""
+    """Return the scale of durations, and the colour of each cell, (cells, 4)."""
     from matplotlib.colors import LinearSegmentedColormap, to_rgba
 
     scale = LinearSegmentedColormap.from_list("durations", [BAND, BLUE])
@@ -105,14 +105,14 @@ def _colours(found: FeasibilityMap, durations: Array) -> tuple[Colormap, Array]:
 
 
 def _parts(durations: Array) -> Array:
-    """Durations as parts of their range, 0 where there is none."""
+    """Return durations as fractions of their range, 0 for a cell without one."""
     known = durations[np.isfinite(durations)]
     low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
     return np.asarray(np.nan_to_num((durations - low) / ((high - low) or 1.0)))
 
 
 def _cell_text(cell: Cell, letter: str, width: float, height: float) -> str:
-    """As much as a cell of that size [in] holds: its duration and letter, the letter alone, or nothing."""
+    """Return the text that a cell of this size [in] holds: duration and letter, the letter, or nothing."""
     if width >= 0.42 and height >= 0.2 and cell.duration is not None:
         return f"{cell.duration:.2f} {letter}"
     return letter if width >= 0.12 and height >= 0.14 else ""
@@ -182,6 +182,6 @@ def letter_of(cell: Cell, kinds: Kinds) -> str:
 
 
 def _letter(number: int) -> str:
-    """a, b, ... z, and then a2, b2."""
+    """Return the letter of a number from 0: a, b, ... z, a2, b2 and so on."""
     turn, place = divmod(number, len(ascii_lowercase))
     return ascii_lowercase[place] + (str(turn + 1) if turn else "")

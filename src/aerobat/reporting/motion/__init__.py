@@ -1,1 +1,1 @@
-"""Pictures that move: a flight at one instant after the other, and the video that they make."""
+"""Animations: the picture of a flight at any instant, and videos of such pictures."""

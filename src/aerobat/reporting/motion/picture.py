@@ -1,4 +1,4 @@
-"""A page on a flight at any instant: the vehicle on its path, and timelines with a cursor."""
+"""The picture of a flight at an instant: the vehicle on its path, and timelines with a cursor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Videos of plans and flights: MP4 for players, GIF for pages that take no other."""
+"""Videos of plans and flights: MP4 for players, GIF for pages that show only images."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class Crossings:
 
     @property
     def note(self) -> str:
-        """The crossings in a few words."""
+        """The number of crossings, and of flights without one, in words."""
         missing = int((~self.crossed).sum())
         text = f"{int(self.crossed.sum())} crossings"
         return text + (f", {missing} without one" if missing else "")

@@ -32,18 +32,18 @@ class ManeuverPlane:
 
     @property
     def camera(self) -> Camera:
-        """The view straight onto the plane, its horizontal axis to the right."""
+        """The view perpendicular to the plane, with its horizontal axis to the right."""
         return Camera(float(np.deg2rad(self.heading_deg - 90.0)))
 
     def of_thrust(self, thrust: Array) -> ManeuverPlane:
-        """The vertical plane in which a specific thrust (3,) lies; this one if that is all but vertical."""
+        """Return the vertical plane that holds a specific thrust (3,); for a vertical thrust, this one."""
         if np.linalg.norm(thrust[:2]) < UPRIGHT * np.linalg.norm(thrust):
             return self
         return ManeuverPlane(round(float(np.rad2deg(np.arctan2(thrust[1], thrust[0]))), 0))
 
     @property
     def name(self) -> str:
-        """The horizontal axis' name: x, y, or h (a heading that the label tells)."""
+        """The name of the horizontal axis: x, y, or h for another heading, which the label has."""
         return {0.0: "x", 90.0: "y"}.get(self.heading_deg, "h")
 
     @property
@@ -74,21 +74,21 @@ class Keyframes:
 
     @property
     def stages(self) -> list[int]:
-        """The places of the stages among the instants."""
+        """The indices of the stages among the instants."""
         return [k for k, keyframe in enumerate(self.instants) if keyframe.interval is not None]
 
     def only(self, kept: list[int]) -> Keyframes:
-        """The keyframes at these places."""
+        """Return the keyframes with these indices."""
         instants = tuple(self.instants[k] for k in kept)
         return Keyframes(instants, self.position[kept], self.q_world_body[kept], self.thrust[kept])
 
     def numbered(self) -> Keyframes:
-        """The keyframes with numbers before their names, as timelines count stages."""
+        """Return the keyframes with numbers before their names, as timelines count stages."""
         instants = tuple(replace(each, name=f"{k} {each.name}") for k, each in enumerate(self.instants, 1))
         return replace(self, instants=instants)
 
     def shortened(self, letters: int) -> Keyframes:
-        """The keyframes with names of at most this many letters."""
+        """Return the keyframes with names of at most this many letters."""
         names = [k.name if len(k.name) <= letters else f"{k.name[: letters - 1]}…" for k in self.instants]
         instants = tuple(replace(k, name=name) for k, name in zip(self.instants, names, strict=True))
         return replace(self, instants=instants)
@@ -118,7 +118,7 @@ class Keyframes:
 
 
 def plan_keyframes(plan: Plan, vehicle: Vehicle) -> Keyframes:
-    """Keyframes of `plan` for `vehicle` at its stages, and where those are few, at equal steps of time."""
+    """Return keyframes of a plan at its stages and, if these are few, at equal steps of time between them."""
     shown = [Keyframe(stage.name, stage.time, stage.interval, stage.gate) for stage in plan.stages]
     if len(shown) < FEWEST:
         steps = np.linspace(0.0, plan.duration, STEPS + 1).tolist()
@@ -133,7 +133,7 @@ def plan_keyframes(plan: Plan, vehicle: Vehicle) -> Keyframes:
 
 
 def maneuver_plane(plan: Plan, thrust: Array) -> ManeuverPlane:
-    """The plane normal to the maneuver's axis; else that in which the specific thrust (k, 3) varies most."""
+    """Return the plane normal to the maneuver's axis, or else that in which the thrust (k, 3) varies most."""
     axis = plan.problem.maneuver.turn_axis
     if axis is not None:
         axis_deg = round(float(np.rad2deg(np.arctan2(axis[1], axis[0]))), 9)
@@ -143,7 +143,7 @@ def maneuver_plane(plan: Plan, thrust: Array) -> ManeuverPlane:
 
 
 def plane_of(points: Array) -> ManeuverPlane | None:
-    """The vertical plane in which points (n, 3) lie; None where they spread to its sides."""
+    """Return the vertical plane that holds points (n, 3); None where there is no such plane."""
     heading_deg, spread = _main_direction(points)
     if spread > THIN * np.ptp(points, axis=0).max():
         return None
@@ -151,7 +151,7 @@ def plane_of(points: Array) -> ManeuverPlane | None:
 
 
 def _main_direction(points: Array) -> tuple[float, float]:
-    """The heading [deg] along which points (n, 3) spread most, and how far they spread to its sides."""
+    """Return the heading [deg] along which points (n, 3) spread most, and their spread across it."""
     level = points[:, :2] - points[:, :2].mean(axis=0)
     if not level.any():
         return 0.0, 0.0

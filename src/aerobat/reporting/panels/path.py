@@ -56,8 +56,8 @@ def draw_path(
 ) -> str:
     """Draw paths, the first vehicle along its path, the gates, obstacles, other stages, start and end.
 
-    Obstacles are drawn where they are near, and those that move where they are beside some vehicles. Stages
-    without a gate are marked by diamonds.
+    Only near obstacles are drawn, and moving ones at the times of some drawn vehicles. Stages without a gate
+    are marked by diamonds.
 
     Args:
         axes: The axes.

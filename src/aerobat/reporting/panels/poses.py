@@ -15,7 +15,7 @@ from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle
 
 VERTICES = 240  # of a drawn path
-FAR = 0.5  # of the reference path's extent: where a flight strays further, it is drawn no more
+FAR = 0.5  # of the reference path's extent: a flight is drawn until its error is larger
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,16 +38,16 @@ class PoseHistory:
         return float(np.ptp(self.position, axis=0).max())
 
     def rows(self, times: Sequence[float] | Array) -> list[int]:
-        """The first rows at or after `times` [s]."""
+        """Return the first rows at or after `times` [s]."""
         rows = np.searchsorted(self.times, np.asarray(times, dtype=float) - 1e-9)
         return [int(k) for k in rows.clip(0, len(self.times) - 1)]
 
     def rows_at_gates(self, gates: Sequence[Gate]) -> list[int]:
-        """The row at which the vehicle is nearest to each gate's centre."""
+        """Return the row at which the vehicle is nearest to the centre of each gate."""
         return [int(np.linalg.norm(self.position - gate.position, axis=-1).argmin()) for gate in gates]
 
     def until_astray(self, reference: PoseHistory) -> PoseHistory:
-        """The poses up to where they stray far from the reference's, taken at the same times."""
+        """Return the poses until they are far from the reference's, which has the same times."""
         error = np.linalg.norm(self.position - reference.position, axis=-1)
         stray = np.flatnonzero(error > FAR * max(reference.extent, 1.0))
         end = max(int(stray[0]), 2) if len(stray) else len(self.times)
@@ -55,24 +55,24 @@ class PoseHistory:
 
 
 def is_flat(positions: Array) -> bool:
-    """True if a path (T, 3) is much longer than high."""
+    """Return True if a path (T, 3) is much longer than high."""
     extents = np.ptp(positions, axis=0)
     return bool(extents[2] < 0.3 * extents.max())
 
 
 def plan_reference(plan: Plan, vehicle: Vehicle) -> Reference:
-    """Reference of a plan for a vehicle from start to goal, sampled for drawing."""
+    """Return the reference of a plan for a vehicle, sampled for drawing."""
     return reference(plan, vehicle, rate=250.0)
 
 
 def reference_poses(reference: Reference | Flight) -> PoseHistory:
-    """The poses of a reference, or of a flight's for as long as it lasted."""
+    """Return the poses of a reference, or of the set-points of a flight."""
     setpoint = reference.setpoint
     return PoseHistory(reference.times, setpoint.flat.position, setpoint.q_world_body)
 
 
 def actual_poses(flight: Flight) -> list[PoseHistory]:
-    """The poses of each vehicle of a flight, or of a batch, before it went astray."""
+    """Return the poses of each vehicle of a flight, or of a batch, until it is far from its reference."""
     planned = reference_poses(flight)
     positions = flight.states.position.reshape(-1, *planned.position.shape)
     attitudes = flight.states.q_world_body.reshape(-1, *planned.q_world_body.shape)

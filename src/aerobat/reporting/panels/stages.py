@@ -81,19 +81,19 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
 
 
 def _column(shots: Keyframes) -> float:
-    """The width [in] that names take, on either side of a tall panel and side by side below a wide one."""
+    """Return the width [in] of a name, at either side of a tall panel and in the row below a wide one."""
     return max(LEAST_NAME, LETTER * max(len(keyframe.name) for keyframe in shots.instants))
 
 
 def _is_crowded(shots: Keyframes, camera: Camera, distance: float) -> bool:
-    """True where two stages come to lie nearer to each other than `distance` [m] on the picture."""
+    """Return True where two stages are nearer to each other than `distance` [m] on the picture."""
     places = camera.project(shots.position[shots.stages])
     apart = np.linalg.norm(places[:, None] - places, axis=-1)
     return bool((apart[np.triu_indices(len(places), 1)] < distance).any())
 
 
 def _apart(shots: Keyframes, camera: Camera, distance: float) -> list[int]:
-    """The stages, and of the steps of time between them those that are drawn clear of all others."""
+    """Return the indices of the stages, and of the steps of time that lie clear of all others."""
     places = camera.project(shots.position)
     kept = shots.stages
     for k in range(len(places)):
@@ -105,7 +105,7 @@ def _apart(shots: Keyframes, camera: Camera, distance: float) -> list[int]:
 def _storyboard(
     axes: Axes, shots: Keyframes, gates: Sequence[Gate], plane: ManeuverPlane
 ) -> tuple[Keyframes, tuple[Gate, ...]]:
-    """Stages that follow one another along the panel's longer side, each with the gate that it passes."""
+    """Return stages in a row along the panel's longer side, and the gates that they pass."""
     size = size_of(axes)
     downward = bool(size[1] >= size[0])
     passed = [
@@ -182,7 +182,7 @@ def _fit(axes: Axes, points: Array, pad: float, min_side: float, columns: tuple[
 
 
 def _draw_sums(axes: Axes, places: Array, sums: Array) -> None:
-    """The thrust in the plane (k, 2) [m] as a line from each vehicle, in a rectangle of its components."""
+    """Draw the thrust in the plane (k, 2) [m] as a line from each vehicle, the diagonal of its components."""
     from matplotlib.collections import LineCollection
 
     tips = places + sums
@@ -195,7 +195,7 @@ def _draw_sums(axes: Axes, places: Array, sums: Array) -> None:
 
 
 def _draw_components(axes: Axes, places: Array, arrows: Array, unit: float, plane: ManeuverPlane) -> None:
-    """The thrust's components (k, 2) [in] as arrows from the vehicles, with keys; 1 m/s² is `unit` long."""
+    """Draw the thrust's components (k, 2) [in] as arrows, with keys; 1 m/s² is `unit` [in] long."""
     size = size_of(axes)
     key = max(KEYS[KEYS * unit <= 0.4], default=KEYS[0])  # [m/s²] of the longest arrow within 0.4 in
     names = (f"thrust along {plane.name}", "thrust along z")
@@ -218,7 +218,7 @@ def _draw_names(
     clear: float,
     columns: tuple[float, float],
 ) -> None:
-    """Names, times and intervals beside the vehicles or below them, with a hair line to each."""
+    """Write names, times and intervals beside the vehicles or below them, with a thin line to each."""
     from matplotlib.collections import LineCollection
 
     size = size_of(axes)
@@ -239,7 +239,7 @@ def _draw_names(
 
 
 def _write_name(axes: Axes, keyframe: Keyframe, anchor: Array, side: str) -> None:
-    """A stage's name in bold over its time and interval; a step of time has its time only."""
+    """Write a stage's name in bold over its time and interval; of a step between stages only the time."""
     below = side == "center"
     place: dict[str, Any] = {"xy": anchor, "xytext": GAPS[side], "textcoords": "offset points", "ha": side}
     if keyframe.interval is None:

@@ -67,7 +67,7 @@ def clearances(position: Array, q_world_body: Array, vehicle: Vehicle, pieces: P
 def draw_errors(panels: Sequence[Axes], flight: Flight, tube: Tube | None = None) -> None:
     """Draw the distance between actual and reference position, and below it the angle between attitudes.
 
-    The distance is in the unit that suits its largest value. With a plan's tube, what is within it is shaded.
+    The distance is in the unit that suits its largest value. The tube of a plan is shaded.
     """
     position, attitude = flight.position_error, np.rad2deg(flight.attitude_error)
     within = np.zeros((2, 1))
@@ -106,7 +106,7 @@ def draw_limits(axes: Axes, limits: Sequence[float], label: str = "") -> None:
 
 
 def fit_to_limits(axes: Axes, limits: Sequence[float], values: Array) -> None:
-    """Fit the vertical axis to limits and values (...); what lies far beyond is cut off, with a note."""
+    """Fit the vertical axis to limits and values (...); values far beyond are cut off, with a note."""
     low, high = min(limits), max(limits)
     lowest = min(float(values.min()), low)
     highest = max(float(values.max()), high)
@@ -173,10 +173,10 @@ def draw_series(
 
 
 def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, named: bool) -> None:
-    """Draw upright lines at the stages' times, passages of gates in their colour, with names above if asked.
+    """Draw upright lines at the stages' times, passages of gates in yellow, and names above if `named`.
 
-    Where there is no room for all names, stages are numbered in their order, of very many only every second
-    or third.
+    Without room for all names, stages are numbered in their order; if there are very many, only every second
+    or third number is written.
     """
     axes.set_xlim(0.0, duration or None)  # of a flight that is over as it begins what matplotlib takes
     times = np.array([stage.time for stage in stages])
@@ -207,7 +207,7 @@ def mark_stages(axes: Axes, stages: Sequence[PlacedStage], duration: float, name
 
 
 def _draw_lines(axes: Axes, lines: list[list[tuple[float, float]]], **style: Any) -> None:
-    """Lines between times [s] and heights as fractions of the axes'."""
+    """Draw lines between points of time [s] and height, a fraction of the axes."""
     from matplotlib.collections import LineCollection
 
     collection = LineCollection(lines, transform=axes.get_xaxis_transform(), **style)

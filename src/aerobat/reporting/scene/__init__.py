@@ -1,1 +1,1 @@
-"""Things in space as pictures of them: camera, axes box, glyphs of vehicles and gates, drawn by depth."""
+"""Pictures of scenes in space: camera, axes box, and glyphs of vehicles, gates and obstacles by depth."""

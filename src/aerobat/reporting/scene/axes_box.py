@@ -40,7 +40,7 @@ class AxesBox:
         return np.stack(grid, axis=-1).reshape(-1, 3)
 
     def ticks(self, axis: int) -> Array:
-        """Round numbers along an axis [m], as dense as on the longest one where at least two fit."""
+        """Return round numbers along an axis [m], as dense as on the longest, or denser so that two fit."""
         lengths = self.upper - self.lower
         step = min(round_step(lengths.max() / 5.0), round_step(lengths[axis] / 2.5))
         first = np.ceil(self.lower[axis] / step - 1e-9)
@@ -48,18 +48,18 @@ class AxesBox:
         return np.arange(first, last + 1) * step + 0.0  # no minus zero
 
     def front(self, camera: Camera) -> Array:
-        """The coordinates of the sides that face the viewer [m], (3,)."""
+        """Return the coordinates of the sides that face the viewer [m], (3,)."""
         return np.where(camera.toward > 0, self.upper, self.lower)
 
     def back(self, camera: Camera) -> Array:
-        """The coordinates of the sides behind the scene [m], (3,)."""
+        """Return the coordinates of the sides behind the scene [m], (3,)."""
         return np.where(camera.toward > 0, self.lower, self.upper)
 
 
 def draw_box_around(
     axes: Axes, points: Array, pad: float, path: Array, gates: Sequence[Gate]
 ) -> tuple[AxesBox, Camera]:
-    """Draw the axes box around points, seen from where a path and gates are seen best; return both.
+    """Draw the axes box around points, in the best view of a path and gates; return box and camera.
 
     Args:
         axes: The axes.
@@ -75,7 +75,7 @@ def draw_box_around(
 
 
 def box_around(points: Array, pad: float) -> AxesBox:
-    """The box around points (n, 3), `pad` [m] wider, and no side much shorter than the longest."""
+    """Return the box around points (n, 3), `pad` [m] wider, with no side much shorter than the longest."""
     lower, upper = points.min(axis=0) - pad, points.max(axis=0) + pad
     short = np.maximum(MIN_SIDE * (upper - lower).max() - (upper - lower), 0.0)
     fraction = np.array([0.5, 0.5, 0.0])  # the floor stays right below
@@ -83,7 +83,7 @@ def box_around(points: Array, pad: float) -> AxesBox:
 
 
 def round_step(length: float) -> float:
-    """The largest of 1, 2, 5, 10, ... (and their tenths) that is not above `length`."""
+    """Return the largest of 1, 2 or 5 times a power of ten that is at most `length`."""
     decade = 10.0 ** np.floor(np.log10(length))
     return float(decade * ROUND[ROUND * decade <= length * (1 + 1e-9)].max())
 
@@ -97,7 +97,7 @@ def draw_axes_box(axes: Axes, box: AxesBox, camera: Camera) -> None:
 
 
 def _room(axes: Axes) -> Array:
-    """The width and height [in] that scales leave to a box in axes, (2,)."""
+    """Return the width and height [in] that the scales leave to a box in axes, (2,)."""
     return np.asarray(size_of(axes) - BOX_MARGINS.sum(axis=0))
 
 
@@ -113,7 +113,7 @@ def _fit(axes: Axes, box: AxesBox, camera: Camera) -> float:
 
 
 def _walls(box: AxesBox, camera: Camera) -> list[Shape]:
-    """Floor and back walls with the lines of their grids."""
+    """Return the floor and the back walls with the lines of their grids."""
     back = box.back(camera)
     back[2] = box.lower[2]
     shapes, lines = [], []
@@ -138,7 +138,7 @@ def _rectangle(box: AxesBox, normal: int, level: float) -> Array:
 
 
 def _scale(axes: Axes, box: AxesBox, camera: Camera, axis: int, per_metre: float) -> None:
-    """Numbers and the axis' name along one edge of the box."""
+    """Write numbers and the name of an axis along one edge of the box."""
     edge, outward = _edge(box, camera, axis)
     ticks = box.ticks(axis)
     points = np.tile(edge, (len(ticks), 1))
@@ -162,7 +162,7 @@ def _scale(axes: Axes, box: AxesBox, camera: Camera, axis: int, per_metre: float
 
 
 def _edge(box: AxesBox, camera: Camera, axis: int) -> tuple[Array, Array]:
-    """A point of the edge that carries an axis' scale (3,), and the way out of the picture there (2,)."""
+    """Return a point of the edge with the scale of an axis (3,), and the outward direction there (2,)."""
     edge = box.front(camera)
     edge[2] = box.lower[2]
     if axis == 2:  # the leftmost of the upright edges

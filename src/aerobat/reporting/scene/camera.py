@@ -36,14 +36,14 @@ class Camera:
         return np.asarray(points @ self.screen.T)
 
     def nearness(self, points: Array) -> Array:
-        """Depth of points toward the viewer [m], (..., 3) -> (...)."""
+        """Return the depth of points toward the viewer [m], (..., 3) -> (...)."""
         return np.asarray(points @ self.toward)
 
 
 def best_view(path: Array, gates: Sequence[Gate], corners: Array, size: Array) -> Camera:
     """Return the view in which a path spreads widest and openings of gates are seen, not their edges.
 
-    Of views that show both as well, the one in which the path leads to the right, then the customary one.
+    Between equal views, the path should lead to the right, and then x should.
 
     Args:
         path: Positions [m], (T, 3).
@@ -59,7 +59,7 @@ def best_view(path: Array, gates: Sequence[Gate], corners: Array, size: Array) -
 
 
 def _spread(path: Array, corners: Array, size: Array, cameras: list[Camera]) -> Array:
-    """The area over which the path spreads in each picture, (cameras,)."""
+    """Return the area over which the path spreads in each picture, (cameras,)."""
     covariance = np.cov(path.T) if len(path) > 1 else np.zeros((3, 3))
     covariance = covariance + 1e-3 * (np.trace(covariance) + 1e-9) * np.eye(3)  # a straight path spreads too
     screens = np.array([camera.screen for camera in cameras])
@@ -69,20 +69,20 @@ def _spread(path: Array, corners: Array, size: Array, cameras: list[Camera]) -> 
 
 
 def _openness(gates: Sequence[Gate], cameras: list[Camera]) -> Array:
-    """Openness of the least open gate, (cameras,); the root lets the path weigh more than the gates."""
+    """Return the root of the least open gate's openness, (cameras,), so that the path weighs more."""
     normals = np.array([gate.normal for gate in gates]).reshape(-1, 3)
     openness = np.abs(np.array([camera.toward for camera in cameras]) @ normals.T)
     return np.asarray(np.sqrt(openness.min(axis=1, initial=1.0)))
 
 
 def _depth(cameras: list[Camera]) -> Array:
-    """Views along a horizontal axis look flat; those across both axes by 0.3 or more deep, (cameras,)."""
+    """Return the depth, (cameras,): views along a horizontal axis look flat, others by 0.3 or more do not."""
     sideways = [np.abs(camera.toward[:2]).min() for camera in cameras]
     return np.asarray(np.minimum(np.array(sideways) / 0.3, 1.0) ** 0.5)
 
 
 def _custom(path: Array, cameras: list[Camera]) -> Array:
-    """Preferences between views that score the same otherwise, (cameras,)."""
+    """Return the preferences between views that are equal otherwise, (cameras,)."""
     travel = path[-1] - path[0]
     travel = travel / max(float(np.linalg.norm(travel)), 1.0)
     onward = np.array([camera.screen[0] @ travel for camera in cameras])

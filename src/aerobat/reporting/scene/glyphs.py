@@ -27,12 +27,12 @@ ENLARGEMENTS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 
 
 
 def span(vehicle: Vehicle) -> float:
-    """The largest distance between rotor tips through the centre [m]."""
+    """Return the largest distance between rotor tips through the centre [m]."""
     return 2.0 * max(float(np.linalg.norm(r.position_body[:2])) + r.radius for r in vehicle.rotors)
 
 
 def enlargement(vehicle: Vehicle, size: float) -> float:
-    """The round factor by which a vehicle is drawn larger than it is, to span about `size` [m]."""
+    """Return the round factor by which a vehicle is enlarged in a picture, to span about `size` [m]."""
     return min(
         (step for step in ENLARGEMENTS if step * span(vehicle) >= 0.85 * size), default=ENLARGEMENTS[-1]
     )
@@ -46,7 +46,7 @@ def vehicle_shapes(
     face: Colour = (INK, 0.35),
     weight: float = 1.0,
 ) -> list[Shape]:
-    """A vehicle at a position (3,) in an attitude (4,): arms and masts, then a disc for each rotor.
+    """Return a vehicle at a position (3,) in an attitude (4,): arms and masts, then a disc for each rotor.
 
     Args:
         vehicle: The vehicle.
@@ -68,18 +68,18 @@ def vehicle_shapes(
 
 
 def thrust_axis_shape(vehicle: Vehicle, position: Array, q_world_body: Array, scale: float) -> Shape:
-    """A line from a vehicle along its thrust axis, somewhat shorter than half the vehicle's span."""
+    """Return a line from a vehicle along its thrust axis, somewhat shorter than half of its span."""
     tip = position + 0.45 * scale * span(vehicle) * so3.thrust_axis(q_world_body)
     return Shape(np.array([position, tip]), edge=INK, width=0.9)
 
 
 def side_face(q_world_body: Array, camera: Camera) -> Colour:
-    """The face of discs seen from above, blue, or from below, white: upright tells from inverted."""
+    """Return the face of discs: blue seen from above, white from below, which shows inverted flight."""
     return SEEN_FROM_ABOVE if float(so3.thrust_axis(q_world_body) @ camera.toward) >= 0.0 else SEEN_FROM_BELOW
 
 
 def direction_marks(path: Array, rows: Sequence[int], camera: Camera, size: float) -> list[Shape]:
-    """Arrowheads along a path that say in which direction it is travelled.
+    """Return arrowheads along a path, in the direction of travel.
 
     Args:
         path: Positions [m], (T, 3).
@@ -100,7 +100,7 @@ def direction_marks(path: Array, rows: Sequence[int], camera: Camera, size: floa
 
 
 def gate_bars(gate: Gate) -> list[Array]:
-    """The bars of a gate's frame, each the corners of its faces [m], (4 faces, 4, 3).
+    """Return the bars of a gate's frame, each by the corners of its faces [m], (4 faces, 4, 3).
 
     The inner edges of the frame are the opening, `Gate.outline`; the bars lie outside it and are as deep
     as they are thick, half before the gate's plane and half behind.
@@ -118,12 +118,12 @@ def gate_bars(gate: Gate) -> list[Array]:
 
 
 def gate_corners(gates: Sequence[Gate]) -> Array:
-    """All corners of all bars of gates [m], (n, 3), for a picture that must hold them."""
+    """Return all corners of all bars of gates [m], (n, 3), for a picture that must hold them."""
     return np.array([bar for gate in gates for bar in gate_bars(gate)]).reshape(-1, 3)
 
 
 def gate_shapes(gate: Gate) -> list[Shape]:
-    """A gate as a shaded frame around its opening."""
+    """Return a gate as a shaded frame around its opening."""
     return [
         Shape(face, face=_shade(face), edge=_shade(face), width=0.4)
         for bar in gate_bars(gate)
@@ -132,7 +132,7 @@ def gate_shapes(gate: Gate) -> list[Shape]:
 
 
 def gate_section(gate: Gate, camera: Camera) -> list[Shape]:
-    """A gate as `gate_shapes`; seen along its own plane, bars that would close the opening are pale."""
+    """Return a gate as `gate_shapes`; seen edge-on, bars that would cover the opening are pale."""
     if abs(float(gate.normal @ camera.toward)) > 0.2:
         return gate_shapes(gate)
     shapes = []
@@ -144,7 +144,7 @@ def gate_section(gate: Gate, camera: Camera) -> list[Shape]:
 
 
 def _shade(face: Array) -> Colour:
-    """The colour of a face (4, 3) in the scene's light."""
+    """Return the colour of a face (4, 3) in the light of the scene."""
     from matplotlib.colors import to_hex, to_rgb
 
     normal = np.cross(face[1] - face[0], face[3] - face[0])
@@ -154,10 +154,10 @@ def _shade(face: Array) -> Colour:
 
 
 def shadow(points: Array, floor: float) -> Array:
-    """Points straight below on the floor [m], (..., 3)."""
+    """Return the points on the floor straight below others [m], (..., 3)."""
     return np.concatenate([points[..., :2], np.full((*points.shape[:-1], 1), floor)], axis=-1)
 
 
 def drop_line(point: Array, floor: float) -> Shape:
-    """A thin line from a point down to the floor."""
+    """Return a thin line from a point down to the floor."""
     return Shape(np.array([point, shadow(point, floor)]), edge=FAINT, width=0.7)

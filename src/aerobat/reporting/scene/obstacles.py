@@ -38,7 +38,7 @@ def surfaces_beside(
 
 
 def obstacle_shapes(surfaces: Sequence[Surface], camera: Camera) -> list[Shape]:
-    """The faces that are turned to the viewer, and all sharp edges."""
+    """Return the faces that are turned to the viewer, and all sharp edges."""
     if not surfaces:
         return []
     extent = np.ptp(np.concatenate([surface.points for surface in surfaces]), axis=0)
@@ -62,7 +62,7 @@ def _surface_shapes(surface: Surface, camera: Camera, cell: float) -> Iterator[S
 
 
 def _cells(corners: Array, cell: float) -> list[Array]:
-    """The parts of a convex polygon, or of a line, in cells [m] of a grid."""
+    """Return the parts of a convex polygon, or of a line, in the cells [m] of a grid."""
     parts = [corners]
     for axis in range(3):
         parts = [cut for part in parts for cut in _slices(part, axis, cell)]
@@ -70,7 +70,7 @@ def _cells(corners: Array, cell: float) -> list[Array]:
 
 
 def _slices(corners: Array, axis: int, cell: float) -> Iterator[Array]:
-    """The parts between levels of one coordinate, `cell` [m] apart."""
+    """Yield the parts between levels of one coordinate, `cell` [m] apart."""
     low, high = corners[:, axis].min() / cell, corners[:, axis].max() / cell
     for level in np.arange(np.floor(low) + 1.0, np.ceil(high)) * cell:
         yield beyond(corners, level - corners[:, axis])

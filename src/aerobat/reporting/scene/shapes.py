@@ -32,7 +32,7 @@ class Shape:
 def polyline(
     points: Array, edge: Colour, width: float, depth_bias: float = 0.0, piece: int = 4
 ) -> list[Shape]:
-    """A line (T, 3) in short pieces, so that it can pass behind one thing and before another."""
+    """Return a line (T, 3) in short pieces, each of which can be behind or before other shapes."""
     starts = range(0, len(points) - 1, piece)
     return [Shape(points[k : k + piece + 1], edge=edge, width=width, depth_bias=depth_bias) for k in starts]
 

@@ -1,1 +1,1 @@
-"""Sweeps as figures, tables for people and plain data."""
+"""Facts and figures of sweeps, and facts of a search for gains."""

@@ -78,7 +78,7 @@ def _passage(sweep: Sweep, name: str) -> Iterator[Fact]:
 
 
 def _nearest(sweep: Sweep) -> Iterator[Fact]:
-    """The obstacle that flights come nearest to, and their clearance."""
+    """Yield the obstacle that flights come nearest to, and their clearance."""
     clearance = sweep.table[CLEARANCE]
     least = int(np.argmin(clearance))
     obstacle = str(sweep.table[NEAREST][least])
@@ -89,7 +89,7 @@ def _nearest(sweep: Sweep) -> Iterator[Fact]:
 
 
 def _quantiles(sweep: Sweep, column: str, label: str) -> Fact:
-    """Quantiles of a column in its unit; None where one falls on flights that did not pass."""
+    """Return the quantiles of a column in its unit; None where one falls on flights that did not pass."""
     values = {level: sweep.quantile(column, level) for level in LEVELS}
     texts = [
         f"{_shown(value, column)} at {'most' if level == 1.0 else f'{100 * level:g} %'}"

@@ -48,7 +48,7 @@ SEEN = 4.0  # times what 95 % of flights keep within: as far axes reach, however
 def sweep_figure(sweep: Sweep) -> Figure:
     """Draw a page on a sweep: errors over time, crossings of gates, outcomes, distributions of distances.
 
-    Bands over time are those of the flights that are sampled, the first ones. What went wrong is red.
+    Bands over time are those of the first flights, which are sampled. Failures are red.
     """
     gates = crossings(sweep)
     bars = BAR * len(sweep.outcomes)
@@ -109,7 +109,7 @@ def _draw_band(axes: Axes, times: Array, errors: Array) -> None:
 
 
 def _draw_gate(figure: Figure, name: str, crossed: Crossings, bottom: float) -> None:
-    """Draw a gate's opening with all crossings, and beside it the crossings larger."""
+    """Draw a gate's opening with all crossings, and beside it the crossings enlarged."""
     opening, scatter = (panel(figure, x, bottom, THIRD, GATE) for x in THIRDS[:2])
     draw_opening(opening, crossed)
     draw_scatter(scatter, crossed)
@@ -120,7 +120,7 @@ def _draw_gate(figure: Figure, name: str, crossed: Crossings, bottom: float) -> 
 
 
 def _draw_outcomes(figure: Figure, sweep: Sweep, left: float, bottom: float) -> None:
-    """Draw a bar an outcome, the most frequent on top, with its interval."""
+    """Draw a bar for each outcome, the most frequent on top, with its interval."""
     shares = sweep.outcomes
     axes = panel(figure, left + NAMES, bottom, THIRD - NAMES, BAR * len(shares))
     heading(axes, "Outcomes", "lines: 95 % confidence", left=NAMES)
@@ -155,7 +155,7 @@ def _draw_distributions(figure: Figure, sweep: Sweep, left: float, bottom: float
 
 
 def known_opening(sweep: Sweep, passage: str) -> Opening | None:
-    """The smallest opening that 99 % pass; None where the flights are too few to say, or too many miss."""
+    """Return the smallest opening that 99 % pass; None where flights are too few, or too many miss."""
     try:
         found = sweep.smallest_opening(passage)
     except SpecError:

@@ -1,4 +1,4 @@
-"""Facts of a search for gains: before and after."""
+"""Facts of a search for gains: the costs of flights with the old gains and the new."""
 
 from __future__ import annotations
 
