@@ -17,7 +17,7 @@ import tomli_w
 
 from aerobat.errors import SpecError
 from aerobat.interchange import read_plan
-from aerobat.interchange.rows import MAX_ROWS
+from aerobat.interchange.number_table import MAX_ROWS
 from aerobat.planning import Plan, load_plan
 from aerobat.problem import load_problem
 from aerobat.simulation import load_flight
@@ -156,7 +156,7 @@ def test_tables_that_no_path_has_are_refused_before_they_are_cut_into_words(
     def cut(line: str, number: int) -> list[float]:
         pytest.fail("it was cut")
 
-    monkeypatch.setattr("aerobat.interchange.rows._numbers", cut)
+    monkeypatch.setattr("aerobat.interchange.number_table._numbers", cut)
     (tmp_path / "long.csv").write_text(text)
     with pytest.raises(SpecError, match=what):
         read_plan(tmp_path / "long.csv")

@@ -19,7 +19,8 @@ from aerobat.declaration import PathName, Positive, unknown_name, validated
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange.csv import write_csv
-from aerobat.interchange.rows import NAMES, PATH
+from aerobat.interchange.number_table import NAMES
+from aerobat.interchange.rows import PATH
 from aerobat.interchange.tables import csv_text
 from aerobat.planning import Plan
 from aerobat.storage import write_whole

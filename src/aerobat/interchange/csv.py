@@ -15,14 +15,8 @@ import numpy as np
 
 from aerobat.declaration import PathName, Positive, validated
 from aerobat.errors import SpecError
-from aerobat.interchange.rows import (
-    PathRows,
-    has_header,
-    number_table,
-    require_numbers,
-    rows_of_columns,
-    times_at_rate,
-)
+from aerobat.interchange.number_table import has_header, number_table, require_numbers
+from aerobat.interchange.rows import PathRows, rows_of_columns, times_at_rate
 from aerobat.interchange.tables import csv_text
 from aerobat.storage import read_whole, write_whole
 from aerobat.trajectory import Carrier, Trajectory, as_trajectory

@@ -14,7 +14,7 @@ from aerobat.arrays import Array
 from aerobat.declaration import PathName, validated
 from aerobat.errors import SpecError
 from aerobat.flatness import reference, vehicle_of
-from aerobat.interchange.rows import NAMES, has_header, named_columns
+from aerobat.interchange.number_table import NAMES, has_header, named_columns
 from aerobat.kernels.motors import first_order_response
 from aerobat.planning import Plan
 from aerobat.simulation import Flight, Outcome

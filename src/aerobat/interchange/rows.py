@@ -1,10 +1,9 @@
-"""Tables of numbers in text files, the rows of a path in such a table, and the trajectory through them."""
+"""Rows of a path: derivatives of its position at instants, and the trajectory through them."""
 
 from __future__ import annotations
 
 import math
-from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,25 +13,13 @@ from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
+from aerobat.interchange.number_table import NAMES, named_columns
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.minimum_effort import minimum_effort
 from aerobat.trajectory.piecewise import MAX_DURATION
 from aerobat.trajectory.polynomial import hermite
 
-NAMES: Mapping[str, tuple[str, ...]] = {  # of columns, by groups
-    "time": ("t",),
-    "position": ("x", "y", "z"),
-    "velocity": ("vx", "vy", "vz"),
-    "acceleration": ("ax", "ay", "az"),
-    "jerk": ("jx", "jy", "jz"),
-    "attitude": ("qw", "qx", "qy", "qz"),
-    "rates": ("wx", "wy", "wz"),
-    "thrusts": (),  # f0, f1, ..., one for each rotor
-}
 PATH = ("position", "velocity", "acceleration", "jerk")
-SYNONYMS = {"time": "t", "time_s": "t", "px": "x", "py": "y", "pz": "z"}
-MAX_ROWS = 2_000_000  # five hours at 100 Hz, half an hour at 1 kHz
-MAX_COLUMNS = 1000
 CONTINUOUS = len(PATH) + 1  # the highest derivative that is continuous at rows, the fifth
 SHORT_STEP = 0.2  # of the usual step; derivatives over a last step that is shorter are rounding errors
 DENSE_STEP = 6e-3  # [s] between rows, a little more than at 200 Hz
@@ -166,24 +153,6 @@ def _snap(knots: Array, times: Array) -> Array:
     return np.asarray(np.linalg.solve(table, values)[4] * math.factorial(4) / size**4)
 
 
-def has_header(text: str) -> bool:
-    """Return True if a file's first line names columns and has no numbers."""
-    first = text.partition("\n")[0].strip().lstrip("#")
-    words = first.split(",", MAX_COLUMNS)  # of more columns, the last part is no identifier
-    return all(word.strip().strip('"').isidentifier() and not _is_number(word) for word in words)
-
-
-def require_numbers(text: str) -> None:
-    """Raise SpecError for a first line that has neither numbers nor names of columns."""
-    first = text.partition("\n")[0].strip()
-    is_table = first.count(",") < MAX_COLUMNS
-    if first and is_table and not any(map(_is_number, first.split(","))):
-        raise SpecError(
-            f"line 1 is neither numbers nor names of columns, got {first[:60]!r}; name them t,x,y,z and so "
-            "on, without units, commas between"
-        )
-
-
 def rows_of_columns(text: str, rate: float) -> PathRows:
     """Return the rows of a table with a header; unknown columns are ignored.
 
@@ -229,28 +198,6 @@ def _unused(columns: Mapping[str, Array]) -> Iterator[str]:
         yield f"column{'s' * (len(others) > 1)} {', '.join(others[:8])}{more}"
 
 
-def named_columns(text: str, needed: Sequence[str], remedy: str) -> dict[str, Array]:
-    """Return the columns of a table with a header by their names, in small letters and without synonyms.
-
-    Raises SpecError, naming the line or the column, for a text without such a table.
-
-    Args:
-        text: The text of the file.
-        needed: The names of required columns.
-        remedy: The end of the message where one is missing, without a full stop.
-    """
-    words = text.partition("\n")[0].strip().lstrip("#").split(",")
-    header = [SYNONYMS.get(name, name) for name in (word.strip().strip('"').lower() for word in words)]
-    for name in header:
-        if header.count(name) > 1:
-            raise SpecError(f"line 1: there are two columns {name}; rename one")
-    for name in needed:
-        if name not in header:
-            raise SpecError(f"line 1: there is no column {name}; {remedy}")
-    table = number_table(text, 2, (len(header),), f"line 1 names {len(header)} columns")
-    return dict(zip(header, table.T, strict=True))
-
-
 def _first_attitude(columns: Mapping[str, Array]) -> Array | None:
     if not all(name in columns for name in NAMES["attitude"]):
         return None
@@ -259,53 +206,3 @@ def _first_attitude(columns: Mapping[str, Array]) -> Array | None:
     if not 0.5 < norm < 2.0:
         raise SpecError(f"line 2: qw, qx, qy, qz must be a unit quaternion, got one of norm {norm:.3g}")
     return np.asarray(attitude / norm)
-
-
-def number_table(text: str, first: int, counts: Sequence[int], expected: str) -> Array:
-    """Return the numbers of a file's lines, (rows, columns), of two rows or more.
-
-    Raises SpecError, naming the line, for a text without such a table.
-
-    Args:
-        text: The text of the file.
-        first: The number of the first line of the table, counted from 1.
-        counts: The allowed numbers of columns.
-        expected: The end of the message for other numbers, without a full stop.
-    """
-    if text.count("\n") > MAX_ROWS:
-        raise SpecError(f"it has more than {MAX_ROWS} lines; give the part that is a path's")
-    lines = text.splitlines()[first - 1 :]
-    while len(lines) > 1 and not lines[-1].strip():
-        lines.pop()
-    if len(lines) > 1 and not text.endswith("\n"):
-        raise SpecError(f"line {first - 1 + len(lines)} is cut off, it has no line end")
-    width = lines[0].count(",") + 1 if lines else 0
-    values = array("d")
-    for number, line in enumerate(lines, first):
-        found = line.count(",") + 1
-        if found not in counts:
-            raise SpecError(f"line {number} has {found} numbers, {expected}")
-        if found != width:
-            raise SpecError(f"line {number} has {found} numbers, line {first} has {width}")
-        values.extend(_numbers(line, number))
-    if len(lines) < 2:
-        raise SpecError(f"a trajectory needs at least two lines of numbers, got {len(lines)}")
-    return np.array(values).reshape(len(lines), width)
-
-
-def _numbers(line: str, number: int) -> list[float]:
-    try:
-        row = [float(word) for word in line.split(",")]
-    except ValueError:
-        raise SpecError(f"line {number} must be numbers with commas between, got {line[:60]!r}") from None
-    if not all(map(math.isfinite, row)):
-        raise SpecError(f"line {number} must have finite numbers only, got {line[:60]!r}")
-    return row
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
