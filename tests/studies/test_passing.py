@@ -121,6 +121,19 @@ def test_hardly_more_reserve_than_needed_is_kept_wherever_plans_end(need: int, r
 
 
 @pytest.mark.slow
+def test_a_dead_rotor_has_no_part_in_the_tube():
+    """Its range is nothing, of which no margin is a part."""
+    hexarotor = ab.load_vehicle("hexarotor")
+    spins = (1, 1, -1, -1, 1, -1)  # with which any one rotor may fail
+    rotors = [replace(rotor, spin=spin) for rotor, spin in zip(hexarotor.rotors, spins, strict=True)]
+    rotors[0] = replace(rotors[0], min_thrust=0.0, max_thrust=0.0)
+    failed = replace(hexarotor, rotors=tuple(rotors))
+    found = ab.plan_to_pass("line", PLANNER, failed, probability=0.25, conditions=WEAK, **FEW)
+    assert found.plan.vehicle == found.plain.vehicle == failed.without_dead_rotors()
+    assert np.isfinite(found.tube.rotor_margin).all()
+
+
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_plan_and_tube():
     again = sought(0.25)
     assert again.plan.trajectory == passing(0.25).plan.trajectory

@@ -85,7 +85,7 @@ def plan_to_pass(
         task = PassingTask(
             problem=as_problem(problem),
             planner=method,
-            vehicle=as_vehicle(vehicle),
+            vehicle=as_vehicle(vehicle).without_dead_rotors(),
             conditions=conditions,
             seed=seed,
             controller=controller,
