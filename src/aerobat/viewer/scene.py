@@ -121,13 +121,13 @@ def plan_fits(plan: Plan, flight: Flight) -> bool:
 
 def _plan_scene(subject: Subject, plan: Plan) -> Scene:
     rate = min(PLAN_RATE, MAX_ROWS / plan.duration)
-    asked = reference(plan, subject.vehicle, rate=rate)
-    setpoint = asked.setpoint
+    planned = reference(plan, subject.vehicle, rate=rate)
+    setpoint = planned.setpoint
     track = Track(
         name=subject.vehicle.name,
         position=setpoint.flat.position,
         q_world_body=setpoint.q_world_body,
-        thrusts=asked.rotor_thrusts,
+        thrusts=planned.rotor_thrusts,
         end=plan.duration,
         failed=not plan.certified,
         sentence="as planned",
@@ -137,7 +137,7 @@ def _plan_scene(subject: Subject, plan: Plan) -> Scene:
     curves = (Curve("speed", "m/s", speed[None]), Curve("body rate", "°/s", rates[None]))
     proof = "not certified" if plan.certificate is None else plan.certificate.why
     facts = (f"planned by {plan.planner}: {plan.duration:.3f} s", proof)
-    return _scene(subject, asked, np.arange(len(asked.times)), facts, (track,), curves)
+    return _scene(subject, planned, np.arange(len(planned.times)), facts, (track,), curves)
 
 
 def _flight_scene(subject: Subject, flight: Flight, poses: int) -> Scene:

@@ -57,8 +57,8 @@ class MovingPicture:
         shown, vehicle = subject.shown, subject.vehicle
         self._subject = subject
         if isinstance(shown, Plan):
-            asked = plan_reference(shown, vehicle)
-            self._reference, self._thrusts = reference_poses(asked), asked.rotor_thrusts
+            planned = plan_reference(shown, vehicle)
+            self._reference, self._thrusts = reference_poses(planned), planned.rotor_thrusts
             self._moved = [self._reference]
         else:
             self._reference, self._thrusts = reference_poses(shown), shown.thrusts
