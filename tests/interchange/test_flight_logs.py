@@ -132,6 +132,19 @@ def test_what_a_log_holds_is_what_is_read_and_what_it_lacks_is_told_from_the_res
     )
 
 
+def test_a_dead_rotor_is_not_saturated(tmp_path: Path) -> None:
+    hexarotor, spins = ab.load_vehicle("hexarotor"), (1, 1, -1, -1, 1, -1)  # the first may fail
+    rotors = [replace(rotor, spin=spin) for rotor, spin in zip(hexarotor.rotors, spins, strict=True)]
+    rotors[0] = replace(rotors[0], min_thrust=0.0, max_thrust=0.0)
+    failed, line = replace(hexarotor, rotors=tuple(rotors)), shared_plan("line")
+    logged = ab.reference(line, failed, rate=100.0)
+    pose = (logged.times, logged.setpoint.flat.position, logged.setpoint.q_world_body)
+    header = ",".join((*POSE, *(f"f{k}" for k in range(6))))
+    table = np.column_stack((*pose, logged.rotor_thrusts))
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="")
+    assert not ab.read_flight_log(tmp_path / "log.csv", line, failed).saturated.all()
+
+
 def test_the_command_takes_a_log_beside_its_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plan().save(tmp_path / "flip.plan")
     file = log(tmp_path / "log.csv", PLANTED["start"](), (*POSE, *THRUSTS))

@@ -121,7 +121,7 @@ def _flight(columns: Mapping[str, Array], plan: Plan, nominal: Vehicle) -> Fligh
         "omega_body": _group(columns, NAMES["rates"], _turning(times, q)),
         "commands": commands,
         "thrusts": thrusts,
-        "saturated": (margin <= 1e-3 * span).any(axis=1),
+        "saturated": ((margin <= 1e-3 * span) & (span > 0.0)).any(axis=1),  # a dead rotor has no range
         "min_thrusts": nominal.min_thrusts,
         "max_thrusts": nominal.max_thrusts,
         "ends": times[-1],
