@@ -16,7 +16,7 @@ from aerobat.environment.obstacles import ConvexPiece
 from aerobat.planning import Plan
 from aerobat.planning.passages import as_passed
 from aerobat.problem.gate import Gate
-from aerobat.reporting.facts import Fact, Facts, facts, picture
+from aerobat.reporting.facts import Fact, Facts, facts, line, picture
 from aerobat.reporting.page import (
     AXIS,
     COLUMNS,
@@ -62,8 +62,8 @@ def _(comparison: Comparison) -> Iterator[Fact]:
     yield Fact("planners", [_row(comparison, entry) for entry in comparison.entries], "planners")
     for entry in comparison.entries:  # outcomes that are worth a sentence
         if entry.score is None or entry.score.outcome is not Outcome.COMPLETE:
-            yield Fact("", text=f"{_name(entry)}: {entry.outcome}")
-    yield from (Fact("", text=f"{_name(entry)}: {entry.note}") for entry in comparison.entries if entry.note)
+            yield line("", f"{_name(entry)}: {entry.outcome}")
+    yield from (line("", f"{_name(entry)}: {entry.note}") for entry in comparison.entries if entry.note)
 
 
 def _row(comparison: Comparison, entry: Entry) -> Facts:

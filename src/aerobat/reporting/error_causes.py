@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from aerobat.reporting.facts import Fact, Facts, facts, record
+from aerobat.reporting.facts import Fact, Facts, facts, line, record
 from aerobat.simulation.outcome import length
 from aerobat.studies.error_causes import ErrorCauses, TrialResult
 
@@ -23,11 +23,11 @@ def _(measured: ErrorCauses) -> Iterator[Fact]:
     plan, conditions = measured.none.plan, measured.none.trial.conditions.name
     vehicle = None if plan.vehicle is None else plan.vehicle.name
     name = "" if vehicle is None else f" · {vehicle}"
-    yield Fact("", text=f"{plan.problem.name}{name} · {conditions}, {len(measured)} flights a row")
+    yield line("", f"{plan.problem.name}{name} · {conditions}, {len(measured)} flights a row")
     yield from record(problem=plan.problem.name, vehicle=vehicle, conditions=conditions)
     yield from record(flights=len(measured), seed=measured.seed)
     yield Fact("causes", [Facts(_row(measured, result)) for result in measured.results], "causes")
-    yield Fact("", text=CAPTION)
+    yield line("", CAPTION)
 
 
 def _row(measured: ErrorCauses, result: TrialResult) -> Iterator[Fact]:

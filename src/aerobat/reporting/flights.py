@@ -38,7 +38,7 @@ def _(flight: Flight) -> Figure:
 @facts.register
 def _(score: Score) -> Iterator[Fact]:
     if score.is_batch:
-        yield Fact("", text=str(score))
+        yield line("", str(score))
         yield Fact("flights", Columns(_flights_of(score)))
         return
     yield from (fact for fact in fields_of(score) if fact.key not in EVENTS)
@@ -84,7 +84,7 @@ def _(passage: Passage) -> Iterator[Fact]:
 
 @facts.register
 def _(flight: Flight) -> Iterator[Fact]:
-    yield Fact("", text=str(flight))
+    yield line("", str(flight))
     yield Fact("rows", Columns(_rows_of(flight)))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.declaration import validated
-from aerobat.reporting.facts import Fact, Facts, facts, picture, record
+from aerobat.reporting.facts import Fact, Facts, facts, line, picture, record
 from aerobat.reporting.page import blank_page, column, heading, house_style
 from aerobat.reporting.style import BLUE, FAINT, INK, RED
 from aerobat.studies.inspection import CAUSES, ErrorShare, Inspection
@@ -29,7 +29,7 @@ def _(found: Inspection) -> Iterator[Fact]:
         time_s=found.time,
     )
     yield Fact("shares", found.shares, "shares")
-    yield from (Fact("", text=remark) for remark in found.remarks)
+    yield from (line("", remark) for remark in found.remarks)
     place = found.alignment
     yield from record(
         command_delay_s=found.delay,

@@ -168,7 +168,7 @@ def _(found: Certificate) -> Iterator[Fact]:
     Of all rotors' thrusts and commands, the table has those nearest to a limit; a gate that is passed as
     required has one row.
     """
-    yield Fact("", text="certificate")
+    yield line("", "certificate")
     yield from record(certified=found.certified, margin_n=found.margin, findings=found.findings)
     yield Fact("", _finding_rows(found.findings), "findings")
     yield Fact("why", found.why, text=("" if found.certified else "not certified: ") + found.why)

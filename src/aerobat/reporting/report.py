@@ -37,7 +37,7 @@ class Report:
 def _(report: Report) -> Iterator[Fact]:
     plan, trials = report.plan, report.trials
     name = None if plan.vehicle is None else plan.vehicle.name
-    yield Fact("", text=f"{plan.problem.name} · {name}: {_verdict(report)}", level=REPORT)
+    yield line("", f"{plan.problem.name} · {name}: {_verdict(report)}", level=REPORT)
     warnings = [] if plan.vehicle is None else implausibilities(plan.vehicle)
     yield from record(problem=plan.problem.name, vehicle=name, warnings=warnings)
     yield Fact("plan", plan, "plan")

@@ -12,7 +12,7 @@ from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
-from aerobat.reporting.facts import EXPLAIN, REPORT, WARNING, Fact, Facts, facts
+from aerobat.reporting.facts import EXPLAIN, REPORT, WARNING, Fact, Facts, facts, line
 
 HeadedFact = tuple[str, Fact]  # the heading that a fact stands under, and the fact
 
@@ -32,7 +32,7 @@ def table(result: Any, least: int = REPORT, most: int = EXPLAIN, title: str = ""
         if least <= fact.level <= most
     ]
     if title:
-        headed = [("", Fact("", text=title)), *(headed[1:] if headed and not headed[0][1].label else headed)]
+        headed = [("", line("", title)), *(headed[1:] if headed and not headed[0][1].label else headed)]
     return Group(*_parts(headed))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from aerobat.reporting.facts import NONE, Columns, Fact, Facts, facts, picture, record
+from aerobat.reporting.facts import NONE, Columns, Fact, Facts, facts, line, picture, record
 from aerobat.reporting.feasibility.figure import Kind, kinds_of, letter_of, map_figure
 from aerobat.studies.feasibility import Cell, Feasibility, FeasibilityMap, Requirement
 
@@ -20,7 +20,7 @@ def _(found: FeasibilityMap) -> Iterator[Fact]:
         down, across = found.axes
         title += f" · duration [s] over {down.label} (down) and {across.label} (across)"
     yield Fact("table", Columns(found.table))
-    yield Fact("", text=title)
+    yield line("", title)
     yield from record(problem=found.problem.name, vehicle=found.vehicle.name)
     yield from record(over={axis.name: axis.values for axis in found.axes})
     yield from record(units={axis.name: axis.unit for axis in found.axes})
@@ -28,7 +28,7 @@ def _(found: FeasibilityMap) -> Iterator[Fact]:
     yield Fact("cells", [_cell(found, cell) for cell in found.cells], "" if is_grid else "cells")
     if is_grid:
         yield Fact("", _grid(found), "grid")
-        yield from (Fact("", text=_legend(found, kind)) for kind in kinds_of(found).values())
+        yield from (line("", _legend(found, kind)) for kind in kinds_of(found).values())
 
 
 picture.register(FeasibilityMap, map_figure)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import starmap
 from math import isfinite
 
@@ -32,13 +31,14 @@ WIDTHS = (0.01, 0.02, 0.05, 0.1)  # [m] off a gate's centre
 def _(sweep: Sweep) -> Iterator[Fact]:
     problem, vehicle, conditions = sweep.plan.problem, sweep.vehicle.name, sweep.conditions.name
     yield Fact("table", Columns(sweep.table))
-    yield Fact("", text=f"{problem.name} · {vehicle} · {conditions}")
+    yield line("", f"{problem.name} · {vehicle} · {conditions}")
     yield from record(problem=problem.name, vehicle=vehicle, conditions=conditions, seed=sweep.seed)
     yield Fact("flights", len(sweep), "flights", f"{len(sweep)}, seed {sweep.seed}")
     yield Fact("went_well", sweep.success, "went well", str(sweep.success))
     yield Fact("judged_by", criterion(problem), "judged by")
     yield Fact("outcomes", Facts(starmap(_outcome, sweep.outcomes.items())))
-    yield Fact("errors", Facts(_quantiles(sweep, column, name) for column, name in ERRORS), "error")
+    errors = (_quantiles(sweep, column, column, label) for column, label in ERRORS)
+    yield Fact("errors", Facts(errors), "error")
     if CLEARANCE in sweep.table:
         yield Fact("nearest", Facts(_nearest(sweep)))
     passages = (Fact(name, Facts(_passage(sweep, name)), name) for name in sweep.passages)
@@ -63,11 +63,11 @@ def _outcome(outcome: Outcome, share: Share) -> Fact:
 def _passage(sweep: Sweep, name: str) -> Iterator[Fact]:
     passed = sweep.passed(name)
     yield Fact("passed", passed, "passed", str(passed))
-    yield replace(_quantiles(sweep, f"{name}_miss_m", "off its centre"), key="miss_m")
-    attitude = replace(_quantiles(sweep, f"{name}_attitude_error_deg", "attitude"), key="attitude_error_deg")
+    yield _quantiles(sweep, f"{name}_miss_m", "miss_m", "off its centre")
+    attitude = _quantiles(sweep, f"{name}_attitude_error_deg", "attitude_error_deg", "attitude")
     planned = planned_passages(sweep.plan.stages, sweep.plan.problem)
-    asked = {each.gate.name for each in planned if isfinite(each.attitude_tolerance)}
-    yield attitude if sweep.passages[name].name in asked else replace(attitude, label="", text=None)
+    required = {each.gate.name for each in planned if isfinite(each.attitude_tolerance)}
+    yield attitude if sweep.passages[name].name in required else Fact(attitude.key, attitude.value)
     shares = {width: sweep.within(f"{name}_miss_m", width) for width in WIDTHS}
     text = ", ".join(f"{length(width)} {shares[width]}" for width in WIDTHS[1:3])
     rows = [Facts((Fact("miss_m", width), *facts(share))) for width, share in shares.items()]
@@ -88,7 +88,7 @@ def _nearest(sweep: Sweep) -> Iterator[Fact]:
     yield line("nearest", f"'{obstacle}', {apart}, {length(middle)} at the median")
 
 
-def _quantiles(sweep: Sweep, column: str, label: str) -> Fact:
+def _quantiles(sweep: Sweep, column: str, key: str, label: str) -> Fact:
     """Return the quantiles of a column in its unit; None where one falls on flights that did not pass."""
     values = {level: sweep.quantile(column, level) for level in LEVELS}
     texts = [
@@ -96,7 +96,7 @@ def _quantiles(sweep: Sweep, column: str, label: str) -> Fact:
         for level, value in values.items()
     ]
     named = {f"{100 * level:g}%": value for level, value in values.items()}
-    return Fact(column, named, label, ", ".join(texts))
+    return Fact(key, named, label, ", ".join(texts))
 
 
 def _shown(value: float, column: str) -> str:
