@@ -17,9 +17,9 @@ from aerobat.errors import SpecError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-REPORT, EXPLAIN = 0, 1  # levels: the lines of a run's report; all that there is to tell
-WARNING = "warning"  # the label of facts that a table tells last
-NONE = "–"  # in place of a number that there is not
+REPORT, EXPLAIN = 0, 1  # levels of facts: the lines of a run's report, and all others
+WARNING = "warning"  # the label of facts that stand last in a table
+NONE = "–"  # in place of a missing number
 
 # the packages of results, each with the module of their facts, imported with the first result
 TOLD_IN = {

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COMPONENTS = {3: AXES, 4: "wxyz"}  # of vectors and quaternions
-# numbers of a score that its sentence is made of
+# fields of a score that only its sentence needs
 EVENTS = ("stop", "is_finite", "ground_time", "off_path_time", "contact", "contact_time", "path_radius_m")
 
 

@@ -14,7 +14,7 @@ from aerobat.reporting.facts import picture
 from aerobat.reporting.page import png as png_of
 from aerobat.reporting.tables import table
 
-COLUMNS = 120  # letters to a line of a table
+COLUMNS = 120  # letters in a line of a table
 PRE = '<pre style="line-height: 1.3; overflow-x: auto">{code}</pre>'
 KEPT = 8  # cached pictures: notebooks request each one twice
 

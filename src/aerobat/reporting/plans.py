@@ -32,10 +32,10 @@ from aerobat.simulation.outcome import length
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SMALL = 1e-4  # [m]: smaller errors mean nothing in a simulation that knows the vehicle
+SMALL = 1e-4  # [m] smaller errors of a simulation with a known vehicle have no meaning
 ENOUGH_MARGIN = 0.05  # of a rotor's thrust: with less, few real flights succeed
 MORE_MARGIN = "--pass 0.95, which keeps as much as flights need"
-SEVERAL_TIMES = 2.0  # times the shortest possible: no percentage beyond
+SEVERAL_TIMES = 2.0  # ratio to the lower bound above which no percentage is given
 
 
 @picture.register(Plan)

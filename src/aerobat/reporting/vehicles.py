@@ -17,10 +17,10 @@ from aerobat.states import STANDARD_GRAVITY
 from aerobat.vehicle import Rotor, Vehicle, implausibilities
 from aerobat.vehicle.fleet import Fleet
 
-MIN_THRUST_TO_WEIGHT = 1.5  # [-] with less, hardly any maneuver is left beside staying up
-MAX_HOVER = 0.7  # [-] of a rotor's thrust in a hover; with more, nothing is left to turn by
-MIN_BANDWIDTH = 5.0  # [rad/s] of the attitude loop: slower ones fall in the time in which they turn
-_NAMED = 1e-6  # [m] from an axis, where a rotor is neither to one side nor to the other
+MIN_THRUST_TO_WEIGHT = 1.5  # [-] with less, hardly any thrust is left for maneuvers
+MAX_HOVER = 0.7  # [-] of a rotor's thrust in a hover; with more, little is left for rotation
+MIN_BANDWIDTH = 5.0  # [rad/s] of the attitude loop; a vehicle with less falls while it turns
+_NAMED = 1e-6  # [m] distance from an axis below which a rotor is on neither side
 
 
 @facts.register

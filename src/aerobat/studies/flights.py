@@ -23,8 +23,8 @@ from aerobat.vehicle import Vehicle
 CHUNK = 50  # flights that are flown, kept and resumed as a unit, whatever the batches and the workers
 CHUNKS_PER_GROUP = 40  # largest number of chunks sent to a worker at once: a second of flying
 # Numbers of flights after which the share is tested; flying stops at the first decision (sequential test).
-# Each test errs with probability 2.5 % at most. All tests together err with 4 % at a true probability of 95
-# %, and with 0.6 % at 94 %. At 98 %, 340 flights are flown on average, and 3 of 1000 plans stay undecided.
+# Each test errs with probability 2.5 % at most. All tests together err with 4 % at a true probability of
+# 95 %, and with 0.6 % at 94 %. At 98 %, 340 flights are flown on average, and 3 of 1000 plans stay undecided.
 LOOKS = (100, 200, 400, 800)
 Flights = Annotated[int, Field(ge=1, le=10**6, description="whole number from 1 to a million")]
 

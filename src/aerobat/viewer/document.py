@@ -24,7 +24,7 @@ SCRIPTS = ("arrays.js", "models.js", "world.js", "cameras.js", "plots.js", "play
 OWN_ORIGIN = (
     "; connect-src 'self'; img-src 'self' data:"  # what a live page may ask beyond one that is a file
 )
-MARK = '<meta name="generator" content="aerobat replay">'  # by which such a page is known
+MARK = '<meta name="generator" content="aerobat replay">'  # identifies a replay page
 PLACE = re.compile("@@([a-z]+)@@")
 DIGITS = 32767.0  # of 16-bit integers: attitudes to 0.004°
 

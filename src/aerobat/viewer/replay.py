@@ -16,7 +16,7 @@ from aerobat.viewer.document import MARK, document
 from aerobat.viewer.scene import Scene, scene_of
 
 INLINE_HEIGHT = 640  # [px] of a page in a notebook
-HEAD = 1000  # characters of a page in which it says what it is
+HEAD = 1000  # first characters of a page, which include MARK
 
 
 @dataclass(frozen=True, repr=False)

@@ -24,13 +24,13 @@ from aerobat.vehicle import Vehicle
 
 Rows = NDArray[np.intp]
 
-PLAN_RATE = 250.0  # [1/s] rows of a plan that nobody flew
+PLAN_RATE = 250.0  # [1/s] rows of a plan without a flight
 MAX_ROWS = 4000  # of a flight: 60 s are then shown at 67 rows a second
 MAX_POSES = 36_000  # of all flights together, so that a page of many stays under 2 MB
 MAX_FLIGHTS = 100
-FEW_STAGES = 4  # fewer are joined by ghosts between them,
-GHOSTS = 8  # at equal steps of time
-SAME_PATH = 1e-6  # [m] by which set-points may miss the path that they are of
+FEW_STAGES = 4  # with fewer, there are ghosts between the stages,
+GHOSTS = 8  # at so many equal steps of time
+SAME_PATH = 1e-6  # [m] largest distance of set-points from their path
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,8 @@ from aerobat.simulation.outcome import length
 from aerobat.trajectory import Trajectory
 from aerobat.trajectory.piecewise import TIME_TOLERANCE
 
-PARTS = 16  # of the time between two rows, at whose ends attitudes are compared; errs by some percent
-ROWS_AT_ONCE = 2000  # whose attitudes are compared together, in some tens of megabytes
+PARTS = 16  # of the time between two rows; attitudes are compared at their ends, with some percent of error
+ROWS_AT_ONCE = 2000  # rows that are compared together, in some tens of megabytes
 STRAIGHT = "straight lines between rows"
 HELD = "each row held until the next"
 

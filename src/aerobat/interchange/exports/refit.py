@@ -18,8 +18,8 @@ from aerobat.trajectory import Trajectory
 from aerobat.trajectory.polynomial import differentiate, evaluate, hermite
 
 DEGREE = 7
-PLACES = 8  # times the number of pieces: the number of places where pieces may end
-SAMPLES = 4  # of the error between two such places
+PLACES = 8  # number of places where pieces may end, as a multiple of the number of pieces
+SAMPLES = 4  # samples of the error between two such places
 
 
 def refit(trajectory: Trajectory, pieces: int) -> Trajectory:

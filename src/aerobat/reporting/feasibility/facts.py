@@ -8,7 +8,7 @@ from aerobat.reporting.facts import NONE, Columns, Fact, Facts, facts, line, pic
 from aerobat.reporting.feasibility.figure import Kind, kinds_of, letter_of, map_figure
 from aerobat.studies.feasibility import Cell, Feasibility, FeasibilityMap, Requirement
 
-WIDE = 14  # values across: of more, letters alone fit
+WIDE = 14  # values across, above which cells have only letters
 
 
 @facts.register

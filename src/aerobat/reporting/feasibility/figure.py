@@ -27,8 +27,8 @@ FILLS = {  # of cells without a plan that flies
     Feasibility.REFUSED: HAIR,
     Feasibility.NO_ANSWER: PAPER,
 }
-WIDTH = 9.6  # [in] of a grid, about
-ROW = 0.2  # [in] of the legend
+WIDTH = 9.6  # [in] about the width of a grid
+ROW = 0.2  # [in] height of a line of the legend
 
 
 @validated

@@ -13,11 +13,11 @@ from aerobat.planning import Plan
 from aerobat.reporting.scene.camera import Camera
 from aerobat.vehicle import Vehicle
 
-FEWEST = 5  # keyframes shown; where a maneuver has fewer stages, equal steps of time join them
+FEWEST = 5  # stages; if a maneuver has fewer, equal steps of time are added
 STEPS = 8
 ROUND_HEADING = 15.0  # [deg]
-UPRIGHT = 0.1  # of a thrust: with less across the vertical it lies in any vertical plane
-THIN = 0.02  # of a path's extent: what spreads less to its sides lies in a plane
+UPRIGHT = 0.1  # horizontal part of a thrust below which it counts as vertical
+THIN = 0.02  # of a path's extent, largest spread of a path that lies in a plane
 
 
 @dataclass(frozen=True)

@@ -37,14 +37,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 POSES = 20  # time steps at which the vehicle is drawn, fewer where it would cover itself
-SIZE = 0.085  # of the vehicle as drawn, relative to the path's extent
-CLEAR = 0.5  # of the distance between two gates, in each of which a vehicle is drawn: at most so large
-GHOSTS = 6  # one of so many drawn vehicles has all that moves beside it, where it is then
-MARKED = 3  # of so many gaps between drawn vehicles one has an arrowhead
-DIRECTION = 0.03  # of an arrowhead, likewise
-BELOW = 0.06  # by which a reference path is drawn under an actual one, relative to its extent
+SIZE = 0.085  # size of the drawn vehicle, relative to the extent of the path
+CLEAR = 0.5  # largest size of the drawn vehicle, relative to the distance of two gates
+GHOSTS = 6  # one in so many drawn vehicles has the moving obstacles of its time beside it
+MARKED = 3  # one in so many gaps between drawn vehicles has an arrowhead
+DIRECTION = 0.03  # length of an arrowhead, relative to the extent of the path
+BELOW = 0.06  # depth of a reference path under an actual one, relative to its extent
 ACTUAL_WIDTH, REFERENCE_WIDTH = 1.3, 4.0  # [pt]
-ALONE_WIDTH = 1.6  # [pt] of a reference path that nobody flew
+ALONE_WIDTH = 1.6  # [pt] of a reference path without a flight
 
 
 def draw_path(

@@ -30,15 +30,15 @@ from aerobat.vehicle import Vehicle
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-VEHICLE = 0.6  # [in] a vehicle, about
-MOST_STAGES = 11  # that follow one another legibly
+VEHICLE = 0.6  # [in] about the size of a vehicle
+MOST_STAGES = 11  # largest number of stages in a legible row
 STAGE_ROW = 0.5  # [in] kept free for names at the foot of a wide panel
-STAGE_WIDTH = 1.1  # [in] of a stage with what is told of it, side by side with others
-LETTER, LEAST_NAME = 0.082, 0.62  # [in] that a stage's name takes by the letter, and at least
-# [pt] from a hair line's end to the text, for each alignment of it
+STAGE_WIDTH = 1.1  # [in] width of a stage with its name in a row
+LETTER, LEAST_NAME = 0.082, 0.62  # [in] width of a letter of a stage's name, and least width of a name
+# [pt] from the end of a thin line to the text, by the alignment of the text
 GAPS = {"right": (-2.88, 0.0), "left": (2.88, 0.0), "center": (0.0, -2.88)}
 COMPONENTS = np.eye(2)  # lateral, vertical
-KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s²] that a key may show
+KEYS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])  # [m/s²] thrusts that a key may show
 
 
 def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:

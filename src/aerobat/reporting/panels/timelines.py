@@ -22,12 +22,12 @@ from aerobat.vehicle import Vehicle
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-NEAR, FAR = 0.5, 1e4  # [m] within which obstacles are looked for first, and at last
+NEAR, FAR = 0.5, 1e4  # [m] first and last distance within which the nearest obstacle is searched
 SPIN_RAMPS = {1: ("#00315f", "#6fa3d4"), -1: ("#1c2b39", "#8b97a3")}  # dark to light, by the sense of turning
 LIMIT: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
-REACH = 1.0  # by how many times the limits' distance an axis extends beyond them, at most
+REACH = 1.0  # largest extent of an axis beyond limits, relative to the distance between these
 LENGTHS = (("m", 1.0), ("cm", 1e-2))
-NAME_WIDTH, LETTER = 0.36, 0.065  # [in] that a stage's name takes at least, and by the letter
+NAME_WIDTH, LETTER = 0.36, 0.065  # [in] least width of a stage's name, and width of a letter
 
 
 def draw_clearance(axes: Axes, poses: PoseHistory, vehicle: Vehicle, pieces: Pieces) -> None:

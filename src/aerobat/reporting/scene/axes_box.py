@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 MIN_SIDE = np.array([0.22, 0.22, 0.12])  # of a box, relative to its longest
 ROUND = np.array([1.0, 2.0, 5.0])
-# [in] for the scales: left of a box and below it, right of it and above
+# [in] margins for the scales: left of a box and below it, right of it and above it
 BOX_MARGINS = np.array([[0.5, 0.5], [0.3, 0.2]])
 NUMBERS = 0.15  # [in] from an edge to the numbers along it
-DIGIT = 0.07  # [in] the width of one
+DIGIT = 0.07  # [in] width of a digit
 
 
 @dataclass(frozen=True, eq=False)

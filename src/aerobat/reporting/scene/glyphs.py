@@ -17,11 +17,11 @@ from aerobat.vehicle import Vehicle
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 19)
 CIRCLE = np.stack([np.cos(TURN), np.sin(TURN), np.zeros_like(TURN)], axis=-1)
-LIGHT = np.array([0.3, -0.5, 0.81])  # where light comes from in shaded pictures
+LIGHT = np.array([0.3, -0.5, 0.81])  # direction toward the light in shaded pictures
 DARK, BRIGHT = "#8f6a12", "#f0c964"  # the darkest and the lightest side of a bar
 SEEN_FROM_ABOVE: Colour = (BLUE, 0.45)
 SEEN_FROM_BELOW: Colour = ("white", 0.9)
-# forward and left, relative to its length: a barb, closed
+# corners of an arrowhead, forward and left, relative to its length
 ARROWHEAD = np.array([[0.6, 0.0], [-0.4, 0.38], [-0.2, 0.0], [-0.4, -0.38], [0.6, 0.0]])
 ENLARGEMENTS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)
 

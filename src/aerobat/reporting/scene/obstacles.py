@@ -15,8 +15,8 @@ from aerobat.reporting.scene.glyphs import LIGHT
 from aerobat.reporting.scene.shapes import Shape
 from aerobat.reporting.style import FAINT, MUTED
 
-GLASS, DARKEST = 0.42, 0.12  # opacity of a face that is turned from the light, and toward it
-CELLS = 12  # to which the longest side of what is shown is cut: each is before or behind a path as a whole
+GLASS, DARKEST = 0.42, 0.12  # opacity of a face away from the light, and of a face toward it
+CELLS = 12  # along the longest side of all surfaces: each cell is wholly before or behind a path
 
 
 def surfaces_beside(

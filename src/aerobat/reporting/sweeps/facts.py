@@ -18,7 +18,7 @@ from aerobat.studies.sweep import Share, Sweep
 from aerobat.studies.sweep.flights import CLEARANCE, NEAREST
 from aerobat.studies.sweep.result import LEVELS
 
-ERRORS = (  # columns of the table, and what people call them
+ERRORS = (  # columns of the table, with their labels
     ("max_position_error_m", "position, max"),
     ("rms_position_error_m", "position, RMS"),
     ("max_attitude_error_deg", "attitude, max"),

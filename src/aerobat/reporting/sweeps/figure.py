@@ -41,7 +41,7 @@ GATE_PITCH = GATE + AXIS + TITLES  # [in] from one to the next
 BAR = 0.36  # [in] an outcome's height
 NAMES = 1.05  # [in] the width of their names
 CURVES = 1.3  # [in] the height of the distributions
-SEEN = 4.0  # times what 95 % of flights keep within: as far axes reach, however far a lost one strays
+SEEN = 4.0  # largest extent of an axis, relative to the error that 95 % of flights keep within
 
 
 @validated

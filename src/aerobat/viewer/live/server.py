@@ -19,12 +19,12 @@ from aerobat.errors import SpecError
 from aerobat.viewer.live.replan import Answer, Desk
 
 HOST = "127.0.0.1"
-MAX_CONNECTIONS = 64  # at a time, each with a thread: half of the files that the smallest shells let be open
-MAX_WAITING = 1024  # connections beyond, which the system keeps until there is room
-GRACE = 0.1  # [s] for the first line of a question, and for the rest, where others wait for the place
-PATIENCE = 10.0  # [s] for both where nobody waits, and for taking the answer
+MAX_CONNECTIONS = 64  # each has a thread; half of the open files that the smallest shells allow
+MAX_WAITING = 1024  # further connections, which the system queues
+GRACE = 0.1  # [s] for the first line of a question, and for the rest, while other connections wait
+PATIENCE = 10.0  # [s] for both while no other connection waits, and for receiving the answer
 MAX_QUESTION = 100_000  # bytes: a few numbers for each gate
-MAX_NAME = 100  # letters of a page's name for itself
+MAX_NAME = 100  # letters of the name that a page gives itself
 JSON = "application/json"
 HTML = "text/html; charset=utf-8"
 BROKEN = Answer("Broken", "Aerobat failed at this, which is its fault; the terminal says where.", False)

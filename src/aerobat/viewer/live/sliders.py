@@ -21,12 +21,12 @@ from aerobat.so3 import UP
 from aerobat.studies.lens import lens
 from aerobat.vehicle import Vehicle
 
-LEAST_REACH = 0.5  # [m] to either side, by which a gate can be moved
-STEPS = 40  # of a slider's range, or more: its step is round
+LEAST_REACH = 0.5  # [m] least distance by which a gate can be moved to either side
+STEPS = 40  # least number of steps of a slider, whose step is a round number
 ORDERS = range(3, 6)  # jerk, snap, crackle
-THRUST_TO_WEIGHT = (1.2, 8.0)  # from what hardly climbs to racing quadrotors
-MAX_OBSTACLES = 12  # that have sliders: more are a page that nobody reads
-PLACES = ("position", "start", "end", "origin", "points")  # fields of obstacles that say where they stand
+THRUST_TO_WEIGHT = (1.2, 8.0)  # from vehicles that hardly climb to racing quadrotors
+MAX_OBSTACLES = 12  # largest number of obstacles with sliders
+PLACES = ("position", "start", "end", "origin", "points")  # fields of obstacles with their place
 MAX_DISPERSION = 3.0  # times the conditions: most maneuvers fail well before
 
 

@@ -20,8 +20,8 @@ from aerobat.viewer.live.server import HOST, LiveServer
 from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.replay import inline_frame
 
-VEHICLE = "agile-quad"  # where nobody names one
-TICK = 0.5  # [s] of waiting at a time: not every system lets Ctrl-C end a longer one
+VEHICLE = "agile-quad"  # the default
+TICK = 0.5  # [s] longest wait: not every system lets Ctrl-C end a longer one
 
 Port = Annotated[int, Field(ge=0, le=65535, description="whole number from 0 to 65535")]
 
