@@ -169,9 +169,8 @@ class MovingPicture:
 
     def _vehicle(self, position: Array, q_world_body: Array, opacity: float = 1.0) -> list[Shape]:
         """Return the vehicle's glyph."""
-        face = side_face(q_world_body, self._camera)
-        if not isinstance(face, str):
-            face = face[0], opacity * face[1]
+        colour, own = side_face(q_world_body, self._camera)
+        face = colour, opacity * own
         shapes = vehicle_shapes(self._subject.vehicle, position, q_world_body, self._scale, face)
         if opacity == 1.0:
             return shapes

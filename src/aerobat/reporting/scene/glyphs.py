@@ -19,8 +19,6 @@ TURN = np.linspace(0.0, 2.0 * np.pi, 19)
 CIRCLE = np.stack([np.cos(TURN), np.sin(TURN), np.zeros_like(TURN)], axis=-1)
 LIGHT = np.array([0.3, -0.5, 0.81])  # direction toward the light in shaded pictures
 DARK, BRIGHT = "#8f6a12", "#f0c964"  # the darkest and the lightest side of a bar
-SEEN_FROM_ABOVE: Colour = (BLUE, 0.45)
-SEEN_FROM_BELOW: Colour = ("white", 0.9)
 # corners of an arrowhead, forward and left, relative to its length
 ARROWHEAD = np.array([[0.6, 0.0], [-0.4, 0.38], [-0.2, 0.0], [-0.4, -0.38], [0.6, 0.0]])
 ENLARGEMENTS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)
@@ -73,9 +71,10 @@ def thrust_axis_shape(vehicle: Vehicle, position: Array, q_world_body: Array, sc
     return Shape(np.array([position, tip]), edge=INK, width=0.9)
 
 
-def side_face(q_world_body: Array, camera: Camera) -> Colour:
+def side_face(q_world_body: Array, camera: Camera) -> tuple[str, float]:
     """Return the face of discs: blue seen from above, white from below, which shows inverted flight."""
-    return SEEN_FROM_ABOVE if float(so3.thrust_axis(q_world_body) @ camera.toward) >= 0.0 else SEEN_FROM_BELOW
+    is_from_above = float(so3.thrust_axis(q_world_body) @ camera.toward) >= 0.0
+    return (BLUE, 0.45) if is_from_above else ("white", 0.9)  # with their opacities
 
 
 def direction_marks(path: Array, rows: Sequence[int], camera: Camera, size: float) -> list[Shape]:

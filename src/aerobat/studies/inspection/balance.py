@@ -23,8 +23,8 @@ _MIN_EXPLAINED = (
 
 def balance_fault(flight: Flight, vehicle: Vehicle) -> Fault | None:
     """Return the offset of the centre of mass that a log shows, None where it shows none."""
-    needed, given = moments_between_rows(flight, vehicle)
-    roll, pitch, _ = (needed - given).T
+    needed, applied = moments_between_rows(flight, vehicle)
+    roll, pitch, _ = (needed - applied).T
     missing, collective = np.stack([pitch, -roll]), between_rows(flight.thrusts).sum(axis=1)
     place = missing @ collective / np.sum(collective**2)
     rest = np.sum((missing - place[:, None] * collective) ** 2)

@@ -34,7 +34,7 @@ def inertia_fault(flight: Flight, vehicle: Vehicle, unmodelled: Array) -> Fault 
     """
     if flight.engine == LOG_OF_COMMANDS:  # rotors that lag more would seem to turn a larger inertia
         return None
-    needed, given = moments_between_rows(flight, vehicle)
+    needed, applied = moments_between_rows(flight, vehicle)
     thrust = between_rows(flight.thrusts).sum(axis=1)
     along = np.sum(unmodelled * between_rows(so3.thrust_axis(flight.q_world_body)), axis=1)
     mass = _factor(thrust, thrust + vehicle.mass * along)
@@ -42,7 +42,7 @@ def inertia_fault(flight: Flight, vehicle: Vehicle, unmodelled: Array) -> Fault 
     least = _MIN_EXCITATION * arm * vehicle.thrust_ranges.max()
     off = []
     for axis, name in enumerate(("roll", "pitch")):
-        moment, turning = (_without(each[:, axis], thrust) for each in (given, needed))
+        moment, turning = (_without(each[:, axis], thrust) for each in (applied, needed))
         if np.sqrt(np.mean(moment**2)) < least or not _explains(moment, turning):
             continue
         factor = _factor(moment, turning)
@@ -51,9 +51,9 @@ def inertia_fault(flight: Flight, vehicle: Vehicle, unmodelled: Array) -> Fault 
     return Fault("inertia", f"the inertia is {' and '.join(off)}") if off else None
 
 
-def _factor(given: Array, needed: Array) -> float:
-    """Return the factor with which `needed` is `given`; noise of `needed` alone does not bias the factor."""
-    return float(given @ given / max(given @ needed, 1e-12 * (given @ given)))
+def _factor(applied: Array, needed: Array) -> float:
+    """Return κ of applied = κ needed by regression, which noise of `needed` alone does not bias."""
+    return float(applied @ applied / max(applied @ needed, 1e-12 * (applied @ applied)))
 
 
 def _without(values: Array, thrust: Array) -> Array:
@@ -61,8 +61,8 @@ def _without(values: Array, thrust: Array) -> Array:
     return np.asarray(values - thrust * (values @ thrust) / (thrust @ thrust))
 
 
-def _explains(given: Array, needed: Array) -> bool:
-    return bool(given @ needed > np.sqrt(_MIN_EXPLAINED * (given @ given) * (needed @ needed)))
+def _explains(applied: Array, needed: Array) -> bool:
+    return bool(applied @ needed > np.sqrt(_MIN_EXPLAINED * (applied @ applied) * (needed @ needed)))
 
 
 def _differs(factor: float, other: float) -> bool:
