@@ -15,9 +15,6 @@ from aerobat.vehicle import Vehicle
 
 FEWEST = 5  # stages; if a maneuver has fewer, equal steps of time are added
 STEPS = 8
-ROUND_HEADING = 15.0  # [deg]
-UPRIGHT = 0.1  # horizontal part of a thrust below which it counts as vertical
-THIN = 0.02  # of a path's extent, largest spread of a path that lies in a plane
 
 
 @dataclass(frozen=True)
@@ -37,7 +34,7 @@ class ManeuverPlane:
 
     def of_thrust(self, thrust: Array) -> ManeuverPlane:
         """Return the vertical plane that holds a specific thrust (3,); for a vertical thrust, this one."""
-        if np.linalg.norm(thrust[:2]) < UPRIGHT * np.linalg.norm(thrust):
+        if np.linalg.norm(thrust[:2]) < 0.1 * np.linalg.norm(thrust):
             return self
         return ManeuverPlane(round(float(np.rad2deg(np.arctan2(thrust[1], thrust[0]))), 0))
 
@@ -139,13 +136,13 @@ def maneuver_plane(plan: Plan, thrust: Array) -> ManeuverPlane:
         axis_deg = round(float(np.rad2deg(np.arctan2(axis[1], axis[0]))), 9)
         return ManeuverPlane(axis_deg - 90.0)
     heading_deg, _ = _main_direction(thrust)
-    return ManeuverPlane(ROUND_HEADING * round(heading_deg / ROUND_HEADING))
+    return ManeuverPlane(15.0 * round(heading_deg / 15.0))
 
 
 def plane_of(points: Array) -> ManeuverPlane | None:
     """Return the vertical plane that holds points (n, 3); None where there is no such plane."""
     heading_deg, spread = _main_direction(points)
-    if spread > THIN * np.ptp(points, axis=0).max():
+    if spread > 0.02 * np.ptp(points, axis=0).max():
         return None
     return ManeuverPlane(round(heading_deg, 1))
 

@@ -38,10 +38,6 @@ if TYPE_CHECKING:
 
 POSES = 20  # time steps at which the vehicle is drawn, fewer where it would cover itself
 SIZE = 0.085  # size of the drawn vehicle, relative to the extent of the path
-CLEAR = 0.5  # largest size of the drawn vehicle, relative to the distance of two gates
-GHOSTS = 6  # one in so many drawn vehicles has the moving obstacles of its time beside it
-MARKED = 3  # one in so many gaps between drawn vehicles has an arrowhead
-DIRECTION = 0.03  # length of an arrowhead, relative to the extent of the path
 BELOW = 0.06  # depth of a reference path under an actual one, relative to its extent
 ACTUAL_WIDTH, REFERENCE_WIDTH = 1.3, 4.0  # [pt]
 ALONE_WIDTH = 1.6  # [pt] of a reference path without a flight
@@ -71,13 +67,13 @@ def draw_path(
     """
     vehicle, stages = subject.vehicle, subject.stages
     gates, poses = as_passed(subject.gates, stages), actual[0] if actual else reference
-    scale = enlargement(vehicle, min(size * reference.extent, CLEAR * _least_distance(gates)))
+    largest = min(size * reference.extent, 0.5 * _least_distance(gates))  # in each gate a vehicle is drawn
+    scale = enlargement(vehicle, largest)
     reach = scale * span(vehicle)
     rows, step = pose_samples(poses, reach, gates)
     paths = [each.path for each in (reference, *actual)]
-    surfaces, points = surfaces_beside(
-        subject.pieces, [*paths, gate_corners(gates)], poses.times[rows[::GHOSTS]]
-    )
+    times = poses.times[rows[::6]]  # at which moving obstacles are drawn
+    surfaces, points = surfaces_beside(subject.pieces, [*paths, gate_corners(gates)], times)
     box, camera = draw_box_around(axes, points, 0.6 * reach, reference.path, gates)
     floor = float(box.lower[2])
     shapes = _path_shapes(reference, actual, floor) + obstacle_shapes(surfaces, camera)
@@ -90,7 +86,7 @@ def draw_path(
         shapes.append(thrust_axis_shape(vehicle, position, q, scale))
         shapes += vehicle_shapes(vehicle, position, q, scale, side_face(q, camera))
     between = [(a + b) // 2 for a, b in pairwise(rows)]
-    shapes += direction_marks(poses.position, between[1::MARKED], camera, DIRECTION * reference.extent)
+    shapes += direction_marks(poses.position, between[1::3], camera, 0.03 * reference.extent)
     draw_depth_sorted(axes, shapes, camera)
     axes.plot([], [], color=BAND, linewidth=REFERENCE_WIDTH if actual else ALONE_WIDTH, label="reference")
     if actual:

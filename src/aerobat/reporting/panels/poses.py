@@ -14,9 +14,6 @@ from aerobat.problem.gate import Gate
 from aerobat.simulation import Flight
 from aerobat.vehicle import Vehicle
 
-VERTICES = 240  # of a drawn path
-FAR = 0.5  # of the reference path's extent: a flight is drawn until its error is larger
-
 
 @dataclass(frozen=True, eq=False)
 class PoseHistory:
@@ -28,8 +25,8 @@ class PoseHistory:
 
     @property
     def path(self) -> Array:
-        """The path with few vertices [m], (n, 3)."""
-        stride = max(1, len(self.times) // VERTICES)
+        """The path with 480 vertices at most [m], (n, 3)."""
+        stride = max(1, len(self.times) // 240)
         return np.concatenate([self.position[:-1:stride], self.position[-1:]])
 
     @property
@@ -47,9 +44,9 @@ class PoseHistory:
         return [int(np.linalg.norm(self.position - gate.position, axis=-1).argmin()) for gate in gates]
 
     def until_astray(self, reference: PoseHistory) -> PoseHistory:
-        """Return the poses until they are far from the reference's, which has the same times."""
+        """Return the poses until their error exceeds half of the reference's extent, at the same times."""
         error = np.linalg.norm(self.position - reference.position, axis=-1)
-        stray = np.flatnonzero(error > FAR * max(reference.extent, 1.0))
+        stray = np.flatnonzero(error > 0.5 * max(reference.extent, 1.0))
         end = max(int(stray[0]), 2) if len(stray) else len(self.times)
         return PoseHistory(self.times[:end], self.position[:end], self.q_world_body[:end])
 

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 VEHICLE = 0.6  # [in] about the size of a vehicle
 MOST_STAGES = 11  # largest number of stages in a legible row
 STAGE_ROW = 0.5  # [in] kept free for names at the foot of a wide panel
-STAGE_WIDTH = 1.1  # [in] width of a stage with its name in a row
-LETTER, LEAST_NAME = 0.082, 0.62  # [in] width of a letter of a stage's name, and least width of a name
+LETTER = 0.082  # [in] width of a letter of a stage's name
 # [pt] from the end of a thin line to the text, by the alignment of the text
 GAPS = {"right": (-2.88, 0.0), "left": (2.88, 0.0), "center": (0.0, -2.88)}
 COMPONENTS = np.eye(2)  # lateral, vertical
@@ -48,7 +47,7 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
     the vertical plane of its own thrust. Maneuvers that stay in place or leave the plane have such stages.
     """
     width, height = size_of(axes)
-    most = MOST_STAGES if height >= width else min(MOST_STAGES, int(width / STAGE_WIDTH))
+    most = MOST_STAGES if height >= width else min(MOST_STAGES, int(width / 1.1))  # [in] with their names
     whole = plan_keyframes(plan, vehicle)
     letters = int(width / (3 if height >= width else min(len(whole.instants), most)) / LETTER)
     shots = whole.shortened(letters)
@@ -82,7 +81,7 @@ def draw_stages(axes: Axes, plan: Plan, vehicle: Vehicle) -> str:
 
 def _column(shots: Keyframes) -> float:
     """Return the width [in] of a name, at either side of a tall panel and in the row below a wide one."""
-    return max(LEAST_NAME, LETTER * max(len(keyframe.name) for keyframe in shots.instants))
+    return max(0.62, LETTER * max(len(keyframe.name) for keyframe in shots.instants))
 
 
 def _is_crowded(shots: Keyframes, camera: Camera, distance: float) -> bool:

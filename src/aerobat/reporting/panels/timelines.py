@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 NEAR, FAR = 0.5, 1e4  # [m] first and last distance within which the nearest obstacle is searched
-SPIN_RAMPS = {1: ("#00315f", "#6fa3d4"), -1: ("#1c2b39", "#8b97a3")}  # dark to light, by the sense of turning
 LIMIT: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
 REACH = 1.0  # largest extent of an axis beyond limits, relative to the distance between these
 LENGTHS = (("m", 1.0), ("cm", 1e-2))
@@ -131,7 +130,7 @@ def rotor_colours(vehicle: Vehicle) -> list[str]:
     from matplotlib.colors import to_hex, to_rgb
 
     colours = [""] * len(vehicle.rotors)
-    for spin, (dark, light) in SPIN_RAMPS.items():
+    for spin, dark, light in ((1, "#00315f", "#6fa3d4"), (-1, "#1c2b39", "#8b97a3")):
         same = [i for i, rotor in enumerate(vehicle.rotors) if rotor.spin == spin]
         for fraction, i in zip(np.linspace(0.0, 1.0, max(len(same), 2)), same, strict=False):
             colours[i] = to_hex((1 - fraction) * np.array(to_rgb(dark)) + fraction * np.array(to_rgb(light)))

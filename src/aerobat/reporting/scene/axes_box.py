@@ -18,12 +18,9 @@ from aerobat.reporting.style import HAIR, NORMAL, PAPER, SMALL
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MIN_SIDE = np.array([0.22, 0.22, 0.12])  # of a box, relative to its longest
-ROUND = np.array([1.0, 2.0, 5.0])
 # [in] margins for the scales: left of a box and below it, right of it and above it
 BOX_MARGINS = np.array([[0.5, 0.5], [0.3, 0.2]])
 NUMBERS = 0.15  # [in] from an edge to the numbers along it
-DIGIT = 0.07  # [in] width of a digit
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,15 +74,16 @@ def draw_box_around(
 def box_around(points: Array, pad: float) -> AxesBox:
     """Return the box around points (n, 3), `pad` [m] wider, with no side much shorter than the longest."""
     lower, upper = points.min(axis=0) - pad, points.max(axis=0) + pad
-    short = np.maximum(MIN_SIDE * (upper - lower).max() - (upper - lower), 0.0)
+    least = np.array([0.22, 0.22, 0.12]) * (upper - lower).max()
+    short = np.maximum(least - (upper - lower), 0.0)
     fraction = np.array([0.5, 0.5, 0.0])  # the floor stays right below
     return AxesBox(lower - fraction * short, upper + (1.0 - fraction) * short)
 
 
 def round_step(length: float) -> float:
     """Return the largest of 1, 2 or 5 times a power of ten that is at most `length`."""
-    decade = 10.0 ** np.floor(np.log10(length))
-    return float(decade * ROUND[ROUND * decade <= length * (1 + 1e-9)].max())
+    steps = 10.0 ** np.floor(np.log10(length)) * np.array([1.0, 2.0, 5.0])
+    return float(steps[steps <= length * (1 + 1e-9)].max())
 
 
 def draw_axes_box(axes: Axes, box: AxesBox, camera: Camera) -> None:
@@ -156,7 +154,8 @@ def _scale(axes: Axes, box: AxesBox, camera: Camera, axis: int, per_metre: float
         place = camera.project(edge) + np.array([-NUMBERS, NUMBERS]) / per_metre
     else:
         edge[axis] = (box.lower[axis] + box.upper[axis]) / 2
-        beside = max(0.3, 0.2 + 0.5 * DIGIT * max(map(len, numbers), default=0))  # [in] from numbers' middle
+        half_width = 0.5 * 0.07 * max(map(len, numbers), default=0)  # [in] of the longest number
+        beside = max(0.3, 0.2 + half_width)  # [in] from the middle of the numbers
         place = camera.project(edge) + (NUMBERS + np.array([beside, 0.2])) * outward / per_metre
     axes.text(place[0], place[1], f"{'xyz'[axis]} [m]", size=NORMAL, ha="center", va="center")
 

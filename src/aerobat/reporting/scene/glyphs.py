@@ -18,7 +18,6 @@ from aerobat.vehicle import Vehicle
 TURN = np.linspace(0.0, 2.0 * np.pi, 19)
 CIRCLE = np.stack([np.cos(TURN), np.sin(TURN), np.zeros_like(TURN)], axis=-1)
 LIGHT = np.array([0.3, -0.5, 0.81])  # direction toward the light in shaded pictures
-DARK, BRIGHT = "#8f6a12", "#f0c964"  # the darkest and the lightest side of a bar
 # corners of an arrowhead, forward and left, relative to its length
 ARROWHEAD = np.array([[0.6, 0.0], [-0.4, 0.38], [-0.2, 0.0], [-0.4, -0.38], [0.6, 0.0]])
 ENLARGEMENTS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0)
@@ -148,7 +147,7 @@ def _shade(face: Array) -> Colour:
 
     normal = np.cross(face[1] - face[0], face[3] - face[0])
     light = abs(float(normal @ LIGHT)) / max(float(np.linalg.norm(normal)), 1e-12)
-    dark, bright = (np.array(to_rgb(c)) for c in (DARK, BRIGHT))
+    dark, bright = (np.array(to_rgb(colour)) for colour in ("#8f6a12", "#f0c964"))
     return to_hex(dark + min(light, 1.0) * (bright - dark))
 
 

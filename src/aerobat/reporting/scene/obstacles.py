@@ -15,9 +15,6 @@ from aerobat.reporting.scene.glyphs import LIGHT
 from aerobat.reporting.scene.shapes import Shape
 from aerobat.reporting.style import FAINT, MUTED
 
-GLASS, DARKEST = 0.42, 0.12  # opacity of a face away from the light, and of a face toward it
-CELLS = 12  # along the longest side of all surfaces: each cell is wholly before or behind a path
-
 
 def surfaces_beside(
     pieces: Sequence[ConvexPiece], points: Sequence[Array], times: Array | None = None
@@ -42,7 +39,7 @@ def obstacle_shapes(surfaces: Sequence[Surface], camera: Camera) -> list[Shape]:
     if not surfaces:
         return []
     extent = np.ptp(np.concatenate([surface.points for surface in surfaces]), axis=0)
-    cell = float(extent.max()) / CELLS
+    cell = float(extent.max()) / 12  # each is wholly before or behind a path
     return [shape for surface in surfaces for shape in _surface_shapes(surface, camera, cell)]
 
 
@@ -53,7 +50,7 @@ def _surface_shapes(surface: Surface, camera: Camera, cell: float) -> Iterator[S
         if float(normal @ camera.toward) <= 0.0:
             continue
         light = max(float(normal @ LIGHT), 0.0)
-        glass = MUTED, GLASS + light * (DARKEST - GLASS)
+        glass = MUTED, 0.42 + light * (0.12 - 0.42)  # less opaque toward the light
         for part in _cells(face, cell):
             yield Shape(part, face=glass)
     for edge in surface.edges:
