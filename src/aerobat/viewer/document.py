@@ -21,9 +21,6 @@ from aerobat.viewer.scene import Scene, Track
 
 PAGE = files("aerobat.viewer") / "page"
 SCRIPTS = ("arrays.js", "models.js", "world.js", "cameras.js", "plots.js", "player.js")  # in this order
-OWN_ORIGIN = (
-    "; connect-src 'self'; img-src 'self' data:"  # what a live page may ask beyond one that is a file
-)
 MARK = '<meta name="generator" content="aerobat replay">'  # identifies a replay page
 PLACE = re.compile("@@([a-z]+)@@")
 DIGITS = 32767.0  # of 16-bit integers: attitudes to 0.004°
@@ -55,7 +52,7 @@ def document(scene: Scene, controls: Any = None) -> str:
     content, is_live = packed(scene), controls is not None
     parts = {
         "title": escape(scene.title),
-        "policy": OWN_ORIGIN if is_live else "; img-src data:",
+        "policy": "; connect-src 'self'; img-src 'self' data:" if is_live else "; img-src data:",
         "style": _text("replay.css") + (_text("live.css") if is_live else ""),
         "panel": _text("live.html").replace("@@controls@@", _embedded(controls)) if is_live else "",
         "header": _embedded(content["header"]),

@@ -15,7 +15,6 @@ from aerobat.vehicle import Vehicle
 from aerobat.viewer.document import MARK, document
 from aerobat.viewer.scene import Scene, scene_of
 
-INLINE_HEIGHT = 640  # [px] of a page in a notebook
 HEAD = 1000  # first characters of a page, which include MARK
 
 
@@ -38,7 +37,7 @@ class Replay:
 def inline_frame(content: str) -> str:
     """Return the HTML of a frame for a notebook; `content` is the attribute that holds or names the page."""
     style = "width:100%;border:1px solid #dfe6ec;border-radius:8px"
-    return f'<iframe style="{style}" height="{INLINE_HEIGHT}" {content}></iframe>'
+    return f'<iframe style="{style}" height="640" {content}></iframe>'
 
 
 @validated

@@ -27,7 +27,6 @@ from aerobat.interchange.solids import solid_surfaces
 from aerobat.planning import Plan
 from aerobat.states import BodyState
 
-START = 1  # [s] stamp of the plan's start; in ROS, a stamp of 0 means none
 PATH, FRAME = (0.02, 0.0, 0.0), (0.05, 0.0, 0.0)  # [m] scales of lines: the width
 BLUE, ORANGE = (0.05, 0.2, 0.6), (0.85, 0.35, 0.05)
 GREY, BLACK = (0.4, 0.4, 0.4), (0.1, 0.1, 0.1)
@@ -50,7 +49,7 @@ class PlanMessages:
 
     messages: Messages
     plan: Plan
-    start: int = START * NANOSECONDS  # [ns] stamp of the plan's start
+    start: int = NANOSECONDS  # [ns] stamp of the plan's start; in ROS, a stamp of 0 means none
     origin: Array = field(default_factory=lambda: np.zeros(3))  # [m] position of its origin in the world
 
     def all(self, found: Reference) -> Iterator[Stamped]:

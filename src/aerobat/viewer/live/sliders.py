@@ -23,11 +23,8 @@ from aerobat.vehicle import Vehicle
 
 LEAST_REACH = 0.5  # [m] least distance by which a gate can be moved to either side
 STEPS = 40  # least number of steps of a slider, whose step is a round number
-ORDERS = range(3, 6)  # jerk, snap, crackle
-THRUST_TO_WEIGHT = (1.2, 8.0)  # from vehicles that hardly climb to racing quadrotors
 MAX_OBSTACLES = 12  # largest number of obstacles with sliders
 PLACES = ("position", "start", "end", "origin", "points")  # fields of obstacles with their place
-MAX_DISPERSION = 3.0  # times the conditions: most maneuvers fail well before
 
 
 @dataclass(frozen=True)
@@ -182,16 +179,18 @@ def _thrust_sliders(setting: Setting) -> Iterator[Slider]:
 def _order_slider(setting: Setting, plan: Plan) -> Iterator[Slider]:
     """Yield the slider of the order, the derivative that is the input, for planners that have one."""
     if plan.order is not None and hasattr(setting.planner, "order"):
-        low, high = min(ORDERS[0], plan.order), max(ORDERS[-1], plan.order)
+        low, high = min(3, plan.order), max(5, plan.order)  # jerk to crackle
         yield Slider("planner.order", "maneuver", "order", "", low, high, 1, plan.order)
 
 
 def _vehicle_slider(setting: Setting) -> Slider:
     value = round(setting.vehicle.thrust_to_weight, 2)
-    low, high = min(THRUST_TO_WEIGHT[0], value), max(THRUST_TO_WEIGHT[1], float(np.ceil(1.5 * value)))
+    # from vehicles that hardly climb to racing quadrotors
+    low, high = min(1.2, value), max(8.0, float(np.ceil(1.5 * value)))
     return Slider("vehicle.thrust_to_weight", "vehicle", "thrust-to-weight", "", low, high, 0.05, value)
 
 
 def _dispersion_slider(setting: Setting) -> Slider:
     unit = f"× {setting.conditions.name}"
-    return Slider("dispersion", "flight", "dispersion", unit, 0.0, MAX_DISPERSION, 0.1, 0.0)
+    # at three times the conditions, most maneuvers fail
+    return Slider("dispersion", "flight", "dispersion", unit, 0.0, 3.0, 0.1, 0.0)

@@ -21,7 +21,6 @@ from aerobat.viewer.live.sliders import Setting, sliders_of
 from aerobat.viewer.replay import inline_frame
 
 VEHICLE = "agile-quad"  # the default
-TICK = 0.5  # [s] longest wait: not every system lets Ctrl-C end a longer one
 
 Port = Annotated[int, Field(ge=0, le=65535, description="whole number from 0 to 65535")]
 
@@ -42,7 +41,7 @@ class LiveView:
     def wait(self) -> None:
         """Wait until the page is closed, or for Ctrl-C."""
         while self._thread.is_alive():
-            self._thread.join(TICK)
+            self._thread.join(0.5)  # [s] not every system lets Ctrl-C end a longer wait
 
     def close(self) -> None:
         """Stop serving the page, and cancel its planning."""
