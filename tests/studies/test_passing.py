@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 import aerobat as ab
 from aerobat.planning.result import FLYING_RESERVE
-from aerobat.studies.passing import Passing, Round, proving
+from aerobat.studies.passing import Passing, Round
+from aerobat.studies.passing import passing as proving
 from aerobat.studies.passing.causes import main_failure_cause
-from aerobat.studies.passing.proving import proven
 from aerobat.studies.passing.spread import with_more_thrust
 from aerobat.studies.passing.steadying import steadier
 from aerobat.studies.passing.task import FlownPlan, PassingTask
@@ -173,7 +173,7 @@ def test_a_plan_that_only_the_flights_it_is_judged_by_pass_is_tightened(monkeypa
     for name, value in changed.items():
         object.__setattr__(task, name, value)
     monkeypatch.setattr(proving, "_with_proof", lambda task, first, best, share, fresh: (best.plan, fresh))
-    assert proven(task) == ("tightened", range(14, 24))
+    assert proving.proven(task) == ("tightened", range(14, 24))
     assert started == [1.0, 0.0]
 
 
