@@ -14,7 +14,7 @@ from aerobat.flatness import vehicle_of
 from aerobat.planning import Plan
 from aerobat.simulation import Flight
 from aerobat.studies.inspection.alignment import aligned
-from aerobat.studies.inspection.balance import balance_fault
+from aerobat.studies.inspection.body import body_fault
 from aerobat.studies.inspection.disturbances import (
     Disturbances,
     PositionLoop,
@@ -22,7 +22,6 @@ from aerobat.studies.inspection.disturbances import (
     command_delay,
     disturbances,
 )
-from aerobat.studies.inspection.inertia import inertia_fault
 from aerobat.studies.inspection.inner_loop import inner_loop_fault
 from aerobat.studies.inspection.result import Inspection
 from aerobat.studies.inspection.rotors import rotor_fault
@@ -146,8 +145,7 @@ def inspect_flight(
     fault = (
         inner_loop_fault(flight, nominal)
         or rotor_fault(flight, nominal, delay)
-        or balance_fault(flight, nominal)
-        or inertia_fault(flight, nominal, causes.vehicle)
+        or body_fault(flight, nominal, causes.vehicle)
     )
     named = None if fault is None else fault.cause
     errors = responses(flight.times, (error[0], rate[0]), causes, loop, unsaturated, named)
