@@ -106,10 +106,10 @@ def compare(
         if planning.is_here:
             for named in compared:
                 begin(named[0])
-                found.append(_timed_entry(task, named, progress))
+                found.append(_entry(task, named, progress))
         else:
             done = {}
-            for named, entry in planning.results(_timed_entry, task, compared):
+            for named, entry in planning.results(_entry, task, compared):
                 begin(entry.planner)
                 done[named] = entry
             found = [done[named] for named in compared]
@@ -118,7 +118,7 @@ def compare(
             begin(f"{name} again")
             left = None if time_limit is None else max(time_limit - found[i].planning_time, 0.0)
             with within_time(left):
-                found[i] = _improved(found[i], planner, found, progress)
+                found[i] = _improved(task, found[i], planner, found, progress)
     entries = tuple(_with_twin(entry, found[:i]) for i, entry in enumerate(found))
     if all(entry.plan is None for entry in entries):
         raise Infeasible(
@@ -136,13 +136,6 @@ class _ComparisonTask:
     time_limit: float | None  # [s] of each
 
 
-def _timed_entry(
-    task: _ComparisonTask, named: tuple[str, Planner], progress: Callable[[Attempt], None] | None = None
-) -> Entry:
-    with within_time(task.time_limit):
-        return _entry(*named, task.problem, task.vehicle, progress)
-
-
 def _named(planner: tuple[str, Planner] | Planner | str) -> tuple[str, Planner]:
     """Return the planner with its name."""
     if isinstance(planner, tuple):
@@ -153,6 +146,7 @@ def _named(planner: tuple[str, Planner] | Planner | str) -> tuple[str, Planner]:
 
 
 def _improved(
+    task: _ComparisonTask,
     entry: Entry,
     planner: TimeOptimal,
     others: Sequence[Entry],
@@ -162,11 +156,9 @@ def _improved(
     faster = [other.plan for other in others if other.certified and other.plan is not None]
     best = min(faster, key=lambda plan: plan.duration, default=None)
     alone = None if entry.plan is None or not entry.certified else entry.plan.duration
-    if best is None or best.vehicle is None or (alone is not None and best.duration >= alone):
+    if best is None or (alone is not None and best.duration >= alone) or out_of_time():
         return entry
-    if out_of_time():
-        return entry
-    again = _entry(entry.planner, replace(planner, start=best), best.problem, best.vehicle, progress)
+    again = _entry(task, (entry.planner, replace(planner, start=best)), progress)
     found = "no plan" if alone is None else f"{alone:.3f} s"
     note = f"begun again from the plan of {best.duration:.3f} s by {best.planner}; {found} alone"
     if again.plan is None or (alone is not None and again.plan.duration >= alone):
@@ -185,21 +177,20 @@ def _with_twin(entry: Entry, before: Sequence[Entry]) -> Entry:
 
 
 def _entry(
-    name: str,
-    planner: Planner,
-    problem: Problem,
-    vehicle: Vehicle,
-    progress: Callable[[Attempt], None] | None,
+    task: _ComparisonTask, named: tuple[str, Planner], progress: Callable[[Attempt], None] | None = None
 ) -> Entry:
-    started = perf_counter()
-    try:
-        found = plan(problem, planner, vehicle, progress)
-    except (Infeasible, BackendMissing) as error:
-        outcome = error.sentence if isinstance(error, Infeasible) else str(error)
-        return Entry(name, None, None, None, perf_counter() - started, outcome)
-    spent = perf_counter() - started
-    flight = fly(found, vehicle)
-    flown = score(flight, found, vehicle)
-    warnings = () if found.assessment is None else found.assessment.warnings
-    note = "; ".join(filter(None, (best_by_limit(found), found.rescue, *warnings)))
-    return Entry(name, found, flight, flown, spent, flown.sentence, note)
+    """Return the result of one planner within the time limit, and the flight of its plan."""
+    name, planner = named
+    with within_time(task.time_limit):
+        started = perf_counter()
+        try:
+            found = plan(task.problem, planner, task.vehicle, progress)
+        except (Infeasible, BackendMissing) as error:
+            outcome = error.sentence if isinstance(error, Infeasible) else str(error)
+            return Entry(name, None, None, None, perf_counter() - started, outcome)
+        spent = perf_counter() - started
+        flight = fly(found, task.vehicle)
+        flown = score(flight, found, task.vehicle)
+        warnings = () if found.assessment is None else found.assessment.warnings
+        note = "; ".join(filter(None, (best_by_limit(found), found.rescue, *warnings)))
+        return Entry(name, found, flight, flown, spent, flown.sentence, note)
