@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -76,22 +76,22 @@ class Robot:
 def link_of(
     name: str,
     pose: RigidTransform,
-    inertial: RigidTransform,
-    mass: float,
-    moments: Array,
     radius: float | None,
     axis: Array | None,
+    inertial: RigidTransform = IDENTITY,
+    mass: float = 0.0,
+    moments: Sequence[float] = (0.0,) * len(MOMENTS),
 ) -> Link:
-    """Return a link with the values in its file. Raises SpecError for a mass below zero.
+    """Return a link with the values in its file, by default massless. Raises SpecError for a mass below zero.
 
     Args:
         name: of the link.
         pose: its frame in that of the model.
-        inertial: the frame of its inertia in the link's, with its origin at the centre of mass.
-        mass: [kg].
-        moments: ixx, iyy, izz, ixy, ixz, iyz [kg·m²], (6,).
         radius: [m] of its collision shape.
         axis: of its joint, the model's axes, (3,).
+        inertial: the frame of its inertia in the link's, with its origin at the centre of mass.
+        mass: [kg].
+        moments: MOMENTS [kg·m²].
     """
     if mass < 0.0:
         raise SpecError(f"link '{name}': mass must be 0 or more, got {mass:g} kg")

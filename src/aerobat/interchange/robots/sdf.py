@@ -106,14 +106,14 @@ def _link(name: str, element: Element, pose: RigidTransform, axis: Array | None)
     radius = collision_radius(element, name, lambda each, key: each.findtext(key))
     inertial = element.find("inertial")
     if inertial is None:
-        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), radius, axis)
+        return link_of(name, pose, radius, axis)
     inertia = inertial.find("inertia")
     what = f"link '{name}'"
     if not (inertial.findtext("mass") or "").strip():
         raise SpecError(f"{what}: its <inertial> has no <mass>; give it in kg")
     moments = [0.0 if inertia is None else child_number(inertia, key, what) for key in MOMENTS]
     mass = child_number(inertial, "mass", what)
-    return link_of(name, pose, _pose(inertial, what), mass, np.array(moments), radius, axis)
+    return link_of(name, pose, radius, axis, _pose(inertial, what), mass, moments)
 
 
 def _pose(element: Element, what: str) -> RigidTransform:

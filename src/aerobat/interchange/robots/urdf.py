@@ -6,8 +6,6 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.interchange.robots.body import IDENTITY, MOMENTS, Link, RigidTransform, Robot, link_of
@@ -71,20 +69,14 @@ def _link(name: str, element: Element, pose: RigidTransform, joint: Element | No
     axis = None if joint is None else _axis(joint, pose)
     inertial = element.find("inertial")
     if inertial is None:
-        return link_of(name, pose, IDENTITY, 0.0, np.zeros(6), radius, axis)
+        return link_of(name, pose, radius, axis)
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
     if mass is None or not mass.get("value", "").strip():
         raise SpecError(f"link '{name}': its <inertial> has no <mass>; give its value in kg")
     moments = [_attribute(inertia, key, f"link '{name}': inertia") for key in MOMENTS]
-    return link_of(
-        name,
-        pose,
-        _origin(inertial, f"link '{name}': inertial"),
-        _attribute(mass, "value", f"link '{name}': mass"),
-        np.array(moments),
-        radius,
-        axis,
-    )
+    origin = _origin(inertial, f"link '{name}': inertial")
+    kilograms = _attribute(mass, "value", f"link '{name}': mass")
+    return link_of(name, pose, radius, axis, origin, kilograms, moments)
 
 
 def _axis(joint: Element, pose: RigidTransform) -> Array | None:
