@@ -38,7 +38,9 @@ def map_figure(found: FeasibilityMap) -> Figure:
     A map over two fields is a grid, with the first field upward; a map over one field is a line. Cells
     without a plan are grey, and plans that are not flyable are red.
     """
-    texts = [f"{kind.letter}   {kind.name} ({kind.count})" for kind in kinds_of(found).values()]
+    kinds = kinds_of(found)
+    durations = np.array([c.duration if c.is_planned else np.nan for c in found.cells], dtype=float)
+    texts = [f"{kind.letter}   {kind.name} ({kind.count})" for kind in kinds.values()]
     legend = [line for text in texts for line in wrap(text, 150)]  # letters fit the page
     height = _height(found) + 0.95 + ROW * len(legend)
     counts = ", ".join(f"{count} {feasibility}" for feasibility, count in found.counts.items())
@@ -47,9 +49,9 @@ def map_figure(found: FeasibilityMap) -> Figure:
         figure = blank_page(height, title, [f"cells: {counts}"])
         (axes,) = column(figure, height, [1.0])
         if len(found.axes) == 1:
-            _draw_line(axes, found)
+            _draw_line(axes, found, kinds, durations)
         else:
-            _draw_grid(figure, axes, found)
+            _draw_grid(figure, axes, found, kinds, durations)
         style = {"size": SMALL, "color": MUTED, "va": "top", "linespacing": 1.9}
         write_by(axes, "\n".join(legend), (0.0, 0.0), (0.0, -0.55), **style)
     return figure
@@ -61,10 +63,9 @@ def _height(found: FeasibilityMap) -> float:
     return float(np.clip(0.5 * rows, 2.6, 6.5))
 
 
-def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
+def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap, kinds: Kinds, durations: Array) -> None:
     """Draw the cells of a map over two fields, and the scale of durations beside them."""
     rows, columns = (len(axis.values) for axis in found.axes)
-    durations = np.array([c.duration if c.is_planned else np.nan for c in found.cells], dtype=float)
     scale, colours = _colours(found, durations)
     axes.imshow(colours.reshape(rows, columns, 4), origin="lower", aspect="auto", interpolation="nearest")
     for axis, set_ticks, set_label, size in (
@@ -76,14 +77,14 @@ def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap) -> None:
         set_ticks(places, [f"{axis.values[i]:g}" for i in places])
         set_label(axis.label)
     axes.grid(visible=False)
-    _write_cells(axes, found, durations)
+    _write_cells(axes, found, kinds, durations)
     if np.isfinite(durations).any() and np.nanmax(durations) > np.nanmin(durations):
         _draw_scale(figure, axes, scale, durations)
 
 
-def _write_cells(axes: Axes, found: FeasibilityMap, durations: Array) -> None:
+def _write_cells(axes: Axes, found: FeasibilityMap, kinds: Kinds, durations: Array) -> None:
     """Write into each cell of a grid what it has room for."""
-    kinds, columns = kinds_of(found), len(found.axes[1].values)
+    columns = len(found.axes[1].values)
     width, height = WIDTH / columns, _height(found) / len(found.axes[0].values)
     for number, (cell, part) in enumerate(zip(found.cells, _parts(durations), strict=True)):
         row, column = divmod(number, columns)
@@ -128,12 +129,10 @@ def _draw_scale(figure: Figure, axes: Axes, scale: Colormap, durations: Array) -
     bar.ax.grid(visible=False)
 
 
-def _draw_line(axes: Axes, found: FeasibilityMap) -> None:
+def _draw_line(axes: Axes, found: FeasibilityMap, kinds: Kinds, durations: Array) -> None:
     """Draw durations over the values of one field, letters above them, and bands where there is no plan."""
     (axis,) = found.axes
     places = np.arange(len(axis.values))
-    kinds = kinds_of(found)
-    durations = np.array([c.duration if c.is_planned else np.nan for c in found.cells], dtype=float)
     axes.plot(places, durations, color=BLUE, marker="o", markersize=4)
     axes.set_xlim(-0.5, len(places) - 0.5)
     known = durations[np.isfinite(durations)]
