@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import inf, sqrt
-from typing import Any, cast
+from typing import Any
 
 from aerobat.control import named_controller
 from aerobat.environment import Dispersion
@@ -89,16 +89,14 @@ class PassingTask:
         vehicle, assessment = self.vehicle, first.plan.assessment
         if tightening.rate < 1.0 and assessment is not None:
             vehicle = replace(vehicle, max_body_rate=tightening.rate * (assessment.max_body_rate or inf))
-        planner = self._warm_started(start.plan, round(first.first_reserve + tightening.reserve, 9))
+        reserve = round(first.first_reserve + tightening.reserve, 9)
+        if hasattr(self.planner, "start"):
+            planner = replace(self.planner, reserve=reserve, start=start.plan)
+        else:
+            planner = warm_started_refinement(self.planner, start.plan, reserve)
         with within_time(self.planning_time, processor):
             found = plan(required, planner, vehicle, self.progress)
         return replace(found, problem=self.problem, vehicle=self.vehicle)
-
-    def _warm_started(self, start: Plan, reserve: float) -> Planner:
-        """Return the planner, or else the refinement, with a reserve and warm-started from a plan."""
-        if hasattr(self.planner, "start"):
-            return cast(Planner, replace(self.planner, reserve=reserve, start=start))
-        return warm_started_refinement(self.planner, start, reserve)
 
     def scores(self, found: Plan, flights: range, conditions: Dispersion | None = None) -> Score:
         """Return scores of flights of a plan, by default under the task's conditions."""
