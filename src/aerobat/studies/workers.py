@@ -37,13 +37,9 @@ MAX_WORKERS = 4096
 WORKERS = f"whole number from 1 to {MAX_WORKERS}, or dask://HOST:PORT"
 MAX_DEATHS = 3  # consecutive deaths of workers, without a finished part, that end a study
 LIBRARIES = ("aerobat", "numpy", "scipy", "llvmlite", "jax")  # whose versions change numbers
-_QUEUED = 2  # groups of parts per worker: the one in progress and the next
-_QUEUED_ELSEWHERE = 256  # groups, for an executor that does not report its number of workers
 _GROUPS_PER_WORKER = 4  # least number of groups per worker, so that all workers end at about the same time
 _WORKERS_ELSEWHERE = 16  # assumed number of workers of an executor that does not report it
 _CONNECT_TIMEOUT = 10.0  # [s] time within which a scheduler must answer
-_MALLOC_THRESHOLDS = (-1, -3)  # glibc's M_TRIM_THRESHOLD and M_MMAP_THRESHOLD
-_KEPT_MEMORY = 32 * 2**20  # [bytes] the largest that glibc takes for both
 _DASK = re.compile(r"dask://([^\s/:]+|\[[0-9a-fA-F:]+\]):(\d{1,5})")
 
 Task = TypeVar("Task")
@@ -154,7 +150,8 @@ class Pool:
     ) -> None:
         """Submit groups of parts, enough to keep all workers busy."""
         executor = self._executor()
-        queued = _QUEUED_ELSEWHERE if self._given is not None else _QUEUED * self._count
+        # two groups for each worker, in progress and next; more for an executor of unknown size
+        queued = 256 if self._given is not None else 2 * self._count
         while waiting and len(self._pending) < queued:
             group = [waiting.popleft() for _ in range(min(size, len(waiting)))]
             try:
@@ -281,8 +278,8 @@ def _keep_freed_memory() -> None:
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # in glibc only
     if mallopt is not None:
-        for parameter in _MALLOC_THRESHOLDS:
-            mallopt(parameter, _KEPT_MEMORY)
+        for threshold in (-1, -3):  # glibc's M_TRIM_THRESHOLD and M_MMAP_THRESHOLD
+            mallopt(threshold, 32 * 2**20)  # [bytes] the largest that glibc takes for both
 
 
 def _return_freed_memory() -> None:

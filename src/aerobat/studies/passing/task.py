@@ -24,8 +24,6 @@ from aerobat.studies.workers import Pool
 from aerobat.vehicle import Vehicle
 
 SCREENING_FLIGHTS = 200  # flights after which a plan is rejected if they already refute its probability
-REFINEMENT_PLANNER = "free-knots"  # planner that continues from a plan where the requested planner cannot
-KEPT_SETTINGS = ("segments", "clearance", "time_limit")  # settings taken from the requested planner
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,5 +131,6 @@ def reserve_kept(found: Plan, asked: float) -> float:
 
 def warm_started_refinement(planner: Any, start: Plan, reserve: float) -> Planner:
     """Return the refinement, warm-started from a plan, with the settings of the planner that found it."""
-    kept = {name: getattr(planner, name) for name in KEPT_SETTINGS if hasattr(planner, name)}
-    return planner_with_reserve(REFINEMENT_PLANNER, reserve, start=start, **kept)
+    names = ("segments", "clearance", "time_limit")
+    kept = {name: getattr(planner, name) for name in names if hasattr(planner, name)}
+    return planner_with_reserve("free-knots", reserve, start=start, **kept)
