@@ -22,7 +22,7 @@ from aerobat.simulation import Flight
 from aerobat.simulation.outcome import length
 from aerobat.vehicle import Vehicle
 
-Rows = NDArray[np.intp]
+RowIndex = NDArray[np.intp]
 
 PLAN_RATE = 250.0  # [1/s] rows of a plan without a flight
 MAX_ROWS = 4000  # of a flight: 60 s are then shown at 67 rows a second
@@ -157,7 +157,7 @@ def _flight_scene(subject: Subject, flight: Flight, poses: int) -> Scene:
 def _scene(
     subject: Subject,
     followed: Reference | Flight,
-    rows: Rows,
+    rows: RowIndex,
     facts: tuple[str, ...],
     tracks: tuple[Track, ...],
     curves: tuple[Curve, ...],
@@ -185,13 +185,13 @@ def _scene(
     )
 
 
-def shown_rows(rows: int, flights: int, poses: int = MAX_POSES) -> Rows:
+def shown_rows(rows: int, flights: int, poses: int = MAX_POSES) -> RowIndex:
     """Return the indices of the rows that are shown of flights of `rows` rows: every k-th and the last."""
     stride = ceil(rows / min(MAX_ROWS, poses // flights))
     return np.unique(np.append(np.arange(0, rows, stride), rows - 1))
 
 
-def _track(flight: Flight, plan: Plan | None, vehicle: Vehicle, rows: Rows, number: int | None) -> Track:
+def _track(flight: Flight, plan: Plan | None, vehicle: Vehicle, rows: RowIndex, number: int | None) -> Track:
     """Return the track of a flight with its score's sentence; `number` is its place in a batch."""
     outcome, sentence = flight.outcome, flight.sentences[0]
     if plan is not None:
@@ -222,7 +222,7 @@ def _facts(tracks: Sequence[Track], flight: Flight, plan: Plan | None) -> tuple[
     return (went, ", ".join(planned)) if planned else (went,)
 
 
-def _left_out(flight: Flight, rows: Rows, flights: int) -> Iterator[str]:
+def _left_out(flight: Flight, rows: RowIndex, flights: int) -> Iterator[str]:
     """Yield a line for each part of the flights that the scene leaves out."""
     stride = int(rows[1] - rows[0])
     rate = 1.0 / float(np.median(np.diff(flight.times)))
@@ -232,7 +232,7 @@ def _left_out(flight: Flight, rows: Rows, flights: int) -> Iterator[str]:
         yield f"the first {flights} of {len(flight.vehicles)} flights"
 
 
-def _errors(flight: Flight, flights: int, rows: Rows) -> tuple[Curve, ...]:
+def _errors(flight: Flight, flights: int, rows: RowIndex) -> tuple[Curve, ...]:
     """Return the tracking errors; each row shows the largest error up to the next row shown."""
     position, attitude = (
         np.maximum.reduceat(np.atleast_2d(error)[:flights], rows, axis=-1)
