@@ -14,16 +14,13 @@ from aerobat.reporting.facts import picture
 from aerobat.reporting.page import png as png_of
 from aerobat.reporting.tables import table
 
-COLUMNS = 120  # letters in a line of a table
-PRE = '<pre style="line-height: 1.3; overflow-x: auto">{code}</pre>'
-KEPT = 8  # cached pictures: notebooks request each one twice
-
 
 def html(value: Any) -> str:
     """Return the HTML of a result: its facts, under its picture if it has one."""
-    console = Console(record=True, file=StringIO(), width=COLUMNS, force_jupyter=False)
+    console = Console(record=True, file=StringIO(), width=120, force_jupyter=False)
     console.print(table(value))
-    text = console.export_html(inline_styles=True, code_format=PRE)
+    pre = '<pre style="line-height: 1.3; overflow-x: auto">{code}</pre>'
+    text = console.export_html(inline_styles=True, code_format=pre)
     found = png(value)
     if found is None:
         return text
@@ -48,4 +45,4 @@ def _drawn(value: Any) -> bytes | None:
     return None if figure is None else png_of(figure)
 
 
-_drawn_once = lru_cache(maxsize=KEPT)(_drawn)
+_drawn_once = lru_cache(maxsize=8)(_drawn)  # notebooks request each picture twice

@@ -33,7 +33,9 @@ Pieces: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.void]]"  # of the type P
 def crazyflie_pieces(plan: Plan, rate: float) -> Content:
     """Return the pieces as bytes and as CSV, see `fitted_pieces`; there are no rows, so `rate` is ignored."""
     pieces, loss = fitted_pieces(plan)
-    return Content((pieces.tobytes(), _csv(pieces)), loss)
+    header = ["duration", *(f"{axis}^{power}" for axis in AXES for power in range(POWERS))]
+    rows = np.column_stack([pieces["duration"], pieces["polynomials"].reshape(len(pieces), -1)])
+    return Content((pieces.tobytes(), csv_text([header, *rows.tolist()]).encode()), loss)
 
 
 def fitted_pieces(plan: Plan) -> tuple[Pieces, Loss]:
@@ -76,9 +78,3 @@ def _loss(plan: Plan, path: Trajectory, yaw: YawFit) -> Loss:
         thrust_axis=yaw.thrust_axis_error,
         reading="pieces of float32 coefficients",
     )
-
-
-def _csv(pieces: Pieces) -> bytes:
-    header = ["duration", *(f"{axis}^{power}" for axis in AXES for power in range(POWERS))]
-    rows = np.column_stack([pieces["duration"], pieces["polynomials"].reshape(len(pieces), -1)])
-    return csv_text([header, *rows.tolist()]).encode()

@@ -23,7 +23,6 @@ from aerobat.vehicle import Vehicle
 
 FPS = 30
 HOLD = 0.6  # [s] that the last picture stays
-MAX_FRAMES = 20_000  # eleven minutes
 DPI = {".mp4": 160, ".gif": 100}  # 1152 and 720 pixels across
 GIF_COLOURS = "split[a][b];[a]palettegen=max_colors=64:stats_mode=diff[p];[b][p]paletteuse=dither=none"
 ENCODING = {
@@ -69,7 +68,7 @@ def write_video(
 def frame_times(duration: float, speed: float) -> NDArray[np.float64]:
     """Return the instants [s] of a video's frames; the last one is held. Raise SpecError for too many."""
     count = duration / speed * FPS
-    if count > MAX_FRAMES:
+    if count > 20_000:  # eleven minutes
         raise SpecError(
             f"speed: {duration:g} s at {speed:g} times their speed are {count:.0f} frames; raise it"
         )
