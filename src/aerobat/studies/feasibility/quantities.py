@@ -87,6 +87,7 @@ class GateSize(NeededQuantity):
 
     name = "gate"
     unit = "of its size"
+    keeps_width: ClassVar[bool] = False
 
     def own(self, scenario: Scenario) -> float:
         """Return 1. Raises SpecError where there is no gate."""
@@ -95,8 +96,9 @@ class GateSize(NeededQuantity):
         return 1.0
 
     def set(self, whole: Scenario, value: float) -> Scenario:
-        """Return the scenario with openings scaled by this fraction."""
-        gates = tuple(gate.resized(value, value) for gate in whole.problem.gates)
+        """Return the scenario with openings scaled by this fraction, circles as a whole."""
+        across = 1.0 if self.keeps_width else value
+        gates = tuple(gate.resized(across, value) for gate in whole.problem.gates)
         return replace(whole, problem=replace(whole.problem, gates=gates))
 
 
@@ -105,12 +107,8 @@ class GateHeight(GateSize):
 
     name = "gate-height"
     unit = "of its height"
+    keeps_width = True
     by_default = False
-
-    def set(self, whole: Scenario, value: float) -> Scenario:
-        """Return the scenario with heights of openings scaled by this fraction, circles as a whole."""
-        gates = tuple(gate.resized(1.0, value) for gate in whole.problem.gates)
-        return replace(whole, problem=replace(whole.problem, gates=gates))
 
 
 QUANTITIES: dict[str, NeededQuantity] = {
