@@ -101,9 +101,10 @@ def explained(refusal: Infeasible, task: Request, progress: Tried | None = None)
     `progress` is called with each change, and whether it helps, as they are tried.
     """
     search = _RemedySearch(task, progress or (lambda words, helps: None))
-    name, sentence, is_proven = task.problem.name, refusal.sentence, not refusal.attempts
-    found = (None if is_proven else search.by_others()) or search.by_changes()
-    return Why(name, sentence, refusal.limits, tuple(found), tuple(search.tried))
+    # a refusal without attempts is proven, so that no other planner would help without a change
+    unchanged = search.remedy([]) if refusal.attempts else None
+    found = search.by_changes() if unchanged is None else [unchanged]
+    return Why(task.problem.name, refusal.sentence, refusal.limits, tuple(found), tuple(search.tried))
 
 
 class _RemedySearch:
@@ -113,11 +114,6 @@ class _RemedySearch:
         self.task, self.progress = task, progress
         self.tried: list[str] = []
 
-    def by_others(self) -> list[Remedy]:
-        """Return the plan of another planner without any change, if there is one."""
-        found = self._remedy([])
-        return [] if found is None else [found]
-
     def by_changes(self) -> list[Remedy]:
         """Return the changes that suffice alone; if there are none, a smallest sufficient set."""
         found = list(changes(self.task))
@@ -126,23 +122,23 @@ class _RemedySearch:
             if out_of_time():
                 break
             self.tried.append(change.words)
-            alone.append(self._remedy([change]))
+            alone.append(self.remedy([change]))
         helpful = [each for each in alone if each is not None]
         return helpful or (self._fewest(found) if len(found) > 1 else [])
 
     def _fewest(self, found: list[Change]) -> list[Remedy]:
         """Return a set of sufficient changes of which none can be left out (greedy elimination)."""
-        best = self._remedy(found)
+        best = self.remedy(found)
         kept = found if best is not None else []
         for change in list(kept):
             fewer = [each for each in kept if each is not change]
-            again = self._remedy(fewer) if len(fewer) > 1 and not out_of_time() else None
+            again = self.remedy(fewer) if len(fewer) > 1 and not out_of_time() else None
             if again is not None:
                 kept, best = fewer, again
         return [] if best is None else [best]
 
-    def _remedy(self, several: list[Change]) -> Remedy | None:
-        """Return the plan with several changes; None where there is none."""
+    def remedy(self, several: list[Change]) -> Remedy | None:
+        """Return the plan with several changes, or with none by another planner; None where there is none."""
         changed = reduce(lambda task, change: change.apply(task), several, self.task)
         planners = _planners(changed, refused=not several)
         with within_time(CHANGE_TIME if several else TIME_LIMIT, processor):
