@@ -49,7 +49,7 @@ class Pattern:
 
     @cached_property
     def diagonal(self) -> Indices:
-        """Where the values of the diagonal are stored, (n,)."""
+        """The indices of the values of the diagonal, (n,)."""
         return self.index(np.arange(self.size), np.arange(self.size))
 
 
