@@ -12,7 +12,14 @@ import pytest
 import aerobat as ab
 from aerobat.planning.result import FLYING_RESERVE
 from aerobat.studies.passing import steadied
-from aerobat.studies.passing.steadying import DURATION_PRICE, MAX_LAG_ANGLE, MIN_GAIN, SELECTION_FLIGHTS
+from aerobat.studies.passing.steadying import (
+    DURATION_PRICE,
+    MAX_LAG_ANGLE,
+    MIN_GAIN,
+    SELECTION_FLIGHTS,
+    _explained,
+)
+from aerobat.studies.passing.task import FlownPlan
 from aerobat.vehicle import load_vehicle
 
 PLANNER = ab.Miqp(reserve=FLYING_RESERVE)
@@ -50,7 +57,7 @@ def test_a_longer_plan_is_worth_its_time(vehicle: str, tilt: float) -> None:
     first = ab.plan(half_flip(tilt), PLANNER, vehicle)
     found = steadied(first, PLANNER, ab.load_dispersion("lab"))
     if found.duration > first.duration:
-        more, less = map(int, re.findall(r"(\d+)(?: of 400 flights| *$)", found.rescue))
+        more, less = map(int, re.findall(r"(\d+) of 400", found.rescue))
         worth = max(MIN_GAIN, DURATION_PRICE * math.log(found.duration / first.duration))
         assert more - less >= worth * len(SELECTION_FLIGHTS)
 
@@ -98,3 +105,15 @@ def test_plans_stay_where_the_lag_turns_little_or_no_reserve_is_asked():
     flip = ab.plan("half-flip", PLANNER, quick)
     assert np.max(quick.lags) * flip.assessment.max_body_rate < MAX_LAG_ANGLE
     assert steadied(flip, PLANNER, lab) is flip
+
+
+def test_the_sentence_counts_both_plans_of_all_their_flights():
+    """A plan that was refuted early read "183 of 200 flights succeed instead of 308", which were of 400."""
+    plan = ab.plan("line", PLANNER, "agile-quad")
+    few, many = (
+        FlownPlan(
+            plan, ab.score_flights(plan, conditions="lab", flights=range(count)), FLYING_RESERVE, plan.problem
+        )
+        for count in (2, 3)
+    )
+    assert _explained(few, many).rescue.endswith(": 2 of 2 flights succeed instead of 3 of 3")

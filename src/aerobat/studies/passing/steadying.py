@@ -160,6 +160,6 @@ def _explained(found: FlownPlan, first: FlownPlan) -> Plan:
     why = (
         f"goes on from {first.plan.planner}'s {first.plan.duration:.3f} s"
         f"{found.tightening.described(first.reserve)}: {found.share.count} of {found.share.of} "
-        f"flights succeed instead of {first.share.count}"
+        f"flights succeed instead of {first.share.count} of {first.share.of}"
     )
     return replace(found.plan, attempts=(*first.plan.attempts, *found.plan.attempts), rescue=why)
