@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 import aerobat as ab
 from aerobat import so3
 from aerobat.control import Controller
+from aerobat.control.parameters import FREE_ERROR, hover_authority, max_bandwidth
 from aerobat.errors import SpecError
 from aerobat.simulation import Flight, Outcome, fly
 from aerobat.states import STANDARD_GRAVITY, BodyState
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import load_vehicle, vehicle_names
+from aerobat.vehicle.fleet import Fleet
 from suites import examples
 
 VEHICLES = vehicle_names()
@@ -153,6 +155,26 @@ def test_a_vehicle_with_weak_rotors_gets_slower_loops_of_the_same_shape() -> Non
     assert half.position == pytest.approx(usual.position / 4)
     assert half.velocity == pytest.approx(usual.velocity / 2)
     assert half.stiffness / half.damping**2 == pytest.approx(usual.stiffness / usual.damping**2)
+
+
+def test_slow_rotors_of_a_heavy_vehicle_hold_it_in_a_lab() -> None:
+    """Leads of such rotors' lag saturated them in a hover: most flights of 10 kg diverged."""
+    small = load_vehicle("hexarotor")
+    rotors = tuple(
+        replace(rotor, position_body=3.0 * rotor.position_body, min_thrust=1.5, max_thrust=40.0, lag=0.12)
+        for rotor in small.rotors
+    )
+    heavy = replace(small, mass=10.0, inertia=np.diag([0.6, 0.6, 1.1]), rotors=rotors)
+    flights = fly(hover(3.0), heavy, conditions="lab", flights=range(30))
+    assert set(flights.outcomes) == {Outcome.COMPLETE}
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_the_lag_slows_no_vehicle_that_comes_with_aerobat(name: str) -> None:
+    fleet, environment = Fleet.of([load_vehicle(name)]), ab.Environment()
+    saturating = np.sqrt(hover_authority(fleet, environment)[0, :2].min() / FREE_ERROR)
+    least = min(saturating, Controller().attitude_frequency)
+    assert max_bandwidth(fleet, environment)[0] >= least
 
 
 @pytest.mark.parametrize("name", ["full", "paper"])

@@ -67,14 +67,17 @@ def controller_parameters(controller: Controller, fleet: Fleet, environment: Env
     )
 
 
-def max_bandwidth(fleet: Fleet, environment: Environment, free_error: float = FREE_ERROR) -> Array:
+def max_bandwidth(fleet: Fleet, environment: Environment) -> Array:
     """Return the highest bandwidth [rad/s] of attitude loops that the rotors allow, (vehicles,).
 
-    In hover the rotors then saturate only at errors of roll or pitch above `free_error` [rad]. The value is
-    NaN for a vehicle that cannot hover.
+    In hover the rotors then saturate only at errors of roll or pitch above FREE_ERROR. Rotors that lag by
+    more than the inverse of that bandwidth allow its geometric mean with the inverse of their lag: commands
+    that lead a lag are larger. The value is NaN for a vehicle that cannot hover.
     """
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.sqrt(hover_authority(fleet, environment)[:, :2].min(axis=-1) / free_error))
+        saturating = np.sqrt(hover_authority(fleet, environment)[:, :2].min(axis=-1) / FREE_ERROR)
+    lag = np.maximum(fleet.lags.max(axis=-1), _MIN_TIME_CONSTANT)
+    return np.asarray(np.minimum(saturating, np.sqrt(saturating / lag)))
 
 
 def hover_authority(fleet: Fleet, environment: Environment) -> Array:

@@ -19,8 +19,8 @@ class Controller:
     """Gains, filters and switches of the tracking controller (paper, Section III).
 
     Gains are per unit of mass and of inertia, so that one set suits all vehicles. If a vehicle's rotors are
-    too weak for the attitude loop, both loops are slowed down by one factor (`gains`). The three switches add
-    features that reduce the tracking error; with all off, the law is the paper's (`paper`).
+    too weak or too slow for the attitude loop, both loops are slowed down by one factor (`gains`). The three
+    switches add features that reduce the tracking error; with all off, the law is the paper's (`paper`).
 
     The disturbance observer estimates forces and moments that the model does not contain: drag, gusts, rotors
     with more or less thrust than nominal. Its speed is limited by its filter and the rotors' lag. It needs an

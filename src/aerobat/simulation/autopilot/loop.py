@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerobat.control.parameters import controller_parameters, hover_authority, max_bandwidth
+from aerobat.control.parameters import controller_parameters, hover_authority
 from aerobat.environment import Environment
 from aerobat.kernels.control_loops import ReferencePoint
 from aerobat.kernels.rigid_body import Body
@@ -35,8 +35,9 @@ def autopilot_setup(start: Body, vehicle: Vehicle, environment: Environment) -> 
     authority = Authority(
         accelerations[:, :2].min(axis=-1), accelerations.min(axis=-1), fleet.lags.max(axis=-1)
     )
-    lag = _LAG_FRACTION * fleet.lags.max(axis=-1)
-    slewing = 1.0 / max_bandwidth(fleet, environment, _LINEAR_ERROR) + lag
+    with np.errstate(invalid="ignore"):  # vehicles that cannot hover have no bandwidth
+        bandwidth = np.sqrt(authority.tilt / _LINEAR_ERROR)
+    slewing = 1.0 / bandwidth + _LAG_FRACTION * authority.lag
     model = AutopilotModel(tracking, authority, upright=vehicle.controller.gains(1.0 / slewing))
     controller = AutopilotController(vehicle.controller.feature_flags)
     parts = LoopPart(StateObserver()), LoopPart(controller, model), plant_part(fleet, environment, RATE)
