@@ -94,6 +94,16 @@ def test_the_turn_once_around_follows_from_its_slopes() -> None:
     assert slope == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-3)
 
 
+def test_the_turn_once_around_is_found_whatever_the_durations_of_segments() -> None:
+    """Segments that begin by rounding after the last one ends were refused for huge derivatives."""
+    quad = replace(QUAD, drag_body=(0.2, 0.3, 0.2))
+    closure = Closure(Refinement.of(Task.of(SHORT, quad), Recorder(None)).limits)
+    still = np.zeros((12, len(FRACTIONS), 6, 3))
+    for seed in range(5):
+        durations = np.random.default_rng(seed).uniform(0.2, 0.6, 12)
+        assert closure.values(still, durations) == pytest.approx(0.0, abs=1e-12)
+
+
 @pytest.mark.slow
 def test_a_lap_flown_twice_over_is_certified_as_one_path() -> None:
     """The seam is a knot like any other, and the second time around the rotors bear the same."""

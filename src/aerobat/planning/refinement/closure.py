@@ -28,8 +28,8 @@ class Closure:
 
     def values(self, derivatives: Array, durations: Array) -> Array:
         """Return the turn [rad], (1,), from derivatives (S, p, 6, 3) and segment durations [s], (S,)."""
-        ends = np.cumsum(durations)
-        times = (ends - durations)[:, None] + durations[:, None] * FRACTIONS
+        starts = np.concatenate([[0.0], np.cumsum(durations)[:-1]])  # bit by bit where the last segments end
+        times = starts[:, None] + durations[:, None] * FRACTIONS
         axes = self.limits.frames(times.ravel(), derivatives.reshape(-1, 6, 3)).axes
         turn = axes[0].T @ axes[-1]
         return np.array([np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])])
