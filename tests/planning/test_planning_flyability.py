@@ -20,6 +20,7 @@ from aerobat.planning import (
 from aerobat.planning.flyability import disturbed_flight
 from aerobat.planning.task import Task
 from aerobat.reporting.plain_data import plain
+from aerobat.reporting.plans import _margin as margin_in_words
 from aerobat.reporting.report import Report
 from aerobat.simulation import Outcome
 from aerobat.trajectory import Trajectory
@@ -99,6 +100,13 @@ def test_without_a_reserve_nothing_is_bought(plan: ab.Plan) -> None:
     assert not bare.certified
     assert flyability(bare).disturbance == flyability(bare).disturbed_fraction == 0.0
     assert flyability(bare).disturbed_error == flyability(bare).error
+
+
+def test_a_flight_that_diverges_without_the_reserve_has_no_distance(plan: ab.Plan) -> None:
+    """The radius at which a flight is given up read as "moves the vehicle 5 m off its path"."""
+    found = replace(flyability(plan), disturbed_error=5.01)
+    assert str(found).endswith("with as much less from all rotors it diverges")
+    assert margin_in_words(found).endswith("; with a loss as large it diverges from its path")
 
 
 def test_a_certified_plan_that_does_not_fly_says_so_as_a_defect_of_its_own() -> None:

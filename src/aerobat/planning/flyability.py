@@ -106,6 +106,11 @@ class Flyability(OwnFlight):
     tilted_by_drag: bool = False  # whether the path misses a gate's attitude, as drag differs along x and y
 
     @property
+    def diverges_disturbed(self) -> bool:
+        """True if the disturbed flight diverges: its error is then where it was given up."""
+        return self.disturbed_error >= DIVERGENCE_RADIUS
+
+    @property
     def remedy(self) -> str:
         """The remedies that may mend the plan's defects, in words; empty where there are none."""
         if self.tilted_by_drag:
@@ -129,10 +134,11 @@ class Flyability(OwnFlight):
             )
         if not self.disturbance:
             return f"flies within {length(self.error)}, with no reserve left"
+        disturbed = "it diverges" if self.diverges_disturbed else f"within {length(self.disturbed_error)}"
         return (
             f"flies within {length(self.error)}; the reserve left, {self.disturbance:.2g} N, is "
             f"{100 * self.disturbed_fraction:.2g} % of a rotor's thrust: with as much less from all rotors "
-            f"within {length(self.disturbed_error)}"
+            f"{disturbed}"
         )
 
 

@@ -262,6 +262,8 @@ def _margin(found: Flyability) -> str:
         return f"no thrust is left to the controller: too little for a real flight; try {MORE_MARGIN}"
     little = "" if kept_fraction >= ENOUGH_MARGIN else f": little for a real flight; try {MORE_MARGIN}"
     moved = f"a loss as large moves the vehicle {rough_length(found.disturbed_error)} off its path"
+    if found.diverges_disturbed:
+        moved = "with a loss as large it diverges from its path"
     return f"{100.0 * kept_fraction:.2g} % of a rotor's thrust{little}; {moved}"
 
 
