@@ -114,10 +114,34 @@ def test_what_a_path_assumes_is_told_of_a_folder_that_holds_it_too(
 
 
 @pytest.mark.parametrize(
-    "header", ["t,x,y,z", "# t,x,y,z", '"t","x","y","z"', "TIME,X,Y,Z", "time,px,py,pz", "t, x, y, z"]
+    ("header", "options", "told"),
+    [
+        ("x,y,z,k", [], True),
+        ("x,y,z,t_ms", [], True),
+        ("x,y,z,k", ["--rate", "50"], False),
+        ("x,y,z,t", [], False),
+    ],
+)
+def test_the_rate_of_rows_without_times_is_told_where_nobody_gave_it(
+    header: str, options: list[str], told: bool, tmp_path: Path, monkeypatch, capsys
+) -> None:
+    """The duration of a path with times in t_ms was that of 100 rows a second, without a word."""
+    monkeypatch.chdir(tmp_path)
+    Path("path.csv").write_text(f"{header}\n" + "".join(f"{0.1 * k**2},0,1,{k}\n" for k in range(9)))
+    assert code("check", "path.csv", "--json", *options) in (0, 1)
+    assumed = json.loads(capsys.readouterr().out)["assumed"]
+    assert ("100 rows a second (--rate)" in assumed) == told
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["t,x,y,z", "# t,x,y,z", '"t","x","y","z"', "TIME,X,Y,Z", "time,px,py,pz", "t, x, y, z", ",t,x,y,z"],
 )
 def test_headers_as_others_write_them_are_understood(header: str, tmp_path: Path) -> None:
-    (tmp_path / "path.csv").write_text(f"{header}\n" + "".join(f"{5 + k / 10},{k},0,1\n" for k in range(6)))
+    """The last is that of a data frame, which writes its index without a name."""
+    index = "0," if header.startswith(",") else ""
+    rows = "".join(f"{index}{5 + k / 10},{k},0,1\n" for k in range(6))
+    (tmp_path / "path.csv").write_text(f"{header}\n{rows}")
     path = read_csv(tmp_path / "path.csv")
     assert path.duration == pytest.approx(0.5)
     np.testing.assert_allclose(path.evaluate(path.duration), [5.0, 0.0, 1.0], atol=1e-12)

@@ -68,12 +68,13 @@ def _bare_rows(text: str, rate: float) -> PathRows:
     require_numbers(text)
     expected = f"a path's have {CSV_COLUMNS}, or {CSV_COLUMNS + 1} with a time"
     rows = number_table(text, 1, (CSV_COLUMNS, CSV_COLUMNS + 1), expected)
-    times = rows[:, CSV_COLUMNS] if rows.shape[1] > CSV_COLUMNS else times_at_rate(len(rows), rate)
+    timed = rows.shape[1] > CSV_COLUMNS
+    times = rows[:, CSV_COLUMNS] if timed else times_at_rate(len(rows), rate)
     steps = np.diff(times)
     if times[0] != 0 or not (steps > 0).all():
         line = 1 if times[0] != 0 else 2 + int(np.argmax(steps <= 0))
         raise SpecError(f"line {line}: times, the thirteenth numbers, must start at 0 and rise")
-    return PathRows(rows[:, :CSV_COLUMNS].reshape(-1, 4, 3), steps)
+    return PathRows(rows[:, :CSV_COLUMNS].reshape(-1, 4, 3), steps, timed=timed)
 
 
 def _text(path: Path) -> str:

@@ -21,7 +21,8 @@ NAMES: Mapping[str, tuple[str, ...]] = {  # of columns, by groups
     "rates": ("wx", "wy", "wz"),
     "thrusts": (),  # f0, f1, ..., one for each rotor
 }
-SYNONYMS = {"time": "t", "time_s": "t", "px": "x", "py": "y", "pz": "z"}
+UNNAMED = "unnamed"  # the name of a column without one, such as the index of a data frame
+SYNONYMS = {"time": "t", "time_s": "t", "px": "x", "py": "y", "pz": "z", "": UNNAMED}
 MAX_ROWS = 2_000_000  # five hours at 100 Hz, half an hour at 1 kHz
 MAX_COLUMNS = 1000
 
@@ -29,8 +30,9 @@ MAX_COLUMNS = 1000
 def has_header(text: str) -> bool:
     """Return True if a file's first line names columns and has no numbers."""
     first = text.partition("\n")[0].strip().lstrip("#")
-    words = first.split(",", MAX_COLUMNS)  # of more columns, the last part is no identifier
-    return all(word.strip().strip('"').isidentifier() and not _is_number(word) for word in words)
+    # of more columns, the last part is no identifier
+    words = [word.strip().strip('"') for word in first.split(",", MAX_COLUMNS)]
+    return any(words) and all((word or UNNAMED).isidentifier() and not _is_number(word) for word in words)
 
 
 def require_numbers(text: str) -> None:

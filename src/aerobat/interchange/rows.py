@@ -34,6 +34,7 @@ class PathRows:
     steps: Array  # [s] from row to row, (rows - 1,)
     attitude: Array | None = None  # body to world at the first row, (4,)
     unused: tuple[str, ...] = ()  # other content of the file, in words
+    timed: bool = True  # whether the rows have times of their own
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -172,7 +173,7 @@ def rows_of_columns(text: str, rate: float) -> PathRows:
     for derivative, group in enumerate(PATH):
         if all(name in columns for name in NAMES[group]):
             knots[:, derivative] = np.stack([columns[name] for name in NAMES[group]], axis=1)
-    return PathRows(knots, steps, _first_attitude(columns), tuple(_unused(columns)))
+    return PathRows(knots, steps, _first_attitude(columns), tuple(_unused(columns)), "t" in columns)
 
 
 def times_at_rate(rows: int, rate: float) -> Array:

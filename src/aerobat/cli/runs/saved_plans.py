@@ -78,11 +78,12 @@ def read_source(path: Path, rate: float | None) -> tuple[Plan | Trajectory, list
     path = plan_file(path)
     if rate is not None and path.suffix in (".plan", ".npz"):
         raise SpecError(f"--rate is for a CSV file, not for {path}; leave it out")
-    rate = USUAL_RATE if rate is None else rate
+    each_second = USUAL_RATE if rate is None else rate
     if path.suffix != ".csv":
-        return read_plan(path, rate), []
-    rows = read_rows(path, rate)
-    facts = [f"{each} left out" for each in rows.unused]
+        return read_plan(path, each_second), []
+    rows = read_rows(path, each_second)
+    facts = [] if rows.timed or rate is not None else [f"{USUAL_RATE:g} rows a second (--rate)"]
+    facts += [f"{each} left out" for each in rows.unused]
     error = rows.fit_error
     if error is None:
         how_far = "these are too few to tell how far it is off"
