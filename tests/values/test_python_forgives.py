@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from math import inf, pi
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,16 @@ def test_a_problem_a_planner_and_a_vehicle_go_by_their_names() -> None:
     assert ab.score(flight(), "line", "agile-quad").outcome is ab.Outcome.COMPLETE
     assert len(ab.score_flights(plan(), "agile-quad", problem="line", rate=100.0)) == 1
     assert ab.certify(plan().trajectory, "agile-quad") == ab.certify(plan())
+
+
+def test_the_path_of_a_file_is_taken_where_a_name_is(tmp_path: Path) -> None:
+    """A path as text was taken, one of `pathlib` refused."""
+    ab.write_vehicle(QUAD, tmp_path / "mine.toml")
+    ab.write_problem(LINE, tmp_path / "mine-too.toml")
+    assert ab.fly(plan(), [tmp_path / "mine.toml"] * 2, rate=100.0).vehicles == ("agile-quad",) * 2
+    assert (
+        ab.score(flight(), tmp_path / "mine-too.toml", tmp_path / "mine.toml").outcome is ab.Outcome.COMPLETE
+    )
 
 
 def test_a_problem_is_planned_for_the_vehicle_that_the_command_line_takes() -> None:

@@ -1,14 +1,17 @@
 """The decorator of public functions: arguments are checked by their annotations before the function runs.
 
 A number must be finite and neither text nor bool; an array must hold numbers; a class takes its instances; a
-path must be a possible one. Wrong arguments raise SpecError, one sentence that names the argument and, if the
-value fits another argument, that one. Annotations are read at the first call, so that imports stay fast.
+path must be a possible one. Where the name of a declared value is taken, the path of its file is, too. Wrong
+arguments raise SpecError, one sentence that names the argument and, if the value fits another argument, that
+one. Annotations are read at the first call, so that imports stay fast.
 """
 
 from __future__ import annotations
 
 import inspect
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
 from functools import wraps
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
@@ -159,9 +162,14 @@ def check_of(hint: Any) -> Check:
     """Return the check of values by an annotation."""
     alternatives = list(_alternatives(hint))
     checks = [_check_of_one(each) for each in alternatives]
+    has_file = str in alternatives and any(
+        isinstance(each, type) and is_dataclass(each) for each in alternatives
+    )
 
     def check(value: Any) -> Any:
         complaints = []
+        if has_file and isinstance(value, os.PathLike):
+            value = os.fspath(value)
         for one in checks:
             try:
                 return one(value)
@@ -228,12 +236,14 @@ def _sequence_of(*members: Any) -> Check:
             raise FieldError("", f"must be a list, got {shown(value)}")
         if is_fixed and len(value) != len(checks):
             raise FieldError("", f"must have {len(checks)} entries, got {shown(value)}")
+        fitting = []
         for i, each in enumerate(value):
             try:
-                checks[i if is_fixed else 0](each)
+                fitting.append(checks[i if is_fixed else 0](each))
             except FieldError as error:
                 raise error.inside(f"[{i}]") from None
-        return value
+        has_paths = any(isinstance(each, os.PathLike) for each in value)
+        return tuple(fitting) if has_paths else value
 
     return check
 
