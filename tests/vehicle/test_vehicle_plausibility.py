@@ -31,6 +31,7 @@ MISTYPED = {
     "inertia in g m2": (replace(QUAD, inertia=1e3 * QUAD.inertia), "inertia", "typed in g·m²"),
     "inertia in g cm2": (replace(QUAD, inertia=1e7 * QUAD.inertia), "inertia", "typed in g·cm²"),
     "inertia of a speck": (replace(QUAD, inertia=1e-4 * QUAD.inertia), "inertia", "check its unit"),
+    "rate in degrees": (replace(QUAD, max_body_rate=1998.0), "max_body_rate", "typed in °/s"),
     "thrust in grams": (with_rotors(max_thrust=lambda f: 100 * f), "max_thrust", "grams of force"),
 }
 

@@ -90,8 +90,8 @@ def _weaknesses(vehicle: Vehicle, hover: float, bandwidth: float) -> Iterator[st
         yield f"a hover takes {100 * hover:.0f} % of a rotor's thrust: little is left to turn by"
     if not bandwidth >= MIN_BANDWIDTH:
         yield (
-            f"the attitude loop has {bandwidth:.2g} rad/s at most: slow for flips; are inertia and "
-            "position_body those of this vehicle?"
+            f"the attitude loop has {bandwidth:.2g} rad/s at most: slow for flips; are inertia, "
+            "position_body and lag those of this vehicle?"
         )
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import hypot, log, sqrt
+from math import hypot, inf, log, radians, sqrt
 
 import numpy as np
 
@@ -19,13 +19,16 @@ from aerobat.vehicle.vehicle import Vehicle
 
 MAX_GYRATION = 1.0  # [-] radius of gyration over the reach of arm and propeller: 1 if all mass is at the tips
 MIN_GYRATION = 0.03  # [-] over the arm: motors alone, a fifth of the mass at the arms' ends, give 0.3
+MAX_BODY_RATE = 100.0  # [rad/s] gyros read up to 70, as 4000°/s
 MAX_THRUST_TO_WEIGHT = 40.0  # [-] record racers reach 25
 MIN_THRUST_TO_WEIGHT = 0.1  # [-] on Earth: too little even for the Moon
 TYPICAL_GYRATION = 0.35  # [-] over the reach, to choose between units that are all plausible
+TYPICAL_BODY_RATE = 15.0  # [rad/s]
 
 LENGTHS = (("mm", 1e-3), ("cm", 1e-2), ("inches", 0.0254))
 TIMES = (("ms", 1e-3), ("µs", 1e-6))
 INERTIAS = (("g·m²", 1e-3), ("kg·cm²", 1e-4), ("kg·mm²", 1e-6), ("g·cm²", 1e-7), ("g·mm²", 1e-9))
+RATES = (("°/s", radians(1.0)), ("rpm", radians(6.0)))
 Units = Sequence[tuple[str, float]]  # names of units, each with its size in the SI unit
 
 
@@ -46,7 +49,7 @@ def implausibilities(vehicle: Vehicle | str) -> tuple[str, ...]:
     """Return a sentence for each kind of implausible value, with the unit that was probably meant."""
     vehicle = as_vehicle(vehicle)
     found = (*_of_dead_rotors(vehicle), *_of_rotors(vehicle.rotors), *_of_inertia(vehicle))
-    return (*found, *_of_thrust(vehicle))
+    return (*found, *_of_thrust(vehicle), *_of_body_rate(vehicle.max_body_rate))
 
 
 def _of_dead_rotors(vehicle: Vehicle) -> Iterator[str]:
@@ -117,6 +120,12 @@ def _of_thrust(vehicle: Vehicle) -> Iterator[str]:
             f"max_thrust adds up to {vehicle.thrust_to_weight:.2g} of the weight of mass, {vehicle.mass:g} "
             "kg; is mass in kg, max_thrust in N, k_f in N/(rad/s)², not N/rpm², max_rpm in rpm, not rad/s?"
         )
+
+
+def _of_body_rate(most: float) -> Iterator[str]:
+    if MAX_BODY_RATE < most < inf:
+        remedy = _remedy(most, (0.0, MAX_BODY_RATE), TYPICAL_BODY_RATE, RATES)
+        yield f"max_body_rate is {most:.4g} rad/s, where {MAX_BODY_RATE:.3g} would be a lot; {remedy}"
 
 
 def _remedy(value: float, limits: tuple[float, float], typical: float, units: Units) -> str:
