@@ -12,6 +12,7 @@ from rich.console import Console
 
 import aerobat as ab
 from aerobat import so3
+from aerobat.evaluation.criteria import criterion
 from aerobat.planning import PlacedStage
 from aerobat.problem import Tolerance
 from aerobat.reporting.plain_data import plain
@@ -116,3 +117,16 @@ def test_a_tolerance_is_read_from_a_file_and_written_as_it_was(tmp_path: Path) -
     path.write_text(path.read_text().replace("position = 0.3", "position = -1"))
     with pytest.raises(ab.SpecError, match=r"tolerance\.position must be"):
         ab.load_problem(path)
+
+
+def test_a_gate_that_no_stage_passes_is_not_asked() -> None:
+    """Flights of certified plans without any other gate were said to miss it."""
+    aside = ab.tilted_gate((2.0, 50.0, 1.0), name="aside")
+    way = ab.Waypoints((ab.Waypoint((5.0, 0.0, 0.0)),))
+    plan = ab.plan(replace(ab.load_problem("line"), maneuver=way, gates=(aside,)), vehicle="agile-quad")
+    flight = ab.fly(plan)
+    for goal in (plan, plan.problem):
+        score = ab.score(flight, goal)
+        assert score.outcome is ab.Outcome.COMPLETE
+        assert not score.passages
+    assert criterion(plan.problem).startswith("the whole path within")

@@ -45,8 +45,8 @@ class SampledPath(NamedTuple):
 def criteria_of(goal: Problem | Plan, path: SampledPath) -> Criteria:
     """Return the criteria of flights: passages in the order of the stages, or of all gates.
 
-    All gates are used where no stage has a place. The first lap begins at the start of the path. The first
-    lap of a closed course begins one path duration before the path's last passage.
+    All gates are used where the problem has no stages. The first lap begins at the start of the path. The
+    first lap of a closed course begins one path duration before the path's last passage.
 
     A plan's stages give the times of passages. Without a plan the times are those of the set-points' nearest
     approaches to the centres, in the stages' order where they have one.
@@ -108,10 +108,10 @@ def _between(path: SampledPath, values: Array, time: float) -> Array:
 
 def criterion(problem: Problem) -> str:
     """Return the criteria of a successful flight, in words."""
-    stages = problem.stages(1.0).stages
+    stages = _passed_stages(problem)
     tolerance = problem.tolerance
     passed = [
-        *(["gates as asked"] if problem.gates else []),
+        *(["gates as asked"] if any(stage.gate is not None for stage in stages) else []),
         *(["waypoints within their radius"] if any(stage.ball for stage in stages) else []),
     ]
     within = "the goal and the places of other stages" if passed else "the whole path"
@@ -121,11 +121,15 @@ def criterion(problem: Problem) -> str:
     return ", ".join([*passed, *clear, tolerances])
 
 
+def _passed_stages(problem: Problem) -> list[Stage]:
+    """Return the stages with a gate or a ball, or those of all gates where the problem has no stages."""
+    stages = problem.stages(1.0).stages or [Stage(gate.name, gate=gate.name) for gate in problem.gates]
+    return [stage for stage in stages if stage.gate is not None or stage.ball is not None]
+
+
 def _nearest_stages(problem: Problem, path: SampledPath) -> list[tuple[Stage, float]]:
-    """Return the stages with a gate or a ball, or all gates, each at the nearest set-point."""
-    sequence = problem.stages(1.0)
-    stages = [stage for stage in sequence.stages if stage.gate is not None or stage.ball is not None]
-    stages = stages or [Stage(gate.name, gate=gate.name) for gate in problem.gates]
+    """Return the stages of `_passed_stages`, each with the time [s] of the nearest set-point."""
+    sequence, stages = problem.stages(1.0), _passed_stages(problem)
     centres = [_centre(stage, problem, path.times) for stage in stages]
     in_order = sequence.ordered and bool(sequence.stages)
     return list(zip(stages, _nearest_instants(centres, path.times, path.position, in_order), strict=True))
