@@ -18,6 +18,7 @@ from aerobat.links.mission import Mission, MissionSettings
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import least_duration
 from aerobat.planning.passages import gaps_at_ends
+from aerobat.planning.polynomial.starts import closed_forms
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.closure import FRACTIONS, Closure
 from aerobat.planning.refinement.refine import Refinement
@@ -102,6 +103,19 @@ def test_the_turn_once_around_is_found_whatever_the_durations_of_segments() -> N
     for seed in range(5):
         durations = np.random.default_rng(seed).uniform(0.2, 0.6, 12)
         assert closure.values(still, durations) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_lap_of_figures_alone_has_starts_at_their_places() -> None:
+    """Figures give ranges of positions: without a gate or a waypoint beside them, planning failed."""
+    loops = ab.Course(
+        (ab.PowerLoop((0.0, 0.0, 2.0)), ab.PowerLoop((5.0, 0.0, 2.0), heading=np.pi)), closed=True
+    )
+    _, start = next(closed_forms(Task.of(replace(SHORT, maneuver=loops), QUAD)))
+    times = [0.0, start.trajectory.duration]
+    assert np.ptp(start.trajectory.evaluate(times, 1), axis=0) == pytest.approx(0.0, abs=1e-2)
+    x = start.trajectory.evaluate(np.linspace(*times, 200))[:, 0]
+    assert x.min() < 0.5
+    assert x.max() > 4.5
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerobat.planning.polynomial.knots import path_along_normals
+from aerobat.planning.polynomial.knots import path_along_normals, position_at_knot
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.end_state import at_rest
@@ -28,8 +28,8 @@ def flying_lap(task: Task, order: int) -> WarmStart:
         order: The derivative of position whose square is minimized.
     """
     problem, sequence = task.problem, task.stages
-    positions = [stage.position(problem.gates) for stage in sequence.stages]
-    places = [position for position in positions if not np.isnan(position).any()]
+    positions = [position_at_knot(stage, task) for stage in sequence.stages]
+    places = [position for position in positions if not np.isnan(position).any()] or [np.zeros(3)]
     lap = (Stage("seam"), *sequence.stages)
     laps = replace(sequence, stages=(*UNROLLED * lap, Stage("seam")), closed=False)
     open_ends = replace(problem, maneuver=Line(), start=at_rest(places[-1]), goal=at_rest(places[0]))

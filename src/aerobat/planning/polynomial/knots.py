@@ -52,12 +52,16 @@ def fixed_at_knots(task: Task, order: int, velocities: Array) -> Array:
     met = problem.goal.fixed(order)
     fixed[0], fixed[-1, met] = problem.start.derivatives(order), problem.goal.derivatives(order)[met]
     for knot, (stage, velocity) in enumerate(zip(stages, velocities, strict=True), 1):
-        for derivative in range(3):
+        fixed[knot, 0] = position_at_knot(stage, task)
+        for derivative in (1, 2):
             fixed[knot, derivative] = _fixed(stage, derivative, task.balance, velocity)
-        centre = stage.centre(problem.gates)
-        if centre is not None:
-            fixed[knot, 0] = centre
     return fixed
+
+
+def position_at_knot(stage: Stage, task: Task) -> Array:
+    """Return the position [m] of `fixed_at_knots` at a stage, NaN where it is free, (3,)."""
+    centre = stage.centre(task.problem.gates)
+    return _fixed(stage, 0, task.balance, np.zeros(3)) if centre is None else centre
 
 
 def stages_with_drag(task: Task) -> list[int]:
