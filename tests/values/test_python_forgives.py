@@ -37,6 +37,8 @@ def test_the_path_of_a_file_is_taken_where_a_name_is(tmp_path: Path) -> None:
     """A path as text was taken, one of `pathlib` refused."""
     ab.write_vehicle(QUAD, tmp_path / "mine.toml")
     ab.write_problem(LINE, tmp_path / "mine-too.toml")
+    ab.write_dispersion(ab.load_dispersion("none"), tmp_path / "calm.toml")
+    assert ab.fly(plan(), conditions=tmp_path / "calm.toml") == ab.fly(plan(), conditions="none")
     assert ab.fly(plan(), [tmp_path / "mine.toml"] * 2, rate=100.0).vehicles == ("agile-quad",) * 2
     assert (
         ab.score(flight(), tmp_path / "mine-too.toml", tmp_path / "mine.toml").outcome is ab.Outcome.COMPLETE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, TypedDict
@@ -23,13 +24,13 @@ LogRate = Annotated[float, Field(ge=1e-3, le=1e6, description="number from 0.001
 
 
 def _or_named(cls: type, named: Callable[[str], Any]) -> PlainValidator:
-    """Return the validator of an instance of a class, of its name, or of None."""
+    """Return the validator of an instance of a class, of its name or the path of its file, or of None."""
 
     def made(value: Any) -> Any:
         if value is None or isinstance(value, cls):
             return value
-        if isinstance(value, str):
-            return named(value)
+        if isinstance(value, str | os.PathLike):
+            return named(os.fspath(value))
         raise FieldError("", f"must be a {cls.__name__} or the name of one, got {shown(value)}")
 
     return PlainValidator(made)
