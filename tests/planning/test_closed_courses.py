@@ -17,6 +17,7 @@ from aerobat.flatness import reference
 from aerobat.links.mission import Mission, MissionSettings
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import least_duration
+from aerobat.planning.heading.follow import _remedy as turn_remedy
 from aerobat.planning.passages import gaps_at_ends
 from aerobat.planning.polynomial.starts import closed_forms
 from aerobat.planning.recorder import Recorder
@@ -116,6 +117,13 @@ def test_a_lap_of_figures_alone_has_starts_at_their_places() -> None:
     x = start.trajectory.evaluate(np.linspace(*times, 200))[:, 0]
     assert x.min() < 0.5
     assert x.max() > 4.5
+
+
+def test_a_turn_that_opens_a_lap_is_not_mended_by_a_reserve() -> None:
+    """More reserve was advised to vehicles of unequal drag, whose laps no turn closes."""
+    assert "equal drag_body" in turn_remedy(SHORT, replace(QUAD, drag_body=(0.2, 0.3, 0.2)))
+    assert "--reserve" in turn_remedy(SHORT, QUAD)
+    assert "--reserve" in turn_remedy(ab.load_problem("line"), replace(QUAD, drag_body=(0.2, 0.3, 0.2)))
 
 
 @pytest.mark.slow

@@ -16,13 +16,16 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.errors import Infeasible, Reason
+from aerobat.flatness import has_unequal_drag
 from aerobat.optimization.quadratic import quadratic_minimum
 from aerobat.planning.heading.yaw_limits import ORDERS, YawLimits
 from aerobat.planning.heading.yaw_spline import PER_KNOT, YawSpline
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
 from aerobat.problem.heading import Heading, HeadingMode
+from aerobat.problem.problem import Problem
 from aerobat.states import FlatState
+from aerobat.vehicle import Vehicle
 
 RESERVE_FRACTION = 0.5  # fraction of the path's reserve that stays for the controller; the rest is for yaw
 # fractions of each part at which limits are evaluated: not at its knots, and denser near them, where limits
@@ -70,7 +73,7 @@ def with_heading(plan: Plan, reserve: float) -> Plan:
         found = next((each for each in tried if each.certified), found)
     if plan.certified and not found.certified:
         why = "" if found.certificate is None else found.certificate.why
-        sentence = f"no turn is proven that follows the heading: {why}; leave more with --reserve"
+        sentence = f"no turn is proven that follows the heading: {why}; {_remedy(plan.problem, plan.vehicle)}"
         raise Infeasible(Reason(sentence, ("heading", "reserve")))
     error = heading_error(found)
     if error is not None and degrees(error.largest) > heading.tolerance_deg:
@@ -83,6 +86,16 @@ def with_heading(plan: Plan, reserve: float) -> Plan:
             )
         )
     return found
+
+
+def _remedy(problem: Problem, vehicle: Vehicle) -> str:
+    """Return what may help where no turn is proven.
+
+    A turn changes the thrust of a vehicle whose drag differs along x and y, so that its lap does not close.
+    """
+    if not problem.ends and has_unequal_drag(vehicle):
+        return "on a closed course, leave the heading free, or take equal drag_body along x and y"
+    return "leave more with --reserve"
 
 
 @dataclass(frozen=True)
