@@ -27,17 +27,20 @@ def test_equations_are_solved_as_numpy_solves_them_or_found_not_positive_definit
     chain: tuple[Array, int, int], columns: int, seed: int
 ) -> None:
     matrix, border, width = chain
-    right = np.random.default_rng(seed).normal(size=(len(matrix), columns))
+    right = np.random.default_rng(seed).normal(size=(len(matrix), columns + 1))
     factors = bordered_band(matrix, border, width).cholesky()
     least = np.linalg.eigvalsh(matrix)[0]
     if factors is None:
         assert least < 1e-9
         return
     assert least > -1e-9
-    np.testing.assert_allclose(matrix @ factors.solve(right), right, atol=1e-9 * max(1.0, 1.0 / abs(least)))
     np.testing.assert_allclose(
-        factors.solve(right.sum(axis=1)), factors.solve(right).sum(axis=1), atol=1e-9 / abs(least)
+        matrix @ factors.solve(right[:, 0]), right[:, 0], atol=1e-9 * max(1.0, 1.0 / abs(least))
     )
+    moved = factors.forward(right[:, 1:])
+    assert moved.shape == (len(matrix), columns)
+    expected = right[:, 1:].T @ np.linalg.solve(matrix, right[:, 1:])
+    np.testing.assert_allclose(moved.T @ moved, expected, rtol=1e-6, atol=1e-9 * max(1.0, 1.0 / abs(least)))
 
 
 @given(chain=chains(), seed=st.integers(0, 2**31))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg.lapack import dpbtrf, dpbtrs, dpotrf, dpotrs
+from scipy.linalg.lapack import dpbtrf, dpotrf, dtbtrs, dtrtrs
 from scipy.sparse import coo_array, csr_array
 
 from aerobat.arrays import Array, Indices
@@ -103,24 +103,39 @@ class BorderedBand:
         band, failed = dpbtrf(self.band, lower=1)
         if failed:
             return None
-        coupling = self.border[:, :inner]
-        eliminated, _ = dpbtrs(band, coupling.T, lower=1)
-        corner, failed = dpotrf(self.border[:, inner:] - coupling @ eliminated, lower=1)
-        return None if failed else BorderedCholesky(band, coupling, eliminated, corner)
+        coupling, _ = dtbtrs(band, self.border[:, :inner].T, uplo="L")
+        corner, failed = dpotrf(self.border[:, inner:] - coupling.T @ coupling, lower=1)
+        return None if failed else BorderedCholesky(band, coupling, corner)
 
 
 @dataclass(frozen=True, eq=False)
 class BorderedCholesky:
-    """The Cholesky factors of a band, and of the Schur complement that its border leaves."""
+    """The Cholesky factor L of a matrix L Lᵀ with a band and a border.
+
+    Everything is solved with L and its transpose, which is stable: barrier functions make matrices whose
+    inverses would lose all digits.
+    """
 
     band: Array  # the factor of the band, as LAPACK stores it, (width + 1, m)
-    coupling: Array  # the matrix's last rows below the band, (border, m)
-    eliminated: Array  # the inverse of the band times the transposed coupling, (m, border)
-    corner: Array  # the factor of the Schur complement, (border, border)
+    coupling: Array  # the transposed last rows of the factor, below its band, (m, border)
+    corner: Array  # the last rows and columns of the factor, (border, border)
 
     def solve(self, right: Array) -> Array:
-        """Return the inverse of the matrix times right-hand sides, (n,) or (n, r)."""
-        inner = len(self.eliminated)
-        first, _ = dpbtrs(self.band, right[:inner], lower=1)
-        last, _ = dpotrs(self.corner, right[inner:] - self.coupling @ first, lower=1)
-        return np.concatenate([first - self.eliminated @ last, last])
+        """Return the solution x of L Lᵀ x = right, (n,)."""
+        return self.backward(self.forward(right))
+
+    def forward(self, right: Array) -> Array:
+        """Return the solution x of L x = right, (n,) or (n, r)."""
+        if not right.size:  # dtbtrs of SciPy 1.17 would write outside its arrays
+            return right
+        inner = len(self.coupling)
+        first, _ = dtbtrs(self.band, right[:inner], uplo="L")
+        last, _ = dtrtrs(self.corner, right[inner:] - self.coupling.T @ first, lower=1)
+        return np.concatenate([first, last])
+
+    def backward(self, right: Array) -> Array:
+        """Return the solution x of Lᵀ x = right, (n,)."""
+        inner = len(self.coupling)
+        last, _ = dtrtrs(self.corner, right[inner:], lower=1, trans=1)
+        first, _ = dtbtrs(self.band, right[:inner] - self.coupling @ last, uplo="L", trans="T")
+        return np.concatenate([first, last])

@@ -456,8 +456,8 @@ class _Equations:
         if factors is None:
             return False
         self._factors = factors
-        self._moved = factors.solve(self._equal.T)
-        self._schur = self._equal @ self._moved + 1e-14 * np.eye(len(self._equal))
+        self._moved = factors.forward(self._equal.T)
+        self._schur = self._moved.T @ self._moved + 1e-14 * np.eye(len(self._equal))
         return True
 
     def step(self, residual: Array, equal: Array) -> _Step:
@@ -468,7 +468,7 @@ class _Equations:
         right -= self._weight * (self._equal.T @ equal)
         x = self._factors.solve(right)
         y = np.asarray(np.linalg.solve(self._schur, self._equal @ x + equal), dtype=float)
-        x = x - self._moved @ y
+        x = x - self._factors.backward(self._moved @ y)
         slacks = -residual - at.point.rows.times(x)
         return _Step(x, slacks, central - at.z - sigma * slacks, y)
 
