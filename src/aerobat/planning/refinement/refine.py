@@ -99,10 +99,11 @@ BACKOFF_OFFSET = 2e-4  # constant added to that tightening, relative to the limi
 # Distance from the tightened limit, relative to the limit's size, within which a certificate may find a
 # violation that dense samples miss.
 NEAR_LIMIT = 2e-3
-# Largest constraint violation, relative to the limit's size, that further rounds may repair: a path whose
-# rotors lag may violate limits on commands by their whole range between places, and by a tenth a round later.
-# With 0.5, one of 75 random problems took twice as long a path; 10 changes none of them.
-REPAIRABLE_VIOLATION = 2.0
+# largest constraint violation, relative to the limit's size, that further rounds may repair
+REPAIRABLE_VIOLATION = 0.5
+# The same among rough rounds: commands of rotors that lag may swing by more than their range between places,
+# and a round later by a tenth. With 0.5, one of 75 random problems took twice as long a path.
+BETWEEN_PLACES = 2.0
 RELATIVE_STAGE_TOLERANCE = 1e-5  # violation of a stage's condition, relative to its size, that is rounding
 # Largest violation of a stage's condition, relative to its size, that further rounds may repair. With 0.02,
 # half-flips of x500 through gates at 45° and 60° took half as long again.
@@ -144,8 +145,8 @@ class Refinement:
     high_accuracy: bool = False  # whether solves are more accurate: within 0.1 % of the local optimum
     # whether paths get twice as many segments where certification costs more than LOSS
     adds_segments: bool = False
-    # whether a path that misses a stage with few segments is given up: more segments take several times as
-    # long, mostly in vain. For planners that have other starts.
+    # whether a path that misses a stage with few segments, or violates limits by far, is given up: more
+    # segments and rounds take several times as long, mostly in vain. For planners that have other starts.
     gives_up_early: bool = False
     _known: dict[tuple[Stage, ...], StageValues] = field(default_factory=dict, init=False, repr=False)
 
@@ -256,7 +257,7 @@ class Refinement:
         The result's `certified` is the shortest certified path of these rounds and of earlier ones.
         """
         rounds = Rounds(self, guess, multipliers=multipliers)
-        before = np.inf
+        before, repairable = np.inf, REPAIRABLE_VIOLATION if self.gives_up_early else BETWEEN_PLACES
         for number in range(ROUGH_ROUNDS):
             solution = rounds.solve()
             certified = _shortest(certified, judge(solution, self.task, self.recorder))
@@ -265,7 +266,7 @@ class Refinement:
             gains_little = has_converged and duration > (1.0 - LITTLE_GAIN) * before
             is_slow = duration > (1.0 + DURATION_CUTOFF) * known
             is_over = gains_little or is_slow or rounds.has_stalled(solution)
-            if is_over or out_of_time() or not self.is_promising(solution.source):
+            if is_over or out_of_time() or not self.is_promising(solution.source, repairable):
                 break
             before = duration
             rounds.recenter(solution.source)
@@ -312,9 +313,14 @@ class Refinement:
         rounds.back_off(rough.violation)
         return certified_solve(rounds, self.task, self.recorder, FINE_ROUNDS)
 
-    def is_promising(self, path: RefinedPath) -> bool:
-        """Return whether further rounds may repair a path's constraint violations and missed stages."""
-        return path.violation.largest <= REPAIRABLE_VIOLATION and self._nearly_meets_stages(path)
+    def is_promising(self, path: RefinedPath, violation: float = REPAIRABLE_VIOLATION) -> bool:
+        """Return whether further rounds may repair a path's constraint violations and missed stages.
+
+        Args:
+            path: The path.
+            violation: The largest violation that they may repair, relative to the limit's size.
+        """
+        return path.violation.largest <= violation and self._nearly_meets_stages(path)
 
     def _gives_up(self, path: RefinedPath) -> bool:
         """Return whether the refinement gives a path up early, before it has the requested segments."""
