@@ -203,9 +203,11 @@ class MultiStart:
         guess = replace(self.guess, reserve=task.reserve)
         if is_course(task.stages):
             quick = replace(self.refinement, gives_up_early=True)
+            alone: tuple[float, ...] = (1.0, *SLOWER_PACES)
             if task.stages.closed:
                 yield quick, list(closed_forms(task, FLYING_PACES))
-            for start in closed_forms(task, (1.0, *SLOWER_PACES)):
+                alone = SLOWER_PACES
+            for start in closed_forms(task, alone):
                 yield quick, [start]
             for each in chain(starts(task, guess), closed_forms(task, SLOWER_PACES), self._of_more(guess)):
                 yield self.refinement, [each]
