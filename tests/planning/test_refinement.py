@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from aerobat.environment import Box, Cylinder, Environment
 from aerobat.planning import Miqp
 from aerobat.planning.gate_clearance import bodies_in_gates
+from aerobat.planning.polynomial.flying_lap import flying_lap
 from aerobat.planning.polynomial.knots import start_along_normals
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.limit_values import LimitValues
@@ -95,6 +96,35 @@ def test_slopes_and_second_derivatives_are_differences(problem: Problem, lag: fl
     squared = dense(here.curvature(0.0 * weights, 0.0 * others, weights)) @ step
     expected = here.rows.transposed(weights * here.rows.times(step))
     np.testing.assert_allclose(squared, expected, rtol=1e-8, atol=1e-10 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("closed", [False, True], ids=["open", "closed"])
+def test_squares_of_all_rows_but_a_whole_laps_lie_in_the_band_and_the_border(closed: bool) -> None:
+    """The attitude in which a lap ends depends on the whole lap. Where its square went astray, laps were slow."""
+    near = program(COURSE, QUAD, 6)
+    if closed:
+        task = Task.of(load_problem("lap-7"), QUAD)
+        lap, stages = knots_at_stages(flying_lap(task, 4), 8), StageValues(task.stages.stages, task, ())
+        near = replace(
+            near,
+            spline=Spline(task, lap.trajectory),
+            limits=LimitValues(task),
+            stages=stages,
+            stage_segments=tuple(range(7)),
+            fractions=np.tile(near.fractions[0], (8, 1)),
+            backoff=np.zeros((8, len(LimitValues(task).sides))),
+        )
+    here = near.at(near.spline.start)
+    equal, others = here.equality_rows, here.rows.others
+    weights, values = np.ones(len(here.inequalities)), here.equalities
+    matrix = here.curvature(weights, values, 0.0 * weights)
+    fits = matrix.pattern.has_squares(equal)
+    assert len(fits) - fits.sum() == closed
+    assert matrix.pattern.has_squares(others).all()
+    for rows in (equal[fits], others):
+        found = dense(matrix.plus_squares(rows, 2.0))
+        expected = dense(matrix) + 2.0 * rows.T @ rows
+        np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_variables_of_a_path_give_the_path_and_others_meet_its_ends() -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpotrf, dtbtrs, dtrtrs
 from scipy.sparse import coo_array, csr_array
 
-from aerobat.arrays import Array, Indices
+from aerobat.arrays import Array, Indices, Mask
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,16 @@ class Pattern:
         in_band = columns * (self.width + 1) + rows - columns
         in_border = self.inner * (self.width + 1) + (rows - self.inner) * self.size + columns
         return np.where(rows < self.inner, in_band, in_border)
+
+    def has_squares(self, rows: Array) -> Mask:
+        """Return whether the square of each row lies in the band and the border, (q,).
+
+        Args:
+            rows: Rows (q, n). Those that couple distant segments, as of a whole lap, lie outside.
+        """
+        inner = rows[:, : self.inner] != 0.0
+        first, last = inner.argmax(axis=1), self.inner - 1 - inner[:, ::-1].argmax(axis=1)
+        return np.asarray(~inner.any(axis=1) | (last - first <= self.width))
 
     @cached_property
     def diagonal(self) -> Indices:
@@ -86,7 +96,7 @@ class BorderedBand:
         """Return the matrix with rowsᵀ diag(weights) rows added.
 
         Args:
-            rows: Rows (q, n), each with entries for the variables of one segment and for those of the border.
+            rows: Rows (q, n) whose squares lie in the band and the border (`Pattern.has_squares`).
             weights: One weight a row, (q,), or one for all.
         """
         sparse = csr_array(rows)

@@ -51,7 +51,8 @@ _LEAST_WEIGHT = 1e-3  # smallest weight of the violation in the merit function
 _PENALTY_FRACTION = 0.5
 _ROUNDING = 1e-12  # increase of the merit function that counts as rounding
 _CORRIDOR = 1e10  # largest factor between s z and μ
-_EQUALITY_WEIGHT = 1e-2  # weight of EᵀE added to the matrix, relative to its largest entry
+# weight of EᵀE added to the matrix, relative to its largest entry, for the rows of E whose squares fit there
+_EQUALITY_WEIGHT = 1e-2
 _ITERATIONS_FLAT = 3  # iterations over which the cost must not change
 _LARGE_MULTIPLIER = 100.0  # average multiplier above which the dual error is scaled down
 
@@ -444,8 +445,9 @@ class _Equations:
         matrix = at.point.curvature(at.z, at.y, at.z / at.slacks)
         matrix = matrix.plus_diagonal(at.z_lower / lower + at.z_upper / upper)
         self._equal = at.point.equality_rows
-        self._weight = max(1.0, np.abs(matrix.diagonal).max()) * _EQUALITY_WEIGHT
-        self._matrix = matrix.plus_squares(self._equal, self._weight)
+        weight, added = max(1.0, np.abs(matrix.diagonal).max()), matrix.pattern.has_squares(self._equal)
+        self._weights = np.where(added, weight * _EQUALITY_WEIGHT, 0.0)
+        self._matrix = matrix.plus_squares(self._equal[added], self._weights[added])
         barrier = self._barrier = method._barrier
         self._residual = method._cost + self._equal.T @ at.y - barrier * (1.0 / lower - 1.0 / upper)
         self._at = at
@@ -465,7 +467,7 @@ class _Equations:
         at = self._at
         sigma, central = at.z / at.slacks, self._barrier / at.slacks
         right = -self._residual - at.point.rows.transposed(central + sigma * residual)
-        right -= self._weight * (self._equal.T @ equal)
+        right -= self._equal.T @ (self._weights * equal)
         x = self._factors.solve(right)
         y = np.asarray(np.linalg.solve(self._schur, self._equal @ x + equal), dtype=float)
         x = x - self._factors.backward(self._moved @ y)

@@ -41,9 +41,6 @@ FINISHED = 3  # certified paths of which the best is kept; later ones only while
 # processor time [s] for one program with more intervals (with nine stages, such a program takes 4 s), or for
 # the other starts beside routes around obstacles
 MORE_TIME = 10.0
-# Paces of the closed forms of closed courses, relative to those of open ones. With 1 alone, four of nine laps
-# took 4 to 8 % longer, two 1 %, and one 2 % less.
-FLYING_PACES = (0.7, 1.0)
 RESERVE_FRACTIONS = (0.25, 0.5, 0.75, 1.0)  # fractions of the reserve, raised step by step
 RAISING_TIME = 40.0  # processor time [s] for raising it; two flips in a row take half of that
 ROUGH_TIME = 0.5  # fraction of the remaining time for rough rounds, where there is a time limit
@@ -194,8 +191,7 @@ class MultiStart:
         """Yield batches of starts, each with its refinement; later batches are tried if earlier ones fail.
 
         A batch fails if it leads to no certified path that is clear of gates' frames. The closed forms of a
-        course are tried with a refinement that gives up early first; those of a closed course, which have the
-        worse local optima, at two paces together.
+        course are tried with a refinement that gives up early first.
         """
         task = self._task
         if self.start is not None:
@@ -203,11 +199,7 @@ class MultiStart:
         guess = replace(self.guess, reserve=task.reserve)
         if is_course(task.stages):
             quick = replace(self.refinement, gives_up_early=True)
-            alone: tuple[float, ...] = (1.0, *SLOWER_PACES)
-            if task.stages.closed:
-                yield quick, list(closed_forms(task, FLYING_PACES))
-                alone = SLOWER_PACES
-            for start in closed_forms(task, alone):
+            for start in closed_forms(task, (1.0, *SLOWER_PACES)):
                 yield quick, [start]
             for each in chain(starts(task, guess), closed_forms(task, SLOWER_PACES), self._of_more(guess)):
                 yield self.refinement, [each]
