@@ -100,7 +100,7 @@ def test_slopes_and_second_derivatives_are_differences(problem: Problem, lag: fl
 
 @pytest.mark.parametrize("closed", [False, True], ids=["open", "closed"])
 def test_squares_of_all_rows_but_a_whole_laps_lie_in_the_band_and_the_border(closed: bool) -> None:
-    """The attitude in which a lap ends depends on the whole lap. Where its square went astray, laps were slow."""
+    """The attitude in which a lap ends depends on all of it; laps were slow when that square went astray."""
     near = program(COURSE, QUAD, 6)
     if closed:
         task = Task.of(load_problem("lap-7"), QUAD)
