@@ -102,7 +102,7 @@ NEAR_LIMIT = 2e-3
 # largest constraint violation, relative to the limit's size, that further rounds may repair
 REPAIRABLE_VIOLATION = 0.5
 # The same among rough rounds: commands of rotors that lag may swing by more than their range between places,
-# and a round later by a tenth. With 0.5, one of 75 random problems took twice as long a path.
+# and a round later by a tenth. With 0.5, closed forms of such vehicles are given up.
 BETWEEN_PLACES = 2.0
 RELATIVE_STAGE_TOLERANCE = 1e-5  # violation of a stage's condition, relative to its size, that is rounding
 # Largest violation of a stage's condition, relative to its size, that further rounds may repair. With 0.02,
