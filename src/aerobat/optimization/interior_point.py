@@ -445,9 +445,10 @@ class _Equations:
         matrix = at.point.curvature(at.z, at.y, at.z / at.slacks)
         matrix = matrix.plus_diagonal(at.z_lower / lower + at.z_upper / upper)
         self._equal = at.point.equality_rows
-        weight, added = max(1.0, np.abs(matrix.diagonal).max()), matrix.pattern.has_squares(self._equal)
-        self._weights = np.where(added, weight * _EQUALITY_WEIGHT, 0.0)
-        self._matrix = matrix.plus_squares(self._equal[added], self._weights[added])
+        weight = _EQUALITY_WEIGHT * max(1.0, np.abs(matrix.diagonal).max())
+        fits = matrix.pattern.has_squares(self._equal)
+        self._weights = np.where(fits, weight, 0.0)
+        self._matrix = matrix.plus_squares(self._equal[fits], weight)
         barrier = self._barrier = method._barrier
         self._residual = method._cost + self._equal.T @ at.y - barrier * (1.0 / lower - 1.0 / upper)
         self._at = at

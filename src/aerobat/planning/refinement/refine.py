@@ -257,7 +257,8 @@ class Refinement:
         The result's `certified` is the shortest certified path of these rounds and of earlier ones.
         """
         rounds = Rounds(self, guess, multipliers=multipliers)
-        before, repairable = np.inf, REPAIRABLE_VIOLATION if self.gives_up_early else BETWEEN_PLACES
+        repairable = REPAIRABLE_VIOLATION if self.gives_up_early else BETWEEN_PLACES
+        before = np.inf
         for number in range(ROUGH_ROUNDS):
             solution = rounds.solve()
             certified = _shortest(certified, judge(solution, self.task, self.recorder))
