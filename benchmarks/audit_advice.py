@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 from aerobat.errors import Infeasible
-from aerobat.optimization.deadline import processor, within_time
+from aerobat.optimization.deadline import within_time, work
 from aerobat.planning import Miqp, plan
 from aerobat.problem import Gate
 from aerobat.studies.why import Remedy, Request, explained
@@ -22,7 +22,7 @@ LIFTS = "lift what refused it at sight"
 NOTHING = "say that nothing tried helps"
 WRONG = "advice in vain"  # the start of what is said of advice that does not help
 PATIENCE = 20.0  # [s] of the processor, for following a piece of advice
-ADVICE_PATIENCE = 240.0  # [s] of the processor, for the advice
+ADVICE_PATIENCE = 240.0  # work limit [s] of the advice
 MORE = 1.01  # times what a refusal says is needed
 
 SIZES = re.compile(r"gate '(.*)' is .* takes ([\d.]+) cm by ([\d.]+) cm")
@@ -36,7 +36,7 @@ def followed(case: Case, asked: Miqp, message: str) -> str:
     eased = _at_sight(task, message)
     if eased is not None:
         return LIFTS if _planned(eased).message != message else f"{WRONG}, the same is said again"
-    with within_time(ADVICE_PATIENCE, processor):
+    with within_time(ADVICE_PATIENCE, work):
         found = explained(Infeasible(message, ["attempts"]), task)
     for remedy in found.remedies:
         made = _again(remedy)

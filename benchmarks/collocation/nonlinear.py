@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, frozen, frozen_bounds
 from aerobat.errors import SpecError
-from aerobat.optimization.deadline import processor, shorter, time_left, wall
+from aerobat.optimization.deadline import shorter, time_left, wall, work
 
 _WARM = {
     "ipopt.warm_start_init_point": "yes",
@@ -164,7 +164,7 @@ def solve_nonlinear(
     settings |= {f"ipopt.{name}": value for name, value in options.items()}
     if (limit := shorter(time_limit, wall)) is not None:
         settings["ipopt.max_wall_time"] = max(limit, _SHORTEST)
-    if (limit := time_left(processor)) is not None:
+    if (limit := time_left(work)) is not None:
         settings["ipopt.max_cpu_time"] = max(limit, _SHORTEST)
     if not exact_hessian:
         settings["ipopt.hessian_approximation"] = "limited-memory"

@@ -76,8 +76,8 @@ def test_a_refusal_names_the_bound_who_was_asked_and_that_it_is_not_proven(
 
 
 def test_ways_for_which_there_is_no_time_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rescue, "RESCUE_TIME", 0.0)
-    with pytest.raises(Infeasible, match=r"0 s were too few to plan .*by time-optimal"):
+    monkeypatch.setattr(rescue, "RESCUE_WORK", 0.0)
+    with pytest.raises(Infeasible, match=r"0 s of work were too few to plan .*by time-optimal"):
         plan(replace(LINE, maneuver=NEXT_TO_THE_END), vehicle=QUAD)
 
 

@@ -100,7 +100,7 @@ def test_time_optimal_without_time_for_a_path_of_its_own_returns_that_which_it_b
 
 
 @pytest.mark.parametrize(
-    ("planner", "ticks"), [pytest.param("miqp", 100, marks=pytest.mark.slow), ("min-snap", 13)]
+    ("planner", "ticks"), [pytest.param("miqp", 100, marks=pytest.mark.slow), ("min-snap", 14)]
 )
 def test_what_a_limit_left_of_a_comparison_says_how_far_from_the_shortest_possible_it_is(
     planner: str, ticks: int

@@ -12,6 +12,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.optimization.assignment import AssignmentProgram, unit_rows
 from aerobat.optimization.backends import solver
+from aerobat.optimization.deadline import count_work
 from aerobat.optimization.result import AssignmentResult, verified
 
 StageSlot = tuple[int, int]  # (stage, slot), the key of a binary
@@ -70,6 +71,7 @@ class ScaledProgram:
         general solvers are sometimes wrong (SCIP 10 reports feasible flips as infeasible). So the exact
         search confirms infeasibility. Where it finds a solution, its own result is returned.
         """
+        count_work(claim.time)
         x = None if claim.x is None else self.unit * claim.x
         result = verified(self.original, replace(claim, x=x, bound=self.unit**2 * claim.bound))
         if result.status != "infeasible":

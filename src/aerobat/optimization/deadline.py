@@ -1,12 +1,16 @@
-"""Time limits for everything that is computed within a block."""
+"""Time limits and work limits for everything that is computed within a block.
+
+Work counts the steps of solvers, in seconds of a reference processor. So a work limit ends at the same step
+on every machine, however busy it is, and equal problems have equal plans.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from threading import local
 from time import perf_counter as clock
-from time import thread_time
 
 Clock = Callable[[], float]
 
@@ -16,9 +20,23 @@ def wall() -> float:
     return clock()
 
 
-def processor() -> float:
-    """Return the processor time of this thread [s], which does not depend on how busy the machine is."""
-    return thread_time()
+class _Work(local):
+    """The work of a thread."""
+
+    done = 0.0
+
+
+_work = _Work()
+
+
+def work() -> float:
+    """Return the work of this thread's solvers [s of the reference processor]."""
+    return _work.done
+
+
+def count_work(seconds: float) -> None:
+    """Add a step of a solver to this thread's work [s of the reference processor]."""
+    _work.done += seconds
 
 
 _deadlines: ContextVar[tuple[tuple[Clock, float], ...]] = ContextVar("deadlines", default=())
@@ -59,9 +77,9 @@ def time_left(*clocks: Clock) -> float | None:
     return None if left is None else max(left, 0.0)
 
 
-def out_of_time() -> bool:
-    """Return True after a deadline."""
-    return time_left() == 0.0
+def out_of_time(*clocks: Clock) -> bool:
+    """Return True after a deadline by one of some clocks (default: all)."""
+    return time_left(*clocks) == 0.0
 
 
 def shorter(limit: float | None, *clocks: Clock) -> float | None:

@@ -27,7 +27,7 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.optimization.bordered_band import BorderedBand
-from aerobat.optimization.deadline import out_of_time
+from aerobat.optimization.deadline import count_work, out_of_time
 
 _BOUND_PUSH = 1e-2  # distance of the start from the bounds of the box, as a fraction of its width
 _FRACTION_TO_BOUNDARY = 0.99  # longest step towards a zero multiplier or the edge of the box
@@ -55,6 +55,10 @@ _CORRIDOR = 1e10  # largest factor between s z and μ
 _EQUALITY_WEIGHT = 1e-2
 _ITERATIONS_FLAT = 3  # iterations over which the cost must not change
 _LARGE_MULTIPLIER = 100.0  # average multiplier above which the dual error is scaled down
+# work [s] of a trial point and of a step's equations: of each, and more by its number of inequalities
+# (benchmarks/work.py)
+_POINT_WORK, _POINT_VALUE_WORK = 0.12e-3, 0.02e-6
+_STEP_WORK, _STEP_VALUE_WORK = 1.3e-3, 0.26e-6
 
 
 class ConstraintRows(Protocol):
@@ -281,6 +285,7 @@ class _InteriorPoint:
 
     def _advance(self, at: _Iterate) -> bool:
         """Take one step. Return False where no step is accepted, even with the largest damping."""
+        count_work(_STEP_WORK + _STEP_VALUE_WORK * len(at.z))
         equations = _Equations(at, self)
         before = self._value(at.x, at.slacks, at.point)
         while self._damping < _LARGEST_DAMPING:
@@ -393,6 +398,7 @@ class _InteriorPoint:
         """
         x = at.x + length * step.x
         point = self._program.at(x)
+        count_work(_POINT_WORK + _POINT_VALUE_WORK * len(point.inequalities))
         falling = np.maximum(at.slacks + length * step.slacks, _MIN_SLACK_FRACTION * at.slacks)
         slacks = np.maximum(falling, -point.inequalities)
         return _Trial(x, slacks, point, self._value(x, slacks, point))

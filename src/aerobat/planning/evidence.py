@@ -11,12 +11,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from aerobat.certification import Certificate, certify
+from aerobat.optimization.deadline import count_work
 from aerobat.planning.assessment.assess import assessment
 from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.flyability import Flyability, own_flights
 from aerobat.planning.passages import PlacedStage
 from aerobat.planning.task import Task
 from aerobat.trajectory import Trajectory
+
+CERTIFICATE_WORK = 1.5e-3  # work of a certificate for each segment [s], measured (benchmarks/work.py)
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,7 @@ class Evidence:
     def certificate(self) -> Certificate:
         """The proof over continuous time that all limits hold, or the violations (5 to 10 ms)."""
         task = self.task
+        count_work(CERTIFICATE_WORK * self.trajectory.segments)
         return certify(self.trajectory, task.vehicle, task.environment, task.envelope(self.stages))
 
     @cached_property

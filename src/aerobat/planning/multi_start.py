@@ -15,7 +15,7 @@ from math import inf
 import numpy as np
 
 from aerobat.errors import Infeasible, Reason, limits_of
-from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
+from aerobat.optimization.deadline import out_of_time, within_share, within_time, work
 from aerobat.planning.around.fastest import fastest_around
 from aerobat.planning.around.guesses import ROUTES, guesses
 from aerobat.planning.assessment.assessment import SUSPICIOUS
@@ -38,11 +38,11 @@ PACE_SPREAD = 0.4  # standard deviation of the logarithm of a random pace of a p
 SEED = 0
 ASIDE = 0.1  # bend of planar paths out of their plane, relative to their extent: planar ones are local optima
 FINISHED = 3  # certified paths of which the best is kept; later ones only while rough paths are faster
-# processor time [s] for one program with more intervals (with nine stages, such a program takes 4 s), or for
+# work limit [s] of one program with more intervals (with nine stages, such a program takes 4 s), or of
 # the other starts beside routes around obstacles
-MORE_TIME = 10.0
+MORE_WORK = 10.0
 RESERVE_FRACTIONS = (0.25, 0.5, 0.75, 1.0)  # fractions of the reserve, raised step by step
-RAISING_TIME = 40.0  # processor time [s] for raising it; two flips in a row take half of that
+RAISING_WORK = 40.0  # work limit [s] of raising it; two flips in a row take half of that
 ROUGH_TIME = 0.5  # fraction of the remaining time for rough rounds, where there is a time limit
 
 _Start = tuple[Plan | None, WarmStart]  # a path, with its plan if it comes from one
@@ -131,7 +131,7 @@ class MultiStart:
         if best.path.duration < SUSPICIOUS * least_duration(task.problem, task.vehicle):
             return best
         more = guess.with_more_intervals(task.problem, task.vehicle)
-        with within_time(RAISING_TIME, processor):
+        with within_time(RAISING_WORK, work):
             for planner in chain([guess], more):
                 with suppress(Infeasible):
                     start = WarmStart.of(planner.plan(task.problem, task.vehicle), task.stages)
@@ -181,7 +181,7 @@ class MultiStart:
         count = self.starts if self._task.stages.asks_thrust else max(self.starts - ROUTES, 0)
         if best is None or is_course(self._task.stages) or not count:
             return best
-        with suppress(Infeasible), within_time(MORE_TIME, processor):
+        with suppress(Infeasible), within_time(MORE_WORK, work):
             _, batch = next(self._batches())
             rough = self._rough(refinement, [path for _, path in batch[:count]])
             best = self._finished(refinement, rough, best)
@@ -221,7 +221,7 @@ class MultiStart:
         task = self._task
         for planner in () if task.stages.closed else guess.with_more_intervals(task.problem, task.vehicle):
             try:
-                with within_time(MORE_TIME, processor):
+                with within_time(MORE_WORK, work):
                     plan = planner.plan(task.problem, task.vehicle)
             except Infeasible:
                 continue

@@ -7,7 +7,7 @@ from dataclasses import replace
 from math import inf
 
 from aerobat.errors import Infeasible
-from aerobat.optimization.deadline import out_of_time, within_time
+from aerobat.optimization.deadline import out_of_time, wall, within_time
 from aerobat.planning.recorder import Attempt, Recorder
 from aerobat.planning.result import Plan
 from aerobat.problem.problem import Problem
@@ -16,8 +16,8 @@ TIME_LIMIT = "Seconds for planning; the best plan found by then is taken, and sa
 
 
 def stopped(plan: Plan) -> Plan:
-    """Return the plan, with the status `time_limit` if no time is left."""
-    return replace(plan, status="time_limit") if out_of_time() else plan
+    """Return the plan, with the status `time_limit` if no time is left; a work limit is not told."""
+    return replace(plan, status="time_limit") if out_of_time(wall) else plan
 
 
 def best_in_time(

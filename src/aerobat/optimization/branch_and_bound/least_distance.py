@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from aerobat.arrays import Array, Indices
 from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED
+from aerobat.optimization.deadline import count_work
 
 # DAQP's flags of a row, and its exit flags
 _AT_UPPER, _AT_LOWER, _IGNORED = 1, 3, 4
@@ -23,6 +24,8 @@ _TOLERANCE = 1e-9  # constraint tolerance on rows of unit norm
 _SETTINGS = {"primal_tol": _TOLERANCE}
 # for QPs at which the usual settings fail
 _CAREFUL_SETTINGS = {"pivot_tol": 1e-4, "sing_tol": 1e-13, "dual_tol": 1e-10}
+_QP_WORK = 0.1e-3  # work of a QP [s], measured (benchmarks/work.py)
+_ITERATION_WORK = 0.09e-9  # work of an iteration for each number in the rows [s], likewise
 
 
 class NotConverged(Exception):
@@ -141,4 +144,5 @@ class LeastDistanceQP:
         if flag < 0:  # infeasible at once: a lower bound exceeds its upper bound
             return lower, flag, lower
         y, _, flag, details = self._model.solve()
+        count_work(_QP_WORK + _ITERATION_WORK * self._rows.size * details["iterations"])
         return y, flag, details["lam"]

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count
 from math import inf
-from time import perf_counter
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from aerobat.optimization.branch_and_bound.lazy_children import Branch, LazyChil
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged, QPSolution
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds, LowerBounds
 from aerobat.optimization.branch_and_bound.null_space import UNBOUNDED, ReducedBounds
+from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.result import Status
 
 _OPTIMALITY_GAP = 1e-10  # relative optimality gap at which the search ends
@@ -38,14 +38,6 @@ class _Node:
     chosen: tuple[int, ...]  # candidates
     pending: tuple[int, ...]  # groups without a chosen candidate
     inherited: LowerBounds  # bounds of its parent, for the candidates compatible with those chosen
-
-
-@dataclass(frozen=True)
-class SearchLimits:
-    """Limits at which a search ends without a proof of optimality."""
-
-    deadline: float = inf  # [s] on the clock of `perf_counter`
-    nodes: float = inf  # solved QPs, where a QP that fails counts with its higher cost
 
 
 class BestFirstSearch:
@@ -71,7 +63,7 @@ class BestFirstSearch:
         self.best: tuple[QPSolution, tuple[int, ...]] | None = None
         self.nodes = 0  # QPs solved
         self._failures = 0  # QPs that did not converge
-        self._limits = SearchLimits()
+        self._node_limit = inf
 
     @property
     def bound(self) -> float:
@@ -102,9 +94,12 @@ class BestFirstSearch:
         if solution is not None:
             self.best = (solution, tuple(chosen))
 
-    def run(self, limits: SearchLimits) -> None:
-        """Search until the best solution is proven optimal, no node is left, or a limit is reached."""
-        self._limits = limits
+    def run(self, node_limit: float) -> None:
+        """Search until the best solution is proven optimal, no node is left, or a limit is reached.
+
+        The limit counts solved QPs; a QP that fails counts with its higher cost.
+        """
+        self._node_limit = node_limit
         if self._is_over:
             self._unresolved = 0.0
             return
@@ -208,7 +203,7 @@ class BestFirstSearch:
     @property
     def _is_over(self) -> bool:
         spent = self.nodes + _FAILURE_COST * self._failures
-        return spent >= self._limits.nodes or perf_counter() >= self._limits.deadline
+        return spent >= self._node_limit or out_of_time()
 
     @property
     def _cutoff(self) -> float:

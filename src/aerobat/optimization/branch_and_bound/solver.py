@@ -16,14 +16,15 @@ from aerobat.optimization.branch_and_bound.candidates import CandidateBounds, Ca
 from aerobat.optimization.branch_and_bound.least_distance import LeastDistanceQP, NotConverged
 from aerobat.optimization.branch_and_bound.lower_bounds import DualBounds
 from aerobat.optimization.branch_and_bound.null_space import NullSpace, ReducedBounds, split_coupled
-from aerobat.optimization.branch_and_bound.search import BestFirstSearch, SearchLimits
-from aerobat.optimization.deadline import shorter
+from aerobat.optimization.branch_and_bound.search import BestFirstSearch
+from aerobat.optimization.deadline import count_work, within_time
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
 _MATRICES = ("rows", "equality", "hessian", "gradient")
 _EQUALITY_TOLERANCE = 1e-12  # bounds closer than this fraction of the larger one make an equality
 # a lower bound contradicts the upper one where it exceeds it by this fraction of the larger one
 _CONTRADICTION_TOLERANCE = 1e-9
+_WORK = 0.4e-3  # work of a program but for its QPs [s], measured (benchmarks/work.py)
 
 
 class BranchAndBound:
@@ -50,14 +51,14 @@ class BranchAndBound:
         """Solve as `Solver.solve` does. The result's time is the time of the whole call."""
         program.check_start(start)
         began = perf_counter()
-        limit = shorter(time_limit)
-        deadline = inf if limit is None else began + limit
-        limits = SearchLimits(deadline, inf if node_limit is None else node_limit)
-        result = verified(program, self._claim(program, limits, start))
+        count_work(_WORK)
+        with within_time(time_limit):
+            claimed = self._claim(program, inf if node_limit is None else node_limit, start)
+        result = verified(program, claimed)
         return replace(result, time=perf_counter() - began)
 
     def _claim(
-        self, program: AssignmentProgram, limits: SearchLimits, start: Sequence[int] | None
+        self, program: AssignmentProgram, node_limit: float, start: Sequence[int] | None
     ) -> AssignmentResult:
         """Return the assignment of minimum cost, or the best one within the limits, not yet verified."""
         try:
@@ -67,7 +68,7 @@ class BranchAndBound:
         if prepared is None:
             return _without_solution("infeasible", inf)
         factorization, blocks = prepared
-        return factorization.claim(program, blocks, limits, start)
+        return factorization.claim(program, blocks, node_limit, start)
 
     def _prepared(self, program: AssignmentProgram) -> tuple[_Factorization, _Blocks] | None:
         """Return the factorization (the last one where it still fits) and the two blocks of the program.
@@ -133,7 +134,7 @@ class _Factorization:
         self,
         program: AssignmentProgram,
         blocks: _Blocks,
-        limits: SearchLimits,
+        node_limit: float,
         start: Sequence[int] | None,
     ) -> AssignmentResult:
         """Search the coupled block, and combine its solution with that of the independent block."""
@@ -142,7 +143,7 @@ class _Factorization:
         )
         if start is not None:
             search.try_start({stage: start[stage] for stage in self.candidates.free_stages})
-        search.run(limits)
+        search.run(node_limit)
         x = slots = None
         if search.best is not None:
             solution, chosen = search.best

@@ -13,7 +13,7 @@ from aerobat.errors import Reason, limits_of
 from aerobat.limits.box import FIELDS, field_with_value
 from aerobat.limits.path_condition import FIELD
 from aerobat.optimization import evenly_spread, solver
-from aerobat.optimization.deadline import out_of_time, processor, within_time
+from aerobat.optimization.deadline import out_of_time, within_time, work
 from aerobat.planning.courses import is_placed_in_windows
 from aerobat.planning.miqp.formulation import Formulation
 from aerobat.planning.recorder import Attempt
@@ -21,7 +21,7 @@ from aerobat.problem.stage import Stage
 
 GROUND = "environment.ground"
 MORE_INTERVALS = (1.3, 1.8, 2.5)  # factors tried on the number of intervals, or of stages if larger
-DIAGNOSIS_TIME = 1.0  # processor time [s] of all relaxed programs
+DIAGNOSIS_WORK = 1.0  # work limit [s] of all relaxed programs
 PROBES = 4  # number of dt at which a relaxed problem is tried
 
 
@@ -34,7 +34,7 @@ def why_infeasible(formulation: Formulation, attempts: Sequence[Attempt]) -> str
     if solved and vehicle is not None:
         best = max(solved, key=lambda a: -inf if a.margin is None else a.margin).outcome
         return Reason(f"{said} that {vehicle.name} can fly: at best, {best}", limits_of(best))
-    with within_time(DIAGNOSIS_TIME, processor):
+    with within_time(DIAGNOSIS_WORK, work):
         found = list(_binding(formulation, tried))
         binding = [name for name, _ in found]
         if out_of_time() and not binding:

@@ -1,6 +1,6 @@
 """Fallbacks of miqp: other settings and planners where the requested ones find no plan, or a poor one.
 
-A problem is not refused before the fallbacks are tried, within RESCUE_TIME.
+A problem is not refused before the fallbacks are tried, within RESCUE_WORK.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from math import inf
 from typing import Any, cast
 
 from aerobat.errors import Infeasible, SpecError
-from aerobat.optimization.deadline import out_of_time, processor, within_share, within_time
+from aerobat.optimization.deadline import out_of_time, within_share, within_time, work
 from aerobat.planning.planners import Planner, planner_class, planner_with_reserve
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import FLYING_RESERVE, KEPT_PART, Plan
@@ -21,11 +21,11 @@ from aerobat.problem.problem import Problem
 from aerobat.problem.stage import MIN_CROSSING_SPEED, StageSequence
 from aerobat.vehicle import Vehicle
 
-RESCUE_TIME = 4.0  # processor time [s] of all fallbacks, so that refusals take 5 s (benchmarks/audit.py)
-# processor time [s] where a plan most likely exists, as a path with small constraint violations was found
-PROMISING_TIME = 15.0
-SHORTENING_TIME = 8.0  # processor time [s] where a plan is known, but poor
-FALLBACK_FRACTION = 0.75  # fraction of the remaining time for one fallback, so that the next has some
+RESCUE_WORK = 4.0  # work limit [s] of all fallbacks, so that refusals take 5 s (benchmarks/audit.py)
+# work limit [s] where a plan most likely exists, as a path with small constraint violations was found
+PROMISING_WORK = 15.0
+SHORTENING_WORK = 8.0  # work limit [s] where a plan is known, but poor
+FALLBACK_FRACTION = 0.75  # fraction of the remaining work for one fallback, so that the next has some
 # factor on the duration of a nearly feasible path above which a plan is poor: of the plans of 300 random
 # problems, it selects those far from the best
 SLOW_FACTOR = 1.1
@@ -49,19 +49,19 @@ class Rescue:
     vehicle: Vehicle
     recorder: Recorder  # of the requested planner; attempts of fallbacks are passed on to its `progress`
     failed: list[str] = field(default_factory=list)  # fallbacks that found no plan
-    unanswered: list[str] = field(default_factory=list)  # fallbacks that had too little time
+    unanswered: list[str] = field(default_factory=list)  # fallbacks that the work limit ended
     is_promising: bool = False  # whether time-optimal failed, but found a path that is nearly feasible
 
     def plan(self) -> Plan | None:
         """Return the first certified plan of the fallbacks, or None; its `rescue` names the fallback."""
-        with within_time(RESCUE_TIME, processor):
+        with within_time(RESCUE_WORK, work):
             found = self._first(self._fallbacks(), self._none_found)
         if found is None and self.is_promising:
-            with within_time(PROMISING_TIME, processor):
+            with within_time(PROMISING_WORK, work):
                 return self._first(iter([self._time_optimal_from_all()]), self._none_found)
         if found is None or found.keeps(self.requested.reserve):
             return found
-        with within_time(RESCUE_TIME, processor):
+        with within_time(RESCUE_WORK, work):
             half = replace(self.requested, reserve=KEPT_PART * self.requested.reserve, rescue=False)
             longest = LONGER_FOR_RESERVE * _priced(found)
             return self._first(iter([(half, HALF_RESERVE)]), self._none_found, longest) or found
@@ -90,7 +90,7 @@ class Rescue:
         said = f"the path of miqp with {self._intervals} intervals {fault}"
         longest = _priced(plan) if plan.certified else inf
         fallbacks = chain([(others, f"by {FREE_KNOTS}")], more)
-        with within_time(SHORTENING_TIME, processor):
+        with within_time(SHORTENING_WORK, work):
             faster = None if plan.certified else self._faster_through_gates(said)
             return faster or self._first(fallbacks, said, longest) or plan
 
@@ -122,8 +122,8 @@ class Rescue:
             said.append(f"but none was found {', '.join(self.failed)}")
         unanswered = [how for how in dict.fromkeys(self.unanswered) if how not in self.failed]
         if unanswered:
-            allowed = RESCUE_TIME + PROMISING_TIME * self.is_promising
-            said.append(f"{allowed:g} s were too few to plan {', '.join(unanswered)}")
+            allowed = RESCUE_WORK + PROMISING_WORK * self.is_promising
+            said.append(f"{allowed:g} s of work were too few to plan {', '.join(unanswered)}")
         return ", ".join(said)
 
     def _first(

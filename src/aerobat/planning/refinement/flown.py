@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 
 from aerobat.certification import Finding
 from aerobat.limits.body_in_gate import BodyInGate
-from aerobat.optimization.deadline import out_of_time, processor, within_time
+from aerobat.optimization.deadline import out_of_time, within_time, work
 from aerobat.planning.certified_solve import Judged
 from aerobat.planning.flyability import OwnFlight, own_flight
 from aerobat.planning.gate_clearance import cleared, is_clear, more_direct
 from aerobat.planning.refinement.refine import RefinedPath, Refinement
 
 MAX_HALVINGS = 3  # attempts with the added room in gates, which is halved where an attempt finds no path
-# Processor time [s] for clearing frames: longer attempts mostly fail; gates are passed faster then
-CLEARING_TIME = 8.0
+# Work limit [s] of clearing frames: longer attempts mostly fail; gates are passed faster then
+CLEARING_WORK = 8.0
 RESERVES = (0.02, 0.05, 0.1, 0.2)  # reserves tried in turn, as fractions of the rotors' thrust ranges
 
 
@@ -54,7 +54,7 @@ class FlownPath:
 
     def through_gates(self) -> FlownPath:
         """Return the path, or one with more room in the gates whose frames the body does not clear."""
-        with within_time(CLEARING_TIME, processor):
+        with within_time(CLEARING_WORK, work):
             return cleared(self, FlownPath._more_direct)
 
     def with_reserves(self) -> FlownPath:

@@ -22,7 +22,7 @@ from aerobat.certification import Certificate, Verdict
 from aerobat.errors import Reason
 from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.limits.path_condition import limit_of
-from aerobat.optimization.deadline import out_of_time, within_share
+from aerobat.optimization.deadline import count_work, out_of_time, within_share
 from aerobat.optimization.interior_point import InteriorPointResult, Settings, interior_point
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, judge
 from aerobat.planning.courses import is_course
@@ -74,6 +74,7 @@ ROUGH_TIME_FRACTION = 0.5  # fraction of the remaining time for rough rounds; th
 PLACES = 16  # places of a segment in the first round: with 12, finding the peaks between them does not help
 MORE_PLACES = 1.5  # factor on PLACES where rotors have no lag and their thrusts may jump
 LOSS = 0.02  # increase of duration by certification, relative, from which twice as many segments are tried
+ROUND_WORK = 1e-3  # work of a round but for its program, for each segment [s] (benchmarks/work.py)
 LITTLE_GAIN = 0.005  # relative decrease of duration below which rough rounds end
 # constraint violation, relative to the limit's size, above which rough rounds continue
 CONVERGED_VIOLATION = 0.1
@@ -421,6 +422,7 @@ class Rounds:
     def solve(self) -> Solution[RefinedPath]:
         """Solve the program around the last path."""
         began, refinement = perf_counter(), self._refinement
+        count_work(ROUND_WORK * self._guess.trajectory.segments)
         program = self._program
         known = None if self._multipliers is None else program.at_its_places(self._multipliers)
         answer = interior_point(program, program.spline.start, self._settings, known)

@@ -27,8 +27,8 @@ from aerobat.vehicle import Vehicle, as_vehicle
 
 # expected failures among the fresh flights at the required probability: two thirds as many are a proof
 PROVING_FAILURES = 50
-# [s] processor time limit of a further plan: with 4, section-v's flip in pitch is refused
-PLANNING_TIME = 20.0
+# work limit [s] of a further plan: with 4, section-v's flip in pitch is refused
+PLANNING_WORK = 20.0
 # proofs are attempted on separate flights: each errs with probability 2.5 % at most, both together 5 %
 PROOFS = 2
 TRIES = 20  # further plans that are tried for each proof
@@ -100,7 +100,7 @@ def plan_to_pass(
             probability=probability,
             flights=range(flights),
             proving=proving,
-            planning_time=PLANNING_TIME,
+            planning_work=PLANNING_WORK,
             progress=progress,
             flying=flying,
             tried=tried,

@@ -12,7 +12,7 @@ from math import log, radians
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
-from aerobat.optimization.deadline import out_of_time, processor, within_time
+from aerobat.optimization.deadline import out_of_time, within_time, work
 from aerobat.planning import Attempt, Plan, Planner, as_planner
 from aerobat.planning.result import FLYING_RESERVE
 from aerobat.problem import Problem
@@ -32,8 +32,8 @@ MIN_GAIN = 0.02  # fraction of these flights that must succeed beyond the first 
 # more must succeed
 DURATION_PRICE = 0.5
 TRIES = 12  # further plans that are tried by commands
-PLANNING_TIME = 4.0  # [s] processor time limit of each of them; most take 0.3 to 3
-SEARCH_TIME = 15.0  # [s] processor time after which commands try no further plan; most searches take 1 to 7
+PLANNING_WORK = 4.0  # work limit [s] of each of them; most take 0.3 to 3
+SEARCH_WORK = 15.0  # work [s] after which commands try no further plan; most searches take 1 to 7
 
 
 @validated
@@ -78,7 +78,7 @@ def steadied(
         probability=Trials.NEEDED,
         flights=SELECTION_FLIGHTS,
         proving=LOOKS[-1],
-        planning_time=PLANNING_TIME,
+        planning_work=PLANNING_WORK,
         progress=progress,
         flying=Pool(),
     )
@@ -87,7 +87,7 @@ def steadied(
         return plan
     scores = joined([scores, task.scores(plan, SELECTION_FLIGHTS[FIRST_FLIGHTS:])])
     first = FlownPlan(plan, scores, kept, plan.problem)
-    with within_time(SEARCH_TIME, processor):
+    with within_time(SEARCH_WORK, work):
         found = steadier(task, first, first, TRIES, DURATION_PRICE, may_grow=reserve == FLYING_RESERVE)
     return plan if found is first else _explained(found, first)
 

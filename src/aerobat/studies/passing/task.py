@@ -10,7 +10,7 @@ from typing import Any
 from aerobat.control import named_controller
 from aerobat.environment import Dispersion
 from aerobat.evaluation import Score
-from aerobat.optimization.deadline import processor, within_time
+from aerobat.optimization.deadline import count_work, within_time, work
 from aerobat.planning import Attempt, Plan, Planner, plan
 from aerobat.planning.planners import planner_with_reserve
 from aerobat.planning.result import KEPT_PART
@@ -23,6 +23,7 @@ from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool
 from aerobat.vehicle import Vehicle
 
+FLIGHT_WORK = 1e-3  # work of a flight [s], measured (benchmarks/sweep.py)
 SCREENING_FLIGHTS = 200  # flights after which a plan is rejected if they already refute its probability
 
 
@@ -60,7 +61,7 @@ class PassingTask:
     probability: float  # with which flights must succeed
     flights: range  # numbers of the flights by which plans are selected
     proving: int  # number of other flights that prove the selected plan
-    planning_time: float  # [s] processor time limit of a further plan
+    planning_work: float  # work limit [s] of a further plan
     progress: Callable[[Attempt], None] | None
     flying: Pool
     tried: Callable[[Round], None] | None = None  # called with every round
@@ -92,7 +93,7 @@ class PassingTask:
             planner = replace(self.planner, reserve=reserve, start=start.plan)
         else:
             planner = warm_started_refinement(self.planner, start.plan, reserve)
-        with within_time(self.planning_time, processor):
+        with within_time(self.planning_work, work):
             found = plan(required, planner, vehicle, self.progress)
         return replace(found, problem=self.problem, vehicle=self.vehicle)
 
@@ -100,6 +101,7 @@ class PassingTask:
         """Return scores of flights of a plan, by default under the task's conditions."""
         controller = named_controller(self.controller, self.vehicle.controller)
         task = FlightTask(found, self.vehicle, conditions or self.conditions, self.seed, controller)
+        count_work(FLIGHT_WORK * len(flights))
         return fly_scores(self.flying, (task,), flights)[0]
 
     def selecting(self, found: Plan) -> Score:

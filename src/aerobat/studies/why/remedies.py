@@ -10,7 +10,7 @@ from functools import reduce
 
 from aerobat.declaration import by_value, short, validated
 from aerobat.errors import BackendMissing, Infeasible, SpecError
-from aerobat.optimization.deadline import out_of_time, processor, within_time
+from aerobat.optimization.deadline import out_of_time, within_time, work
 from aerobat.planning import Plan, Planner, as_planner, plan, registered_planners, suited_planner
 from aerobat.planning.planners import planner_with_reserve
 from aerobat.problem import Problem, as_problem
@@ -18,8 +18,8 @@ from aerobat.studies.feasibility.probe import TIME_LIMIT
 from aerobat.studies.why.changes import Change, Request, changes
 from aerobat.vehicle import Vehicle, as_vehicle
 
-# [s] processor time limit for the plan of each change: twice the time of a refusal
-CHANGE_TIME = 10.0
+# work limit [s] of the plan of each change: twice that of a refusal
+CHANGE_WORK = 10.0
 Tried = Callable[[str, bool], None]
 
 
@@ -73,7 +73,7 @@ def why(
     Changes are tried one at a time: without each limit, with stronger rotors, with stages at any time, and so
     on. If no change suffices alone, a smallest sufficient set of them is searched. Each change is planned by
     `planner`, by the planner that suits the problem, and by all other registered ones. This ends with the
-    first plan that is certified and flies, or after 10 s of processor time. The whole search takes up to
+    first plan that is certified and flies, or after 10 s of work. The whole search takes up to
     minutes.
 
     Args:
@@ -141,7 +141,7 @@ class _RemedySearch:
         """Return the plan with several changes, or with none by another planner; None where there is none."""
         changed = reduce(lambda task, change: change.apply(task), several, self.task)
         planners = _planners(changed, refused=not several)
-        with within_time(CHANGE_TIME if several else TIME_LIMIT, processor):
+        with within_time(CHANGE_WORK if several else TIME_LIMIT, work):
             found = next(filter(None, (_planned(changed, planner) for planner in planners)), None)
         words = tuple(change.words for change in several)
         self.progress(_in_words(words), found is not None)
