@@ -9,7 +9,7 @@ from pydantic import Field
 from aerobat.declaration import AS_IT_IS
 from aerobat.environment import Environment
 from aerobat.errors import SpecError
-from aerobat.trajectory import HasTrajectory, Trajectory
+from aerobat.trajectory.piecewise import HasTrajectory, Trajectory
 from aerobat.vehicle.files import as_vehicle
 from aerobat.vehicle.vehicle import Vehicle
 
