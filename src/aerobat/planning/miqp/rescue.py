@@ -29,13 +29,13 @@ FALLBACK_FRACTION = 0.75  # fraction of the remaining work for one fallback, so 
 # factor on the duration of a nearly feasible path above which a plan is poor: of the plans of 300 random
 # problems, it selects those far from the best
 SLOW_FACTOR = 1.1
+FREE_KNOTS = "free-knots"  # a quick planner that starts from other paths too
 HALF_RESERVE = "with half of the reserve"
 # factor on the duration of a plan without a reserve up to which one with half of the reserve is taken. Of 100
 # flights of the plans of six problems under `lab`, 0, 7, 71, 86, 100 and 1 succeed without, 14, 47, 87, 100,
 # 100 and 34 with it.
 LONGER_FOR_RESERVE = 1.5
 FASTER = 2.0  # factor on the least speed through gates
-FREE_KNOTS = "free-knots"  # a quick planner that starts from other paths too
 TIME_OPTIMAL = "time-optimal"  # the planner that starts from the most paths
 FEW_STARTS = 2  # starts of time-optimal: more starts give faster plans, but seldom the first plan
 
@@ -61,10 +61,14 @@ class Rescue:
                 return self._first(iter([self._time_optimal_from_all()]), self._none_found)
         if found is None or found.keeps(self.requested.reserve):
             return found
-        with within_time(RESCUE_WORK, work):
-            half = replace(self.requested, reserve=KEPT_PART * self.requested.reserve, rescue=False)
+        with within_time(SHORTENING_WORK, work):
+            reserve = KEPT_PART * self.requested.reserve
+            half = [
+                (replace(self.requested, reserve=reserve, rescue=False), HALF_RESERVE),
+                (planner_with_reserve(FREE_KNOTS, reserve), f"by {FREE_KNOTS} {HALF_RESERVE}"),
+            ]
             longest = LONGER_FOR_RESERVE * _priced(found)
-            return self._first(iter([(half, HALF_RESERVE)]), self._none_found, longest) or found
+            return self._first(iter(half), self._none_found, longest) or found
 
     @property
     def _none_found(self) -> str:
