@@ -29,7 +29,7 @@ def assessment(task: Task, trajectory: Trajectory, certificate: Certificate) -> 
         ground=task.environment.ground,
         rate_limit=task.vehicle.max_body_rate,
         obstructed=bool(task.environment.obstacles),
-        extra_turns=extra_turns(trajectory, task.stages, task.balance),
+        extra_turns=extra_turns(trajectory, task),
     )
 
 
