@@ -12,7 +12,6 @@ from functools import cached_property
 
 from aerobat.certification import Certificate, certify
 from aerobat.optimization.deadline import count_work
-from aerobat.planning.assessment.assess import assessment
 from aerobat.planning.assessment.assessment import Assessment
 from aerobat.planning.flyability import Flyability, own_flights
 from aerobat.planning.passages import PlacedStage
@@ -45,7 +44,7 @@ class Evidence:
     @cached_property
     def assessment(self) -> Assessment:
         """The path against a lower bound on durations, and against usual room and rates."""
-        return assessment(self.task, self.trajectory, self.certificate)
+        return Assessment.of(self.task, self.trajectory, self.certificate)
 
     def at(self, stages: Sequence[PlacedStage]) -> Evidence:
         """Return the evidence for the same path with other placed stages.
