@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 from itertools import pairwise, product
 from math import inf, pi, sqrt
 
@@ -105,19 +104,11 @@ def _along(vector: Array, direction: Array) -> float:
     return factor if abs(factor) >= (1.0 - PARALLEL) * float(np.linalg.norm(vector)) else 0.0
 
 
-class _Relation(Enum):
-    """The relation of a motion along a line to a position that a stage asks."""
-
-    ABOVE = "at or beyond it"
-    BELOW = "at or short of it"
-    AT = "there"
-
-
 @dataclass(frozen=True)
 class _Place:
-    """A position on a line that is met in its order; ABOVE and BELOW are reversals at zero speed."""
+    """A position on a line that is met in its order; those with a side are reversals at zero speed."""
 
-    relation: _Relation
+    side: int  # where a motion meets it: 1 at or beyond the position, −1 at or short of it, 0 there
     position: float  # [m]
     velocity: float = 0.0  # [m/s]
     is_passed: bool = False  # whether the velocity there is free, as at a goal with free velocity
@@ -126,7 +117,7 @@ class _Place:
     def of_end(cls, end: EndState, direction: Array) -> _Place:
         """Return the position at which a motion begins or ends."""
         position, velocity = (float(vector @ direction) for vector in (end.position, end.velocity))
-        return cls(_Relation.AT, position, velocity, end.free_velocity)
+        return cls(0, position, velocity, end.free_velocity)
 
 
 @dataclass(frozen=True)
@@ -211,15 +202,14 @@ def _longest(groups: Sequence[Sequence[_Place]], up: DampedPoint, down: DampedPo
 def _not_surpassed(longest: dict[_Place, float]) -> Iterator[tuple[_Place, float]]:
     """Yield the positions with their times, without reversals from which another one goes farther and later.
 
-    Motions go down from positions ABOVE and up from those BELOW, for longer the farther the next one is.
+    Motions go back from reversals, to the other side, for longer the farther the next one is.
     """
-    farthest = {_Relation.ABOVE: -inf, _Relation.BELOW: -inf}
+    farthest = {1: -inf, -1: -inf}
     for place, time in sorted(longest.items(), key=lambda item: item[1], reverse=True):
-        if place.relation is not _Relation.AT:
-            distance = place.position if place.relation is _Relation.ABOVE else -place.position
-            if distance <= farthest[place.relation]:
+        if place.side:
+            if place.side * place.position <= farthest[place.side]:
                 continue
-            farthest[place.relation] = distance
+            farthest[place.side] = place.side * place.position
         yield place, time
 
 
@@ -229,13 +219,11 @@ def _leg(a: _Place, b: _Place, up: DampedPoint, down: DampedPoint) -> float:
     if b.is_passed:
         up, down = replace(up, backward=INSTANT_STOP), replace(down, backward=INSTANT_STOP)
     if distance == 0.0:
-        is_met = a.relation is b.relation is _Relation.AT
-        return up.least_time(0.0, a.velocity, b.velocity) if is_met else -inf
-    if distance > 0.0:
-        blocked = a.relation is _Relation.ABOVE or b.relation is _Relation.BELOW
-        return -inf if blocked else up.least_time(distance, a.velocity, b.velocity)
-    blocked = a.relation is _Relation.BELOW or b.relation is _Relation.ABOVE
-    return -inf if blocked else down.least_time(-distance, -a.velocity, -b.velocity)
+        return up.least_time(0.0, a.velocity, b.velocity) if a.side == b.side == 0 else -inf
+    way, point = (1, up) if distance > 0.0 else (-1, down)
+    if a.side == way or b.side == -way:
+        return -inf
+    return point.least_time(abs(distance), way * a.velocity, way * b.velocity)
 
 
 def _places(stage: Stage, direction: Array) -> tuple[_Place, ...]:
@@ -245,9 +233,9 @@ def _places(stage: Stage, direction: Array) -> tuple[_Place, ...]:
     if stage.ball is not None:
         middle = float(stage.ball.centre @ direction)
         lower, upper = max(lower, middle - stage.ball.radius), min(upper, middle + stage.ball.radius)
-    found = [_Place(_Relation.ABOVE, lower), _Place(_Relation.BELOW, upper)]
+    found = [_Place(1, lower), _Place(-1, upper)]
     if lower == upper and slow == fast:
-        found.append(_Place(_Relation.AT, lower, slow))
+        found.append(_Place(0, lower, slow))
     return tuple(place for place in found if abs(place.position) < inf)
 
 
