@@ -26,7 +26,7 @@ from aerobat.optimization.deadline import count_work, out_of_time, within_share
 from aerobat.optimization.interior_point import InteriorPointResult, Settings, interior_point
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, judge
 from aerobat.planning.courses import is_course
-from aerobat.planning.gate_clearance import bodies_in_gates, is_clear
+from aerobat.planning.gate_clearance import bodies_in_gates
 from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.limit_values import LimitValues
@@ -295,18 +295,17 @@ class Refinement:
         """Return the certified path, or a shorter certified path with twice as many segments.
 
         More segments are tried where the certified path is much longer than the rough one. Courses have many
-        segments already. Paths whose body touches gates' frames are refined again elsewhere, with more room.
+        segments already.
         """
         path, duration = rough.path.trajectory, found.solution.duration
         loses_little = not found.feasible or duration <= (1.0 + LOSS) * path.duration
-        if loses_little or is_course(self.task.stages) or not is_clear(found.frames) or out_of_time():
+        if loses_little or is_course(self.task.stages) or out_of_time():
             return found
         finer = self.finer(rough, min(2 * path.segments, MAX_SEGMENTS), duration)
         if not self.is_promising(finer) or finer.duration >= duration:
             return found
         judged = replace(self, adds_segments=False).finished(finer)
-        is_better = judged.feasible and judged.solution.duration < duration and is_clear(judged.frames)
-        return judged if is_better else found
+        return judged if judged.feasible and judged.solution.duration < duration else found
 
     def _fine_rounds(self, rough: RefinedPath) -> Judged[RefinedPath]:
         """Run one series of fine rounds; return the certified path, or the last path tried."""
