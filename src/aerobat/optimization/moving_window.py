@@ -13,7 +13,7 @@ from itertools import cycle
 
 import numpy as np
 
-from aerobat.optimization.assignment import AssignmentProgram, SlottedStage
+from aerobat.optimization.assignment import AssignmentProgram
 from aerobat.optimization.backends import solver
 from aerobat.optimization.deadline import out_of_time
 from aerobat.optimization.result import AssignmentResult, Status
@@ -36,15 +36,24 @@ def improved_in_windows(
     slots = answer.slots or start or evenly_spread(program)
     if answer.status in ("optimal", "infeasible") or slots is None or not program.is_totally_ordered:
         return answer
-    search = _MovingWindowSearch(program, slots)
-    search.run()
-    spent = replace(answer, nodes=answer.nodes + search.nodes, time=answer.time + search.time)
-    best = search.best
+    search, best, nodes, time = solver("builtin"), None, answer.nodes, answer.time
+    last = max(len(slots) - WIDTH, 0)  # first stage of the last window, which ends with the last stage
+    firsts = [*range(0, last, STEP), last]
+    unchanged, proven = 0, True  # windows in a row without an improvement, and whether all are solved exactly
+    for first in cycle(firsts):
+        if unchanged == len(firsts) or out_of_time():
+            break
+        window = _window(program, slots, range(first, first + WIDTH))
+        found = search.solve(window, node_limit=WINDOW_NODES, start=None if best is None else slots)
+        nodes, time = nodes + found.nodes, time + found.time
+        if found.slots is not None and (best is None or found.cost < best.cost * (1.0 - IMPROVEMENT)):
+            best, slots, unchanged, proven = found, found.slots, 0, True
+        proven = proven and found.status == "optimal"
+        unchanged += 1
     if best is None or not best.cost <= answer.cost:
-        return spent
-    status: Status = "locally optimal" if search.converged else "time_limit"
-    bound = min(answer.bound, best.cost)
-    return replace(best, status=status, bound=bound, nodes=spent.nodes, time=spent.time)
+        return replace(answer, nodes=nodes, time=time)
+    status: Status = "locally optimal" if proven and unchanged == len(firsts) else "time_limit"
+    return replace(best, status=status, bound=min(answer.bound, best.cost), nodes=nodes, time=time)
 
 
 def evenly_spread(program: AssignmentProgram) -> tuple[int, ...] | None:
@@ -74,66 +83,14 @@ def _latest(program: AssignmentProgram) -> list[int] | None:
     return latest
 
 
-class _MovingWindowSearch:
-    """Windows that move along one program, and the best result so far."""
-
-    def __init__(self, program: AssignmentProgram, slots: Sequence[int]) -> None:
-        self._program = program
-        self._slots = tuple(slots)
-        self._search = solver("builtin")
-        self.best: AssignmentResult | None = None
-        self.converged = False
-        self.nodes = 0
-        self.time = 0.0
-
-    def run(self) -> None:
-        """Move the windows until a whole round finds no improvement, or time is over."""
-        last = max(len(self._slots) - WIDTH, 0)
-        # first stages of the windows; the last window ends with the last stage
-        firsts = [*range(0, last, STEP), last]
-        unchanged, proven = 0, True
-        for first in cycle(firsts):
-            if out_of_time():
-                return
-            result = self._solved(first)
-            if self._improves(result):
-                unchanged, proven = 0, True
-            proven = proven and result.status == "optimal"
-            unchanged += 1
-            if unchanged == len(firsts):
-                self.converged = proven
-                return
-
-    def _solved(self, first: int) -> AssignmentResult:
-        window = range(first, first + WIDTH)
-        stages = self._program.stages
-        free = [self._between(i, window) if i in window else self._fixed(i) for i in range(len(stages))]
-        start = None if self.best is None else self._slots
-        result = self._search.solve(
-            replace(self._program, stages=tuple(free)), node_limit=WINDOW_NODES, start=start
-        )
-        self.nodes += result.nodes
-        self.time += result.time
-        return result
-
-    def _improves(self, result: AssignmentResult) -> bool:
-        """Keep a result that costs less than the best one, or is the first. Return True if it was kept."""
-        if result.x is None:
-            return False
-        assert result.slots is not None
-        known = np.inf if self.best is None else self.best.cost
-        if result.cost >= known * (1.0 - IMPROVEMENT):
-            return False
-        self.best, self._slots = result, result.slots
-        return True
-
-    def _between(self, i: int, window: range) -> SlottedStage:
-        """Return a stage with only the slots between the neighbours of its window."""
-        after = self._slots[window.start - 1] if window.start > 0 else -1
-        before = self._slots[window.stop] if window.stop < len(self._slots) else np.inf
-        stage = self._program.stages[i]
-        return stage.restricted([k for k, slot in enumerate(stage.slots) if after < slot < before])
-
-    def _fixed(self, i: int) -> SlottedStage:
-        stage = self._program.stages[i]
-        return stage.restricted([stage.index(self._slots[i])])
+def _window(program: AssignmentProgram, slots: Sequence[int], window: range) -> AssignmentProgram:
+    """Return the program whose stages outside a window keep their slots, with those between inside."""
+    after = slots[window.start - 1] if window.start > 0 else -1
+    before = slots[window.stop] if window.stop < len(slots) else np.inf
+    stages = (
+        stage.restricted([k for k, free in enumerate(stage.slots) if after < free < before])
+        if i in window
+        else stage.restricted([stage.index(slot)])
+        for i, (stage, slot) in enumerate(zip(program.stages, slots, strict=True))
+    )
+    return replace(program, stages=tuple(stages))
