@@ -175,17 +175,18 @@ class Formulation:
     @cached_property
     def _matrix(self) -> Array:
         """The matrix of all rows by the inputs, without drag, (m, 3N)."""
-        return self._assembled(self._response[self._places])
+        return self._rows_at(0.0)
 
     def _rows_at(self, dt: float) -> Array:
         """Return the matrix of all rows by the inputs at one dt, with drag, (m, 3N)."""
-        intervals, derivatives = self._places
-        below = self._response[intervals, np.maximum(derivatives - 1, 0)]
-        return self._assembled(self._response[self._places] + (dt * self._drags)[:, None] * below)
-
-    def _assembled(self, per_axis: Array) -> Array:
-        matrix = self._directions[:, :, None] * per_axis[:, None, :]
+        matrix = self._directions[:, :, None] * self._with_drag(self._response, dt)[:, None, :]
         return frozen(matrix.reshape(len(self._rows), 3 * self.chain.intervals), "rows")
+
+    def _with_drag(self, values: Array, dt: float) -> Array:
+        """Return the values (m, ·) at each row's interval and derivative, of values (N, r + 1, ·) at all."""
+        intervals, derivatives = self._places
+        below = values[intervals, np.maximum(derivatives - 1, 0)]
+        return np.asarray(values[intervals, derivatives] + (dt * self._drags)[:, None] * below)
 
     @cached_property
     def _response(self) -> Array:
@@ -200,13 +201,8 @@ class Formulation:
 
     def _free(self, dt: float) -> Array:
         """Return the normalised value of each row for zero input, (m,)."""
-        free = np.concatenate(
-            [self.chain.free(self.initial, dt), np.zeros((self.chain.intervals, 1, 3))], axis=1
-        )
-        intervals, derivatives = self._places
-        per_axis = free[intervals, derivatives]
-        per_axis = per_axis + (dt * self._drags)[:, None] * free[intervals, np.maximum(derivatives - 1, 0)]
-        return np.asarray(np.sum(per_axis * self._directions, axis=-1))
+        free = np.pad(self.chain.free(self.initial, dt), ((0, 0), (0, 1), (0, 0)))
+        return np.asarray(np.sum(self._with_drag(free, dt) * self._directions, axis=-1))
 
     def _row(self, condition: Condition, interval: int) -> Row:
         x, y, z = condition.direction.tolist()
