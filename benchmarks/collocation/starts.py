@@ -14,7 +14,7 @@ from aerobat.planning.courses import is_course
 from aerobat.planning.gate_clearance import bodies_in_gates
 from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner
-from aerobat.planning.polynomial.knots import start_along_normals
+from aerobat.planning.polynomial.closed_forms import start_along_normals
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task

@@ -19,7 +19,7 @@ from aerobat.links.stream import SetpointStream
 from aerobat.planning import least_duration
 from aerobat.planning.heading.follow import _remedy as turn_remedy
 from aerobat.planning.passages import gaps_at_ends
-from aerobat.planning.polynomial.starts import closed_forms
+from aerobat.planning.polynomial.closed_forms import closed_forms
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.closure import FRACTIONS, Closure
 from aerobat.planning.refinement.refine import Refinement

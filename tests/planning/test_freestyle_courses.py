@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import aerobat as ab
-from aerobat.planning.polynomial.knots import fixed_at_knots, stretched_path
-from aerobat.planning.polynomial.starts import closed_forms
+from aerobat.planning.polynomial.closed_forms import closed_forms, stretched_path
+from aerobat.planning.polynomial.knots import fixed_at_knots
 from aerobat.planning.rotor_margin import sampled_margin
 from aerobat.planning.task import Task
 

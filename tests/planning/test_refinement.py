@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from aerobat.environment import Box, Cylinder, Environment
 from aerobat.planning import Miqp
 from aerobat.planning.gate_clearance import bodies_in_gates
-from aerobat.planning.polynomial.flying_lap import flying_lap
-from aerobat.planning.polynomial.knots import start_along_normals
+from aerobat.planning.polynomial.closed_forms import flying_lap, start_along_normals
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.limit_values import LimitValues
 from aerobat.planning.refinement.program import Multipliers, RefinementProgram

@@ -22,7 +22,8 @@ from aerobat.planning.assessment.assessment import SUSPICIOUS
 from aerobat.planning.assessment.lower_bound import least_duration
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
-from aerobat.planning.polynomial.starts import SLOWER_PACES, closed_forms, starts
+from aerobat.planning.polynomial.closed_forms import SLOWER_PACES, closed_forms
+from aerobat.planning.polynomial.starts import starts
 from aerobat.planning.refinement.flown import FlownPath
 from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
 from aerobat.planning.result import Plan

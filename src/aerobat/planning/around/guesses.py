@@ -14,7 +14,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.planning.around.cells import Cells
 from aerobat.planning.around.routes import GridRoute, Leg, routes, straightened
-from aerobat.planning.polynomial.knots import start_along_normals
+from aerobat.planning.polynomial.closed_forms import start_along_normals
 from aerobat.planning.task import CLEARANCE_FRACTION, Task
 from aerobat.planning.warm_start import WarmStart
 from aerobat.problem.condition import Attitude, Quantity, fixed

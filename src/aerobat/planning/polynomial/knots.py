@@ -11,25 +11,14 @@ import numpy as np
 
 from aerobat.arrays import Array
 from aerobat.errors import Reason
-from aerobat.planning.rotor_margin import sampled_margin
 from aerobat.planning.task import Task
-from aerobat.planning.warm_start import WarmStart
-from aerobat.problem.condition import Condition, ForceBalance, Quantity, fixed
-from aerobat.problem.gate import Gate
+from aerobat.problem.condition import Condition, ForceBalance, Quantity
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
 from aerobat.trajectory import Trajectory
-from aerobat.trajectory.minimum_effort import minimum_effort
 
 LEG_THRUST_FRACTION = 0.3  # fraction of the specific thrust that accelerates a leg when times are guessed
 SHORTEST_LEG = 0.2  # least guessed duration of a leg [s]
-# by how much a stretched path may exceed rotor limits, as a fraction of the rotors' range
-ALLOWED_EXCESS = 0.3
-PACE = 1.05  # factor on the duration in one step of stretching
-PACES = 80  # largest number of steps: 50 times the duration
-FIGURE_PACES = 12  # the same for figures, 1.8 times: slow motions reach their attitudes only in free fall
-PACE_STRIDE = 4  # steps at a time where no pace is close enough and the one closest to the limits is taken
-MIN_GATE_SPEED = 3.0  # least speed of starts through gates [m/s]
 STAGE_TOLERANCE = 1e-6  # violation of a condition that is rounding, in SI units
 
 
@@ -99,91 +88,6 @@ def without_speed_bounds(task: Task) -> Task:
     return task.with_stages(stages)
 
 
-def _without_figures_attitudes(task: Task) -> Task:
-    """Return the task without the attitudes of figures' stages whose position is given."""
-    stages = (
-        replace(stage, attitude=None, conditions=tuple(filterfalse(_is_of_thrust, stage.conditions)))
-        if _is_of_figure(stage) and stage.is_placed
-        else stage
-        for stage in task.stages.stages
-    )
-    return task.with_stages(stages)
-
-
-def _is_of_figure(stage: Stage) -> bool:
-    """Return whether a stage asks an attitude and has no gate, as in a figure such as a flip."""
-    return stage.gate is None and stage.attitude is not None
-
-
-def _is_of_thrust(condition: Condition) -> bool:
-    return condition.quantity is Quantity.SPECIFIC_THRUST
-
-
-def stretched_path(task: Task, order: int) -> Trajectory:
-    """Return the closed form through ordered stages as a warm start; legs last as the roots of their lengths.
-
-    The path is stretched in time until rotors exceed their limits by ALLOWED_EXCESS at most: a motion that is
-    a little too fast is nearer to the optimum than one that is too slow. Slow motions cannot fly figures:
-    where no pace tried satisfies that, the pace that exceeds limits least is taken.
-
-    Args:
-        task: The task whose ends and stages are met, without the attitudes of figures, which follow from
-            their positions.
-        order: The derivative of position whose square is minimized.
-    """
-    vehicle, still = task.vehicle, np.zeros((len(task.stages.stages), 3))
-    fixed = fixed_at_knots(_without_figures_attitudes(without_speed_bounds(task)), order, still)
-    durations = first_times(task.problem, fixed, vehicle.max_specific_thrust)
-    allowed = -ALLOWED_EXCESS * float(vehicle.thrust_ranges.max())
-    paces = FIGURE_PACES if any(map(_is_of_figure, task.stages.stages)) else PACES
-
-    def path(steps: int) -> Trajectory:
-        return minimum_effort(fixed, durations * PACE**steps, heading=task.problem.heading.start)
-
-    def margin(steps: int) -> float:
-        return float(sampled_margin(path(steps), vehicle, task.environment).margin)
-
-    slower = next((steps for steps in range(paces) if margin(steps) >= allowed), None)
-    if slower is None:
-        return path(max(range(-2 * paces, paces, PACE_STRIDE), key=margin))
-    if slower > 0:
-        return path(slower)
-    return path(1 - next((steps for steps in range(1, PACES) if margin(-steps) < allowed), PACES))
-
-
-def path_along_normals(task: Task, order: int) -> Trajectory:
-    """Return the stretched closed form through ordered stages that passes gates along their normals.
-
-    The speed in a gate is that of the closed form with free velocities, at least MIN_GATE_SPEED.
-
-    Args:
-        task: The task whose ends are met and whose gates are passed.
-        order: The derivative of position whose square is minimized.
-    """
-    path = stretched_path(task, order)
-    if all(stage.gate is None for stage in task.stages.stages):
-        return path
-    speeds = np.linalg.norm(path.evaluate(path.knots[1:-1], 1), axis=-1).tolist()
-    stages = [
-        stage
-        if stage.gate is None
-        else replace(stage, conditions=(*stage.conditions, *_along(task.problem.gate(stage.gate), speed)))
-        for stage, speed in zip(task.stages.stages, speeds, strict=True)
-    ]
-    return stretched_path(task.with_stages(stages), order)
-
-
-def start_along_normals(task: Task, order: int) -> WarmStart:
-    """Return the path of `path_along_normals` as a warm start.
-
-    Args:
-        task: The task whose ends are met and whose gates are passed, with its stages in order.
-        order: The derivative of position whose square is minimized.
-    """
-    path = path_along_normals(task, order)
-    return WarmStart(path, task.stages.stages, tuple(path.knots[1:-1].tolist()))
-
-
 def violated_stage(task: Task, trajectory: Trajectory) -> Reason | None:
     """Return a sentence about the first stage missed by a trajectory with a knot at each stage, or None."""
     values = [trajectory.evaluate(trajectory.knots[1:-1], k) for k in range(3)]
@@ -201,11 +105,6 @@ def violated_stage(task: Task, trajectory: Trajectory) -> Reason | None:
             sentence = f"the stage '{stage.name}' asks to be passed {given} at {fraction:.4g}"
             return Reason(sentence, (f"stage '{stage.name}'",))
     return None
-
-
-def _along(gate: Gate, speed: float) -> tuple[Condition, ...]:
-    """Return conditions that fix the velocity in a gate along its normal, at MIN_GATE_SPEED or more."""
-    return fixed(Quantity.VELOCITY, max(speed, MIN_GATE_SPEED) * gate.normal)
 
 
 def _is_speed_bound(condition: Condition) -> bool:

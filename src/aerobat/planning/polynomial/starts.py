@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
-from itertools import product
 
 from aerobat.errors import Infeasible
 from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner
-from aerobat.planning.polynomial.flying_lap import flying_lap
-from aerobat.planning.polynomial.knots import start_along_normals
+from aerobat.planning.polynomial.closed_forms import closed_forms
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
-
-ORDERS = (4, 3)  # orders of the closed forms that start courses: minimum snap, minimum jerk
-SLOWER_PACES = (1.3, 1.7)  # factors on their durations where faster starts fail or paths touch a frame
 
 
 def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
@@ -73,10 +68,3 @@ def _without_rotors(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, Warm
             return
     if not (found or out_of_time()):
         raise refusal
-
-
-def closed_forms(task: Task, paces: Sequence[float] = (1.0,)) -> Iterator[tuple[None, WarmStart]]:
-    """Yield closed forms through a course with their durations scaled by each of `paces`; none is a plan."""
-    closed_form = flying_lap if task.stages.closed else start_along_normals
-    for pace, order in product(paces, ORDERS):
-        yield None, closed_form(task, order).time_scaled(pace)
