@@ -6,12 +6,24 @@ import numpy as np
 import pytest
 
 from aerobat.certification import Finding, Side, Verdict
+from aerobat.errors import Infeasible
 from aerobat.planning import FreeKnots, MinSnap, Plan, plan
 from aerobat.planning.flyability import own_flight
 from aerobat.planning.gate_clearance import more_direct
+from aerobat.planning.multi_start import MultiStart
+from aerobat.planning.refinement.refine import Refinement
 from aerobat.planning.rotor_margin import reserve_shortfalls
 from aerobat.planning.task import Task
-from aerobat.problem import Course, PassGate, Problem, at_rest, load_problem, tilted_gate
+from aerobat.problem import (
+    Course,
+    PassGate,
+    Problem,
+    Waypoint,
+    Waypoints,
+    at_rest,
+    load_problem,
+    tilted_gate,
+)
 from aerobat.vehicle import Vehicle, load_vehicle
 from random_courses import random_course
 from random_flights import with_lags
@@ -119,3 +131,15 @@ def test_a_corkscrew_that_no_closed_form_leads_to_begins_at_a_program_of_more_in
     assert found.planner == "free-knots"
     assert found.flies
     assert found.duration < 4.75
+
+
+def test_no_start_of_a_refused_course_is_refined_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Refinement, "is_promising", lambda *_: False)
+    monkeypatch.setattr("aerobat.planning.multi_start.starts", lambda *_: ())
+    monkeypatch.setattr(MultiStart, "_of_more", lambda *_: ())
+    points = tuple(Waypoint((float(k), k % 2, 2.0)) for k in range(1, 7))
+    course = Problem("zigzag", at_rest((0.0, 0.0, 2.0)), at_rest((7.0, 0.0, 2.0)), Waypoints(points))
+    with pytest.raises(Infeasible) as refusal:
+        plan(course, "free-knots")
+    durations = [attempt.duration for attempt in refusal.value.attempts]
+    assert len(durations) == len(set(durations)) > 5

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from math import inf
 
@@ -66,6 +66,7 @@ class MultiStart:
     start: Plan | None  # a plan whose path is tried alone, before the other starts
     guess: Miqp  # the planner whose plan is one of the starts
     finalists: int  # number of fastest rough paths that get twice as many segments; one then gets four times
+    _given_up: dict[WarmStart, None] = field(default_factory=dict, init=False, repr=False)  # starts, in order
 
     def plan(self, time_limit: float | None) -> Plan:
         """Return the fastest certified plan found, which may be a plan from which the search started.
@@ -192,7 +193,7 @@ class MultiStart:
         """Yield batches of starts, each with its refinement; later batches are tried if earlier ones fail.
 
         A batch fails if it leads to no certified path that is clear of gates' frames. The closed forms of a
-        course are tried with a refinement that gives up early first.
+        course are tried with a refinement that gives up early first, and those given up once more without.
         """
         task = self._task
         if self.start is not None:
@@ -202,7 +203,8 @@ class MultiStart:
             quick = replace(self.refinement, gives_up_early=True)
             for start in closed_forms(task, (1.0, *SLOWER_PACES)):
                 yield quick, [start]
-            for each in chain(starts(task, guess), closed_forms(task, SLOWER_PACES), self._of_more(guess)):
+            again = ((None, path) for path in self._given_up)
+            for each in chain(again, starts(task, guess), self._of_more(guess)):
                 yield self.refinement, [each]
             return
         with within_share(ROUGH_TIME):
@@ -256,6 +258,8 @@ class MultiStart:
         for path in batch:
             known = min((each.duration for each in found), default=inf)
             rough = refinement.rough(path, self._least_segments, known)
+            if refinement.gives_up_early and rough.path.trajectory.segments < self._least_segments:
+                self._given_up[path] = None
             if refinement.is_promising(rough):
                 found.append(rough)
             if found and out_of_time():

@@ -1,4 +1,4 @@
-"""Starts of refinements: closed forms through a course, or the plans of other planners."""
+"""Starts of refinements: the plans of other planners."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from aerobat.optimization.deadline import out_of_time
 from aerobat.planning.courses import is_course
 from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.planners import Planner
-from aerobat.planning.polynomial.closed_forms import closed_forms
 from aerobat.planning.polynomial.min_snap import MinSnap
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
@@ -18,19 +17,17 @@ from aerobat.planning.warm_start import WarmStart
 
 
 def starts(task: Task, guess: Miqp) -> Iterator[tuple[Plan | None, WarmStart]]:
-    """Yield paths through a task's stages, the likeliest first, each with its plan if it is one.
+    """Yield the paths of other planners, the likeliest first, each with its plan if it is one.
 
     Args:
         task: The task that is planned.
-        guess: The mixed-integer planner, which plans for the vehicle, then for none. Courses use it last, if
+        guess: The mixed-integer planner, which plans for the vehicle, then for none. Courses use it only if
             it has more intervals than they have stages.
 
     Raises:
         Infeasible: A stage asks more thrust than the vehicle has.
     """
     problem, on_course = task.problem, is_course(task.stages)
-    if on_course:
-        yield from closed_forms(task)
     if task.stages.closed or (on_course and guess.intervals_for(task.stages) <= len(task.stages.stages)):
         return
     closed_form: list[Planner] = [MinSnap()] if problem.maneuver.through_points and not on_course else []
