@@ -17,6 +17,7 @@ from aerobat.arrays import Array
 from aerobat.engines.floats import ArrayOps
 from aerobat.engines.pytree import tree_map
 from aerobat.kernels.gates import progress
+from aerobat.kernels.gates.snapshot import Transition
 from aerobat.problem.ball import Ball
 from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
 from aerobat.simulation import Outcome
@@ -79,9 +80,9 @@ def tick_by_tick(
     last = now = tree_map(lambda leaf: leaf[0], rows)
     for k in range(TICKS):
         last, now = now, tree_map(itemgetter(k), rows)
-        counted = np.full(FLIGHTS, k > 0), k < ends
+        transition = Transition(last, now, np.full(FLIGHTS, k > 0), k < ends)
         with np.errstate(invalid="ignore"):  # 0/0, of what is not selected
-            found = progress.step(ArrayOps, found, place, (last, now), counted)
+            found = progress.step(ArrayOps, found, place, transition)
     return passages(planned, found, np.where(ends < TICKS, TIMES[ends - 1], np.nan))
 
 

@@ -12,7 +12,7 @@ from aerobat.kernels.gates.approach import Approach, Target
 from aerobat.kernels.gates.pointing import Direction, Pointing
 from aerobat.kernels.gates.progress import GateProgress
 from aerobat.kernels.gates.section import BoundingEllipsoid, GatePlane
-from aerobat.kernels.gates.snapshot import Snapshot
+from aerobat.kernels.gates.snapshot import Snapshot, Transition
 from aerobat.kernels.ops import Ops, PerRotor, Quaternion, Scalar, Vector
 from aerobat.kernels.quaternions import angle_between
 from aerobat.kernels.rigid_body import Body
@@ -102,7 +102,7 @@ def step(
     below = counted & (body.position[2] < lowest_height(ops, parameters.ground, body.velocity))
     is_off = counted & (square > parameters.path_radius_sq)
     now = Snapshot(time, *body[:3])
-    snapshots, both = (metrics.last, now), (metrics.ticks > 0.5, counted)
+    transition = Transition(metrics.last, now, metrics.ticks > 0.5, counted)
     return RunningMetrics(
         flying=going,
         is_finite=ops.select(ended & (counts < 0.5), 0.0, metrics.is_finite),
@@ -117,15 +117,15 @@ def step(
         saturated=metrics.saturated + ops.select(saturated, counts, 0.0),
         last=now,
         gates=tuple(
-            progress.step(ops, gate, (plane, parameters.ellipsoid), snapshots, both)
+            progress.step(ops, gate, (plane, parameters.ellipsoid), transition)
             for gate, plane in zip(metrics.gates, parameters.gates, strict=True)
         ),
         waypoints=tuple(
-            approach.step(ops, latest, target, snapshots, both)
+            approach.step(ops, latest, target, transition)
             for latest, target in zip(metrics.waypoints, parameters.waypoints, strict=True)
         ),
         attitudes=tuple(
-            pointing.step(ops, latest, direction, snapshots, both)
+            pointing.step(ops, latest, direction, transition)
             for latest, direction in zip(metrics.attitudes, parameters.attitudes, strict=True)
         ),
     )

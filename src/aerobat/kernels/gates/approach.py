@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from aerobat.kernels.gates.snapshot import Snapshot, interpolated, relative
+from aerobat.kernels.gates.snapshot import Snapshot, Transition, interpolated, relative
 from aerobat.kernels.ops import Ops, Scalar, Vector, clip, magnitude, select_tree
 from aerobat.kernels.vectors import ZERO, dot, subtract
 
@@ -40,23 +40,8 @@ def _nearest(ops: Ops, last: Snapshot, now: Snapshot) -> Approach:
     return Approach(dot(here.position, here.position), here.time, here.velocity)
 
 
-def step(
-    ops: Ops,
-    approach: Approach,
-    target: Target,
-    snapshots: tuple[Snapshot, Snapshot],
-    counted: tuple[Scalar, Scalar],
-) -> Approach:
-    """Return the nearest approach a tick later.
-
-    Args:
-        ops: the arithmetic of the engine.
-        approach: the approach before the tick.
-        target: the place.
-        snapshots: the snapshots at the last tick and at this tick.
-        counted: whether there was a last tick, and whether this tick counts.
-    """
-    here = _nearest(ops, *(relative(each, target.centre) for each in snapshots))
-    in_window = magnitude(ops, here.time - target.planned) <= target.window
-    counts = counted[0] & counted[1] & in_window
+def step(ops: Ops, approach: Approach, target: Target, transition: Transition) -> Approach:
+    """Return the nearest approach a tick later."""
+    here = _nearest(ops, *(relative(each, target.centre) for each in (transition.last, transition.now)))
+    counts = transition.is_counted & (magnitude(ops, here.time - target.planned) <= target.window)
     return select_tree(ops, counts & (here.square < approach.square), here, approach)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from aerobat.kernels.gates.snapshot import Snapshot
+from aerobat.kernels.gates.snapshot import Snapshot, Transition
 from aerobat.kernels.ops import Ops, Scalar, Vector, clip, magnitude, select_tree
 from aerobat.kernels.quaternions import axes
 from aerobat.kernels.vectors import add_scaled, dot, norm, subtract
@@ -53,23 +53,8 @@ def _nearest(ops: Ops, direction: Direction, last: Snapshot, now: Snapshot) -> P
     return select_tree(ops, cosine > end, Pointing(cosine, time), Pointing(end, now.time))
 
 
-def step(
-    ops: Ops,
-    pointing: Pointing,
-    direction: Direction,
-    snapshots: tuple[Snapshot, Snapshot],
-    counted: tuple[Scalar, Scalar],
-) -> Pointing:
-    """Return the smallest angle a tick later.
-
-    Args:
-        ops: the arithmetic of the engine.
-        pointing: the state before the tick.
-        direction: the required direction of the thrust axis.
-        snapshots: the snapshots at the last tick and at this tick, with attitudes of unit length.
-        counted: whether there was a last tick, and whether this tick counts.
-    """
-    here = _nearest(ops, direction, *snapshots)
-    in_window = magnitude(ops, here.time - direction.planned) <= direction.window
-    counts = counted[0] & counted[1] & in_window
+def step(ops: Ops, pointing: Pointing, direction: Direction, transition: Transition) -> Pointing:
+    """Return the smallest angle a tick later; attitudes at the ticks are of unit length."""
+    here = _nearest(ops, direction, transition.last, transition.now)
+    counts = transition.is_counted & (magnitude(ops, here.time - direction.planned) <= direction.window)
     return select_tree(ops, counts & (here.cosine > pointing.cosine), here, pointing)

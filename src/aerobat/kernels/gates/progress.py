@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from aerobat.kernels.gates import swath
 from aerobat.kernels.gates.section import BoundingEllipsoid, GatePlane
-from aerobat.kernels.gates.snapshot import Snapshot, interpolated, relative_to_moving
+from aerobat.kernels.gates.snapshot import Snapshot, Transition, interpolated, relative_to_moving
 from aerobat.kernels.gates.swath import SwathProgress
 from aerobat.kernels.ops import Ops, Scalar, magnitude, select_tree
 from aerobat.kernels.vectors import ZERO, dot
@@ -34,22 +34,14 @@ def step(
     ops: Ops,
     progress: GateProgress,
     gate: tuple[GatePlane, BoundingEllipsoid],
-    snapshots: tuple[Snapshot, Snapshot],
-    counted: tuple[Scalar, Scalar],
+    transition: Transition,
 ) -> GateProgress:
-    """Return the progress a tick later.
-
-    Args:
-        ops: the arithmetic of the engine.
-        progress: the progress before the tick.
-        gate: the gate's plane, and the ellipsoid around the vehicle; () for an unknown body.
-        snapshots: the snapshots at the last tick and at this tick.
-        counted: whether there was a last tick, and whether this tick counts.
-    """
+    """Return the progress a tick later, at a gate's plane; its ellipsoid is () for an unknown body."""
     plane, _ = gate
-    last, now = (relative_to_moving(ops, each, plane.centre, plane.motion) for each in snapshots)
+    last, now, _, counts = transition
+    last, now = (relative_to_moving(ops, each, plane.centre, plane.motion) for each in (last, now))
     before, behind = dot(last.position, plane.normal), dot(now.position, plane.normal)
-    both = counted[0] & counted[1]
+    both = transition.is_counted
     forward = both & (before <= 0.0) & (behind > 0.0)
     back = both & (before > 0.0) & (behind <= 0.0)
     crosses = ops.select(forward, 1.0, ops.select(back, 1.0, 0.0))
@@ -59,13 +51,14 @@ def step(
     is_passing = (behind > 0.0) & (behind < plane.depth) & (latest.time < inf)
     off_time = magnitude(ops, latest.time - plane.planned)
     nearer = off_time < magnitude(ops, progress.crossing.time - plane.planned)
-    passed = counted[1] & (behind >= plane.depth) & (off_time <= plane.window) & nearer
+    passed = counts & (behind >= plane.depth) & (off_time <= plane.window) & nearer
     back_off_time = magnitude(ops, here.time - plane.planned)
     nearer_back = back_off_time < magnitude(ops, progress.backward - plane.planned)
-    in_window = counted[1] & (magnitude(ops, now.time - plane.planned) <= plane.window)
+    in_window = counts & (magnitude(ops, now.time - plane.planned) <= plane.window)
     swept = progress.swath
     if plane.directions:
-        swept = swath.step(ops, swept, gate, (last, now), counted, crosses, (is_passing, passed))
+        seen = transition._replace(last=last, now=now)
+        swept = swath.step(ops, swept, gate, seen, crosses, (is_passing, passed))
     return GateProgress(
         latest,
         select_tree(ops, passed, latest, progress.crossing),

@@ -17,6 +17,20 @@ class Snapshot(NamedTuple):
     q_world_body: Quaternion  # interpolated attitudes are not of unit length
 
 
+class Transition(NamedTuple):
+    """A vehicle at the last tick and at this tick; its motion between them is straight."""
+
+    last: Snapshot
+    now: Snapshot
+    follows: Scalar  # whether there was a last tick
+    counts: Scalar  # whether this tick counts
+
+    @property
+    def is_counted(self) -> Scalar:
+        """True where the motion between the ticks counts."""
+        return self.follows & self.counts
+
+
 class VelocityJump(NamedTuple):
     """An instant at which the velocity of a place jumps."""
 

@@ -22,7 +22,7 @@ from aerobat.kernels.gates.section import (
     gap,
     section,
 )
-from aerobat.kernels.gates.snapshot import Snapshot, interpolated
+from aerobat.kernels.gates.snapshot import Snapshot, Transition, interpolated
 from aerobat.kernels.ops import Ops, Scalar, Vector, magnitude, select_tree
 from aerobat.kernels.vectors import dot, norm, subtract
 
@@ -61,8 +61,7 @@ def step(
     ops: Ops,
     progress: SwathProgress,
     gate: tuple[GatePlane, BoundingEllipsoid],
-    snapshots: tuple[Snapshot, Snapshot],
-    counted: tuple[Scalar, Scalar],
+    transition: Transition,
     crosses: Scalar,
     crossed: tuple[Scalar, Scalar],
 ) -> SwathProgress:
@@ -72,25 +71,23 @@ def step(
         ops: the arithmetic of the engine.
         progress: the progress before the tick.
         gate: the gate's plane, and the ellipsoid around the vehicle.
-        snapshots: the snapshots at the last tick and at this tick, positions relative to the opening's
-            centre.
-        counted: whether there was a last tick, and whether this tick counts.
+        transition: the vehicle at the last tick and at this one, positions relative to the opening's centre.
         crosses: 1 where the centre crosses the plane between them.
         crossed: two flags: whether the centre has crossed the plane anywhere and is within the depth; and
             whether, with this tick, this stay or the last one has become the one that counts.
     """
     plane, ellipsoid = gate
     is_passing, passed = crossed
-    now = snapshots[1]
+    last, now, _, counts = transition
     across = plane.normal, *plane.directions[0][:2]
     gap_now = gap(ops, section(ops, ellipsoid, across, now.position, now.q_world_body))
     distance = magnitude(ops, dot(now.position, plane.normal))
     beside = norm(ops, now.position) - plane.radius - extent(ops, ellipsoid)
-    at_plane = counted[1] & (ops.minimum(gap_now, distance - plane.depth) <= 0.0)
+    at_plane = counts & (ops.minimum(gap_now, distance - plane.depth) <= 0.0)
     is_about = at_plane & (ops.select(is_passing, 0.0, beside) <= 0.0)
-    met, here = swept_between(ops, gate, snapshots, (progress.gap, gap_now), crosses)
+    met, here = swept_between(ops, gate, (last, now), (progress.gap, gap_now), crosses)
     before = select_tree(ops, progress.is_about > 0.5, progress.stay, len(plane.directions) * (NOWHERE,))
-    stay = _wider(ops, counted[0] & counted[1] & met, here, before)
+    stay = _wider(ops, transition.is_counted & met, here, before)
     is_crossing = ops.select(passed, 1.0, progress.is_crossing) > 0.5
     return SwathProgress(
         gap_now,

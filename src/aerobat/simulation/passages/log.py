@@ -15,7 +15,7 @@ from aerobat.engines import choose, run_whole
 from aerobat.engines.engine import Init, Step
 from aerobat.engines.pytree import Tree, components, tree_leaves, tree_map, tree_stack
 from aerobat.kernels.gates import progress
-from aerobat.kernels.gates.snapshot import Snapshot
+from aerobat.kernels.gates.snapshot import Snapshot, Transition
 from aerobat.kernels.ops import Ops, Scalar
 from aerobat.problem.planned_passage import PlannedPassage
 from aerobat.simulation.passages.passage import Passage, bounding_ellipsoid, gate_places, passages
@@ -31,15 +31,7 @@ class PlaceKernel(Protocol):
     def init(self, place: Tree, /) -> Tree:
         """Return the state before the first tick."""
 
-    def step(
-        self,
-        ops: Ops,
-        state: Tree,
-        place: Tree,
-        snapshots: tuple[Snapshot, Snapshot],
-        counted: tuple[Scalar, Scalar],
-        /,
-    ) -> Tree:
+    def step(self, ops: Ops, state: Tree, place: Tree, transition: Transition, /) -> Tree:
         """Return the state a tick later."""
 
 
@@ -83,7 +75,7 @@ def _functions(kernel: PlaceKernel) -> tuple[Init, Step]:
 
     def step(ops: Ops, place: Tree, carry: Tree, row: ScannedRow) -> tuple[Tree, Tree]:
         state, last = carry
-        state = kernel.step(ops, state, place, (last, row.snapshot), (row.follows > 0.5, True))
+        state = kernel.step(ops, state, place, Transition(last, row.snapshot, row.follows > 0.5, True))
         return (state, row.snapshot), state
 
     return init, step
