@@ -115,12 +115,8 @@ def read_named_file(path: str | os.PathLike[str], max_size: int) -> bytes:
         raise FieldError("", f"must be the name of a file, got {shown(path)}")
     try:
         return read_whole(beside_document(path), max_size)
-    except FileNotFoundError:
-        raise FieldError("", f": there is no file {beside_document(path)}; check the path") from None
     except SpecError as error:
-        raise FieldError("", f": {path}: {error}") from None
-    except (OSError, ValueError) as error:
-        raise FieldError("", f": {path} cannot be read: {_reason(error)}") from None
+        raise FieldError("", f": {beside_document(path)}: {error}") from None
 
 
 def write_document(path: str | os.PathLike[str], table: Mapping[str, Any]) -> None:
@@ -160,19 +156,11 @@ def read_text(path: Document, max_size: int = MAX_DOCUMENT) -> str:
 
     Raises SpecError, one sentence without the file's name, where it cannot be read.
     """
+    content = read_whole(path, max_size) if isinstance(path, Path) else path.read_bytes()
     try:
-        content = read_whole(path, max_size) if isinstance(path, Path) else path.read_bytes()
         return content.decode("utf-8-sig")
-    except FileNotFoundError:
-        raise SpecError("there is no such file; check the path") from None
-    except IsADirectoryError:
-        raise SpecError("this is a folder; give the path of a file") from None
     except UnicodeDecodeError as error:
         raise SpecError(f"byte {error.start} is not UTF-8 text; save the file as UTF-8") from None
-    except SpecError:
-        raise
-    except (OSError, ValueError) as error:
-        raise SpecError(f"cannot be read: {_reason(error)}") from None
 
 
 def read_json(path: Path) -> Any:
@@ -181,10 +169,6 @@ def read_json(path: Path) -> Any:
         return json.loads(read_text(path))
     except (ValueError, RecursionError) as error:
         raise error if isinstance(error, SpecError) else SpecError("it is no JSON; write it again") from None
-
-
-def _reason(error: Exception) -> str:
-    return (isinstance(error, OSError) and error.strerror) or str(error)
 
 
 def _parse(text: str) -> dict[str, Any]:

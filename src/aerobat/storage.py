@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import errno
 import hashlib
 import io
 import os
@@ -131,19 +130,25 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
 def read_whole(path: str | os.PathLike[str], max_size: int) -> bytes:
     """Return a file's whole content.
 
-    Raises OSError where it cannot be read, and SpecError for what is no file of at most `max_size` bytes: a
-    pipe or a device may never end.
+    Raises SpecError, one sentence without the file's name, where it cannot be read, and for what is no file
+    of at most `max_size` bytes: a pipe or a device may never end.
     """
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    with os.fdopen(descriptor, "rb") as file:
-        found = os.fstat(descriptor)
-        if stat.S_ISDIR(found.st_mode):
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-        if not stat.S_ISREG(found.st_mode):
-            raise SpecError("it is a pipe or a device, not a file; give a file's path")
-        if found.st_size > max_size:
-            raise SpecError(f"it has {found.st_size / 2**20:.0f} MiB, more than {max_size // 2**20} MiB")
-        return file.read()
+    try:
+        with open(path, "rb", opener=_open_at_once) as file:
+            found = os.fstat(file.fileno())
+            if not stat.S_ISREG(found.st_mode):
+                raise SpecError("it is a pipe or a device, not a file; give a file's path")
+            if found.st_size > max_size:
+                raise SpecError(f"it has {found.st_size / 2**20:.0f} MiB, more than {max_size // 2**20} MiB")
+            return file.read()
+    except FileNotFoundError:
+        raise SpecError("there is no such file; check the path") from None
+    except IsADirectoryError:
+        raise SpecError("this is a folder; give the path of a file") from None
+    except SpecError:
+        raise
+    except (OSError, ValueError) as error:
+        raise SpecError(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
 
 def read_arrays(
@@ -163,16 +168,11 @@ def read_arrays(
     try:
         content = read_whole(path, limit)
         arrays = _unpacked(content, min(limit, SMALL_ARRAYS + MAX_EXPANSION * len(content)))
-        if arrays is not None:
-            return arrays
-        complaint = f"it is not a whole .npz file of a {what}; save it again"
-    except FileNotFoundError:
-        complaint = "there is no such file; check the path"
+        if arrays is None:
+            raise SpecError(f"it is not a whole .npz file of a {what}; save it again")
+        return arrays
     except SpecError as error:
-        complaint = str(error)
-    except (OSError, ValueError) as error:
-        complaint = f"it cannot be read ({(isinstance(error, OSError) and error.strerror) or error})"
-    raise SpecError(f"{what} file {path}: {complaint}")
+        raise SpecError(f"{what} file {path}: {error}") from None
 
 
 def digest_of(content: Mapping[str, NDArray[Any]]) -> str:
@@ -211,6 +211,11 @@ def _unpacked(content: bytes, max_size: int) -> dict[str, NDArray[Any]] | None:
     except Exception:  # zlib, lzma, struct, tokenize, memory: a damaged archive can end in anything
         pass
     return None
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """Open a file without waiting for what a pipe will hold."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _entries(folder: Path) -> list[str]:

@@ -51,7 +51,7 @@ def test_the_path_of_what_moves_is_read_from_a_csv_file(tmp_path: Path) -> None:
     assert OBSTACLES.read(to_table(obstacle)) == obstacle
     (tmp_path / "path.csv").write_text("0, 1, 2, 3\n2, x, 4, 3\n", encoding="utf-8")
     assert "has a row that is not four numbers" in refusal(tmp_path, kind + '"path.csv"')
-    assert "there is no file" in refusal(tmp_path, kind + '"other.csv"')
+    assert "there is no such file" in refusal(tmp_path, kind + '"other.csv"')
     assert "the time rising" in refusal(tmp_path, kind + "[[1, 0, 0, 0], [1, 1, 0, 0]]")
     assert "must be a CSV file's name or rows of t, x, y, z, got 3" in refusal(tmp_path, kind + "3")
 

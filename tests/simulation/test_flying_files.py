@@ -64,7 +64,7 @@ def changed(**arrays: object) -> Callable[[Path], None]:
     ("write", "sentence"),
     [
         (lambda path: None, "there is no such file"),
-        (lambda path: path.mkdir(), "cannot be read"),
+        (lambda path: path.mkdir(), "this is a folder; give the path of a file"),
         (lambda path: path.write_bytes(b""), "not a whole .npz"),
         (lambda path: path.write_bytes(b"PK\x03\x04 torn"), "not a whole .npz"),
         (lambda path: path.write_text("time,x,y,z\n"), "not a whole .npz"),

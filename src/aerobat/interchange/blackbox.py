@@ -64,8 +64,6 @@ def read_blackbox(path: PathName) -> Blackbox:
             rate_setpoint=scale * _three(columns, "setpoint"),
             motors=(np.stack(motors, axis=-1) - low) / (high - low),
         )
-    except OSError as error:
-        raise SpecError(f"blackbox log {path}: {error.strerror}") from None
     except SpecError as error:
         raise SpecError(f"blackbox log {path}: {error}") from None
     except (KeyError, ValueError, IndexError, TypeError):

@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from aerobat.declaration import PathName, Positive, validated
+from aerobat.documents import read_text, within
 from aerobat.errors import SpecError
 from aerobat.interchange.number_table import has_header, number_table, require_numbers
 from aerobat.interchange.rows import PathRows, rows_of_columns, times_at_rate
 from aerobat.interchange.tables import csv_text
-from aerobat.storage import read_whole, write_whole
+from aerobat.storage import write_whole
 from aerobat.trajectory import Carrier, Trajectory, as_trajectory
 
 CSV_COLUMNS = 12
@@ -55,12 +56,10 @@ def read_csv(path: PathName, rate: Positive = 100.0) -> Trajectory:
 @validated
 def read_rows(path: PathName, rate: Positive = 100.0) -> PathRows:
     """Return the rows of which `read_csv` makes a trajectory. Raises SpecError as `read_csv` does."""
-    text = _text(Path(path))
-    try:
+    with within(f"{path}: "):
+        text = read_text(Path(path), MAX_CSV)
         rows = rows_of_columns(text, rate) if has_header(text) else _bare_rows(text, rate)
         _ = rows.trajectory
-    except SpecError as error:
-        raise SpecError(f"{path}: {error}") from None
     return rows
 
 
@@ -75,15 +74,3 @@ def _bare_rows(text: str, rate: float) -> PathRows:
         line = 1 if times[0] != 0 else 2 + int(np.argmax(steps <= 0))
         raise SpecError(f"line {line}: times, the thirteenth numbers, must start at 0 and rise")
     return PathRows(rows[:, :CSV_COLUMNS].reshape(-1, 4, 3), steps, timed=timed)
-
-
-def _text(path: Path) -> str:
-    try:
-        return read_whole(path, MAX_CSV).decode("utf-8-sig")
-    except SpecError as error:
-        raise SpecError(f"{path}: {error}") from None
-    except UnicodeDecodeError:
-        raise SpecError(f"{path}: is not a text file") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise SpecError(f"{path}: cannot be read: {reason}") from None

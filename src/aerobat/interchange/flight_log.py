@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.declaration import PathName, validated
+from aerobat.documents import read_text, within
 from aerobat.errors import SpecError
 from aerobat.flatness import reference, vehicle_of
 from aerobat.interchange.number_table import NAMES, has_header, named_columns
@@ -19,7 +20,6 @@ from aerobat.kernels.motors import first_order_response
 from aerobat.planning import Plan
 from aerobat.simulation import Flight, Outcome
 from aerobat.simulation.flight import LOG_OF_COMMANDS, setpoint_series
-from aerobat.storage import read_whole
 from aerobat.vehicle import Vehicle
 
 MAX_LOG = 2**27  # bytes: ten minutes at 1 kHz
@@ -52,21 +52,13 @@ def read_flight_log(path: PathName, plan: Plan, vehicle: Vehicle | str | None = 
     Raises SpecError, naming the line or the column, for a file without such a table.
     """
     nominal = vehicle_of(plan, vehicle)
-    try:
-        columns = _columns(Path(path), plan.duration)
+    with within(f"flight log {path}: "):
+        columns = _columns(read_text(Path(path), MAX_LOG), plan.duration)
         return _flight(columns, plan, nominal)
-    except SpecError as error:
-        raise SpecError(f"flight log {path}: {error}") from None
 
 
-def _columns(path: Path, duration: float) -> dict[str, Array]:
+def _columns(text: str, duration: float) -> dict[str, Array]:
     """Return the used columns by their names, with the rows within the plan's time."""
-    try:
-        text = read_whole(path, MAX_LOG).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise SpecError("it is no text; give a CSV file") from None
-    except OSError as error:
-        raise SpecError(f"it cannot be read ({error.strerror or error}); check the path") from None
     if not has_header(text):
         raise SpecError("line 1: it names no columns; a log needs t, x, y, z, qw, qx, qy, qz and f0, f1, ...")
     needed = (*NAMES["time"], *NAMES["position"], *NAMES["attitude"])
