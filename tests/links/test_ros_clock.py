@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from math import inf
 from threading import Thread
-from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -12,10 +11,21 @@ from hypothesis import strategies as st
 
 from aerobat.errors import SpecError
 from aerobat.links.ros import middleware
-from aerobat.links.ros.middleware import CallQueue, PacedClock, require_time
+from aerobat.links.ros.middleware import PacedClock, QueuedNode
 from aerobat.links.ros.run import run
 
 SECOND = 10**9  # [ns]
+
+
+class Told(QueuedNode):
+    """A node whose ROS tells one time after the other, and the last for ever."""
+
+    def __init__(self, *times: int) -> None:
+        super().__init__(None)
+        self._times = list(times)
+
+    def ros_time(self) -> int:
+        return self._times.pop(0) if len(self._times) > 1 else self._times[0]
 
 
 class Wall:
@@ -94,9 +104,9 @@ def test_a_few_ticks_that_were_missed_are_made_up_for_and_of_many_the_last() -> 
 
 def test_calls_are_done_for_no_longer_than_patience_where_time_stands_still() -> None:
     done: list[str] = []
-    calls = CallQueue()
-    calls.put(lambda: done.append("what waited"))
-    calls.work_until(1, lambda: 0, patience=0.02)
+    node = Told(0)
+    node.request(done.append, "what waited")
+    node.work_until(1, patience=0.02)
     assert done == ["what waited"]
 
 
@@ -115,18 +125,12 @@ def test_a_clock_that_waits_tells_its_time_again_and_one_that_runs_does_not() ->
 
 
 def test_whoever_still_waits_is_answered_when_the_node_ends() -> None:
-    calls, answers = CallQueue(), []
-    asking = Thread(target=lambda: answers.append(calls.answer(lambda answer: None)))
+    node, answers = Told(0, 1), []
+    asking = Thread(target=lambda: answers.append(node.answer(lambda answer: None)))
     asking.start()
-    clock = SimpleNamespace(now=0)
-
-    def time() -> int:
-        clock.now += 1
-        return int(clock.now)
-
-    while not calls._unanswered:
-        calls.work_until(1, time)
-    calls.close()
+    while not node._unanswered:
+        node.work_until(1)
+    node.close()
     asking.join()
     assert answers == [(False, "the node has ended")]
 
@@ -134,5 +138,5 @@ def test_whoever_still_waits_is_answered_when_the_node_ends() -> None:
 def test_time_that_nobody_tells_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(middleware, "time", Wall())
     with pytest.raises(SpecError, match="/clock"):
-        require_time(lambda: 0)
-    require_time(lambda: SECOND)
+        Told(0).require_time()
+    Told(SECOND).require_time()

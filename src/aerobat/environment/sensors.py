@@ -18,6 +18,7 @@ from aerobat.declaration import (
     declared,
     number,
 )
+from aerobat.states import STANDARD_GRAVITY
 
 SensorRate = Annotated[float, Field(ge=1, le=1e6, description="number from 1 to 1e6")]
 Probability = Annotated[float, Field(ge=0, le=1, description="number from 0 to 1")]
@@ -46,7 +47,6 @@ class Imu:
         "gyro_range_deg": "[deg/s] `gyro_range` in degrees",
         "accelerometer_range_g": "[g] `accelerometer_range` in 9.81 m/s²",
     }
-    G: ClassVar[float] = 9.81  # [m/s²]
 
     @classmethod
     def expand(cls, table: dict[str, Any]) -> dict[str, Any]:
@@ -56,7 +56,7 @@ class Imu:
             return table
         if "accelerometer_range" in table:
             raise FieldError(shorthand, "stands beside accelerometer_range; give one of them")
-        return table | {"accelerometer_range": cls.G * number(table.pop(shorthand), shorthand)}
+        return table | {"accelerometer_range": STANDARD_GRAVITY * number(table.pop(shorthand), shorthand)}
 
 
 @declared

@@ -25,8 +25,9 @@ class Mode(StrEnum):
 
 _MAX_VALUE = 1e6  # [m], [m/s] and [rad/s] largest plausible values
 _NORM_TOLERANCE = 1e-2  # [-] tolerance of the norm of a quaternion, which may be sent with few decimals
-_ZERO: Array = np.zeros(3)
-_ZERO.flags.writeable = False
+TAKEOFF_THRESHOLD = 0.01  # [m] height of a goal above the ground that means take-off
+ZERO: Array = np.zeros(3)
+ZERO.flags.writeable = False
 
 
 class PositionGoal(NamedTuple):
@@ -36,12 +37,12 @@ class PositionGoal(NamedTuple):
     velocity: Array  # [m/s], (3,)
     acceleration: Array  # [m/s²], (3,)
     yaw: float  # [rad] of the body's x axis about the vertical, from east
-    jerk: Array = _ZERO  # [m/s³], (3,)
+    jerk: Array = ZERO  # [m/s³], (3,)
 
     @classmethod
     def hover(cls, position: Array, yaw: float) -> PositionGoal:
         """Return the goal of a hover at a position [m], (3,), and a yaw [rad]."""
-        return cls(position, _ZERO, _ZERO, yaw)
+        return cls(position, ZERO, ZERO, yaw)
 
 
 class PathGoal(NamedTuple):
@@ -63,7 +64,7 @@ class PathGoal(NamedTuple):
         heading = so3.about_axis(so3.UP, goal.yaw)
         q = so3.multiply(so3.smallest_rotation(so3.UP, thrust / size), heading)
         omega = so3.cross(thrust, goal.jerk) / size**2
-        return cls(goal.position, goal.velocity, goal.acceleration, goal.jerk, q, omega, _ZERO)
+        return cls(goal.position, goal.velocity, goal.acceleration, goal.jerk, q, omega, ZERO)
 
 
 class PathPiece(NamedTuple):

@@ -13,12 +13,13 @@ from aerobat.links.betaflight.packets import Sticks, state_packet
 from aerobat.links.betaflight.process import Firmware, FirmwareEnded, configured, require_firmware
 from aerobat.links.betaflight.settings import betaflight_settings, board_rate, rotor_order, throttle_of
 from aerobat.simulation.flight_controller import AUTOPILOTS, Autopilot, Sensed
+from aerobat.states import STANDARD_GRAVITY
 from aerobat.storage import whole_file
 from aerobat.vehicle import Vehicle
 
 _STEP = 0.02  # [s] between packets while the vehicle stands
 _GRACE = 5.0  # [s] after its start, in which the firmware does not arm
-_AT_REST = Sensed((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), (1.0, 0.0, 0.0, 0.0))
+_AT_REST = Sensed((0.0, 0.0, 0.0), (0.0, 0.0, STANDARD_GRAVITY), (1.0, 0.0, 0.0, 0.0))
 _THROTTLE = 0.05  # [-] throttle from which motors turn
 _BLACKBOX = (
     "set blackbox_device = VIRTUAL",

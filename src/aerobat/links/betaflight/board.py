@@ -20,13 +20,12 @@ from aerobat.links.betaflight.crsf import CRSF
 from aerobat.links.betaflight.msp import MSP
 from aerobat.links.betaflight.packets import ReceiverProtocol, Sticks
 from aerobat.links.betaflight.settings import board_rate, rotor_order, throttle_of
-from aerobat.links.goals import Observed, PathPiece
+from aerobat.links.goals import TAKEOFF_THRESHOLD, Observed, PathPiece
 from aerobat.so3 import exp, multiply
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.fleet import Fleet
 
 PROTOCOLS = {"msp": MSP, "crsf": CRSF}
-_TAKEOFF_THRESHOLD = 0.01  # [m] height of a goal above the ground that means take-off
 _LANDED_HEIGHT = 0.05  # [m] height above the ground within which a goal below the ground ends the flight
 _AIRBORNE_HEIGHT = 0.3  # [m] height above the ground from which motors are not stopped: the failsafe decides
 _PAUSE = 0.1  # [s] without goals, after which the outer loop is reset
@@ -121,7 +120,7 @@ class Board:
         above = float(piece.end.position[2]) - self._ground
         if above < 0.0 and height < _LANDED_HEIGHT:
             self._stop()
-        elif self._state is None and above < _TAKEOFF_THRESHOLD:
+        elif self._state is None and above < TAKEOFF_THRESHOLD:
             self._line.send(self._sticks.idle(armed=True))
         else:
             self._line.send(self._flown(piece, observed, now))

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from aerobat import so3
-from aerobat.arrays import Array
 from aerobat.environment import Environment
 from aerobat.interchange.exports.crazyflie import AXES, PIECE, as_path
 from aerobat.interchange.ros import NANOSECONDS, RosMessage
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
-from aerobat.links.goals import Mode, PathGoal, PathPiece
+from aerobat.links.goals import ZERO, Mode, PathGoal, PathPiece
 from aerobat.links.ros import topics
 from aerobat.links.ros.crazyswarm import FULL_STATE, SERVICES, Ros2
 from aerobat.links.ros.vehicle_node import VehicleNode
@@ -25,7 +24,6 @@ from aerobat.links.stream import SetpointStream
 _KEPT = 0.5  # [s] for which a full state is extrapolated at most
 _STREAM = 0.05  # [s] largest interval between two full states of one stream
 _AHEAD = 0.01  # [s] length of a trajectory's pieces for the controller
-_ZERO: Array = np.zeros(3)
 
 
 class CrazyswarmServer(VehicleNode):
@@ -36,7 +34,7 @@ class CrazyswarmServer(VehicleNode):
         super().__init__(ros, vehicle, goal=f"{name}/goal", odometry=f"{name}/odom", **settings)
         self._trajectories: dict[int, list[RosMessage]] = {}
         self._flown: tuple[SetpointStream, float] | None = None  # the trajectory and its start time [s]
-        nowhere = PathGoal(_ZERO, _ZERO, _ZERO, _ZERO, so3.IDENTITY, _ZERO, _ZERO)
+        nowhere = PathGoal(ZERO, ZERO, ZERO, ZERO, so3.IDENTITY, ZERO, ZERO)
         self._last = nowhere, -np.inf  # the last full state, and its stamp [s]
         ros.subscribe(f"{name}/cmd_full_state", FULL_STATE, self._take_full_state)
         for service, kind in SERVICES.items():
@@ -70,7 +68,7 @@ class CrazyswarmServer(VehicleNode):
             topics.vector, (pose.position, twist.linear, twist.angular, message.acc)
         )
         stamp = (topics.nanoseconds(message.header.stamp) - self.origin) / NANOSECONDS
-        goal = PathGoal(position, velocity, acceleration, _ZERO, q, so3.rotate(q, omega), _ZERO)
+        goal = PathGoal(position, velocity, acceleration, ZERO, q, so3.rotate(q, omega), ZERO)
         if np.isfinite(np.concatenate([*goal, [stamp]])).all():
             goal = self._with_jerk(goal, stamp)
             self.vehicle.advance(stamp)
@@ -95,7 +93,7 @@ class CrazyswarmServer(VehicleNode):
 
     def _go_to(self, request: RosMessage) -> None:
         self._flown = None
-        here = self.vehicle.state.position if request.relative else _ZERO
+        here = self.vehicle.state.position if request.relative else ZERO
         self.vehicle.go_to(here + topics.vector(request.goal), None if request.relative else request.yaw)
 
     def _notify_setpoints_stop(self, request: RosMessage) -> None:
@@ -119,7 +117,7 @@ class CrazyswarmServer(VehicleNode):
                 numbers[: len(polynomial)] = polynomial
         path = as_path(pieces, heading=float(pieces["polynomials"][0, 3, 0]))
         here = self.vehicle.state.position
-        offset = here - path.evaluate(0.0) if request.relative else _ZERO
+        offset = here - path.evaluate(0.0) if request.relative else ZERO
         environment = Environment(gravity=self.vehicle.gravity)
         stream = SetpointStream(path, self.vehicle.vehicle, environment, offset)
         self._flown = stream, self.vehicle.time

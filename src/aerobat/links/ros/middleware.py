@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from importlib import import_module
 from math import inf
 from queue import Empty, Queue
@@ -96,32 +98,45 @@ class Middleware(Protocol):
         """Shut the node down."""
 
 
-def require_time(clock: Callable[[], int]) -> None:
-    """Wait for simulated time to begin. Raises SpecError where no node publishes it."""
-    end = time.monotonic() + _START_TIMEOUT
-    while clock() == 0:
-        if time.monotonic() > end:
-            raise SpecError("ROS time is simulated, but nobody tells it on /clock; start the simulator first")
-        time.sleep(_MAX_WAIT)
+class QueuedNode(ABC):
+    """A node of either generation: its clock, and calls that threads of ROS request.
 
+    The thread that runs `work_until` executes the calls.
+    """
 
-class CallQueue:
-    """Calls requested by threads of ROS and executed by the thread that runs `work_until`."""
-
-    def __init__(self) -> None:
+    def __init__(self, clock: PacedClock | None) -> None:
+        self._clock = clock  # None for ROS time
         # not SimpleQueue: on a busy machine its `get` may wait for ever if a short timeout passes within it
-        self._waiting: Queue[Callable[[], None]] = Queue()
+        self._calls: Queue[Callable[[], None]] = Queue()
         self._unanswered: set[Future[tuple[bool, str]]] = set()
 
-    def put(self, call: Callable[[], None]) -> None:
-        """Request a call."""
-        self._waiting.put(call)
+    @abstractmethod
+    def ros_time(self) -> int:
+        """Return the time that ROS tells [ns]."""
+
+    def time(self) -> int:
+        """See `Middleware.time`."""
+        return self.ros_time() if self._clock is None else self._clock.time()
+
+    def require_time(self) -> None:
+        """Wait for simulated time to begin. Raises SpecError where no node publishes it."""
+        end = time.monotonic() + _START_TIMEOUT
+        while self.time() == 0:
+            if time.monotonic() > end:
+                raise SpecError(
+                    "ROS time is simulated, but nobody tells it on /clock; start the simulator first"
+                )
+            time.sleep(_MAX_WAIT)
+
+    def request(self, take: Callable[[Any], None], message: Any) -> None:
+        """Request a call with a message."""
+        self._calls.put(lambda: take(message))
 
     def answer(self, take: Callable[[Answer], None]) -> tuple[bool, str]:
         """Request a service call, and wait for its answer."""
         answered: Future[tuple[bool, str]] = Future()
         self._unanswered.add(answered)
-        self.put(lambda: take(lambda success, sentence: self._settle(answered, success, sentence)))
+        self.request(take, partial(self._settle, answered))
         return answered.result()
 
     def close(self) -> None:
@@ -134,14 +149,14 @@ class CallQueue:
             self._unanswered.discard(answered)
             answered.set_result((success, sentence))
 
-    def work_until(self, instant: int, clock: Callable[[], int], patience: float = inf) -> None:
-        """Execute calls, waiting ones in any case, until a time [ns] or for `patience` [s] of wall time."""
+    def work_until(self, instant: int, patience: float = inf) -> None:
+        """See `Middleware.work_until`; calls that wait are executed in any case."""
         end = time.monotonic() + patience
-        for _ in range(self._waiting.qsize()):
-            self._waiting.get()()
-        while (remaining := (instant - clock()) / NANOSECONDS) > 0.0 and time.monotonic() < end:
+        for _ in range(self._calls.qsize()):
+            self._calls.get()()
+        while (remaining := (instant - self.time()) / NANOSECONDS) > 0.0 and time.monotonic() < end:
             try:
-                call = self._waiting.get(timeout=min(max(remaining, _MIN_WAIT), _MAX_WAIT))
+                call = self._calls.get(timeout=min(max(remaining, _MIN_WAIT), _MAX_WAIT))
             except Empty:
                 continue
             call()

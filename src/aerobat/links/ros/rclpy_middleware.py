@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
-from math import inf
 from threading import Thread
 from typing import Any
 
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.links.ros.middleware import (
-    NEWEST,
-    QUEUE,
-    Answer,
-    CallQueue,
-    PacedClock,
-    interface_class,
-    require_time,
-)
+from aerobat.links.ros.middleware import NEWEST, QUEUE, Answer, PacedClock, QueuedNode, interface_class
 
 CLOSING_TIME = 2.0  # [s] of the wall for each thread that ends
 
 
-class RclpyMiddleware:
+class RclpyMiddleware(QueuedNode):
     """A node of ROS 2; see `Middleware`."""
 
     def __init__(self, name: str, clock: PacedClock | None = None, sim_time: bool = False) -> None:
@@ -33,6 +25,7 @@ class RclpyMiddleware:
             clock: the clock of the node; None for ROS time.
             sim_time: whether ROS time is that of the topic /clock.
         """
+        super().__init__(clock)
         self._rclpy = rclpy = _rclpy()
         from rclpy.callback_groups import ReentrantCallbackGroup
         from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
@@ -44,8 +37,6 @@ class RclpyMiddleware:
         # services have a node of their own: an executor that lets them wait is several times slower per
         # message
         self._waiting = rclpy.create_node(f"{name}_services")
-        self._clock = clock
-        self._calls = CallQueue()
         self._services = ReentrantCallbackGroup()
         # at most four services wait for their answers, each in a thread
         self._executors = SingleThreadedExecutor(), MultiThreadedExecutor(4)
@@ -54,16 +45,16 @@ class RclpyMiddleware:
         self._threads = [Thread(target=executor.spin, daemon=True) for executor in self._executors]
         for thread in self._threads:
             thread.start()
-        require_time(self.time)
+        self.require_time()
 
     @staticmethod
     def make(kind: str, /, **given: Any) -> Any:
         """See `Make.__call__`."""
         return interface_class(kind)(**given)
 
-    def time(self) -> int:
-        """See `Middleware.time`."""
-        return int(self._node.get_clock().now().nanoseconds) if self._clock is None else self._clock.time()
+    def ros_time(self) -> int:
+        """See `QueuedNode.ros_time`."""
+        return int(self._node.get_clock().now().nanoseconds)
 
     def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
         """See `Middleware.publisher`."""
@@ -82,7 +73,7 @@ class RclpyMiddleware:
         self._node.create_subscription(
             interface_class(kind),
             topic,
-            lambda message: self._calls.put(lambda: take(message)),
+            partial(self.request, take),
             qos.QoSProfile(depth=QUEUE if every else NEWEST, reliability=reliability),
         )
 
@@ -91,7 +82,7 @@ class RclpyMiddleware:
         trigger = import_module("std_srvs.srv").Trigger
 
         def respond(_request: Any, response: Any) -> Any:
-            response.success, response.message = self._calls.answer(take)
+            response.success, response.message = self.answer(take)
             return response
 
         self._waiting.create_service(trigger, service, respond, callback_group=self._services)
@@ -108,18 +99,14 @@ class RclpyMiddleware:
         """See `crazyswarm.Ros2.serve`."""
 
         def respond(request: Any, response: Any) -> Any:
-            self._calls.put(lambda: take(request))
+            self.request(take, request)
             return response
 
         self._waiting.create_service(interface_class(kind), service, respond, callback_group=self._services)
 
-    def work_until(self, instant: int, patience: float = inf) -> None:
-        """See `Middleware.work_until`."""
-        self._calls.work_until(instant, self.time, patience)
-
     def close(self) -> None:
         """See `Middleware.close`."""
-        self._calls.close()
+        super().close()
         for executor in self._executors:
             executor.shutdown(0.0)
         self._rclpy.try_shutdown()

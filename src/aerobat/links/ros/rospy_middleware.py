@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
-from math import inf
 from typing import Any
 
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.links.ros.middleware import (
-    NEWEST,
-    QUEUE,
-    Answer,
-    CallQueue,
-    PacedClock,
-    interface_class,
-    require_time,
-)
+from aerobat.links.ros.middleware import NEWEST, QUEUE, Answer, PacedClock, QueuedNode, interface_class
 
 _SIM_TIME = "/use_sim_time"  # the parameter that nodes read when they start
 
 
-class RospyMiddleware:
+class RospyMiddleware(QueuedNode):
     """A node of ROS 1; see `Middleware`."""
 
     def __init__(self, name: str, clock: PacedClock | None = None) -> None:
@@ -33,17 +25,16 @@ class RospyMiddleware:
             name: of the node.
             clock: the clock of this node and of all nodes started later; None for ROS time.
         """
+        super().__init__(clock)
         self._rospy = rospy = _rospy()
         import rosgraph
 
         if not rosgraph.is_master_online():
             raise SpecError(f"no ROS master answers at {rosgraph.get_master_uri()}; start roscore first")
         rospy.init_node(name, disable_signals=True)
-        self._clock = clock
-        self._calls = CallQueue()
         if clock is not None:
             rospy.set_param(_SIM_TIME, True)
-        require_time(self.time)
+        self.require_time()
 
     @staticmethod
     def make(kind: str, /, **given: Any) -> Any:
@@ -53,9 +44,9 @@ class RospyMiddleware:
             return getattr(import_module("genpy"), name)(given["sec"], given["nanosec"])
         return interface_class(kind)(**given)
 
-    def time(self) -> int:
-        """See `Middleware.time`."""
-        return int(self._rospy.get_rostime().to_nsec()) if self._clock is None else self._clock.time()
+    def ros_time(self) -> int:
+        """See `QueuedNode.ros_time`."""
+        return int(self._rospy.get_rostime().to_nsec())
 
     def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
         """See `Middleware.publisher`."""
@@ -69,7 +60,7 @@ class RospyMiddleware:
         self._rospy.Subscriber(
             topic,
             interface_class(kind),
-            lambda message: self._calls.put(lambda: take(message)),
+            partial(self.request, take),
             queue_size=None if every else NEWEST,
             tcp_nodelay=True,
         )
@@ -79,18 +70,14 @@ class RospyMiddleware:
         srv = import_module("std_srvs.srv")
 
         def respond(_request: Any) -> Any:
-            success, sentence = self._calls.answer(take)
+            success, sentence = self.answer(take)
             return srv.TriggerResponse(success=success, message=sentence)
 
         self._rospy.Service(service, srv.Trigger, respond)
 
-    def work_until(self, instant: int, patience: float = inf) -> None:
-        """See `Middleware.work_until`."""
-        self._calls.work_until(instant, self.time, patience)
-
     def close(self) -> None:
         """See `Middleware.close`."""
-        self._calls.close()
+        super().close()
         if self._clock is not None:
             self._rospy.delete_param(_SIM_TIME)
         self._rospy.signal_shutdown("done")

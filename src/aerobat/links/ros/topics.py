@@ -15,7 +15,7 @@ import numpy as np
 from aerobat import so3
 from aerobat.arrays import Array
 from aerobat.interchange.ros import BODY, NANOSECONDS, JointMotion, Messages, RosMessage
-from aerobat.links.goals import Observed, PathGoal, PathPiece, observed
+from aerobat.links.goals import ZERO, Observed, PathGoal, PathPiece, observed
 
 GOAL, ODOMETRY = "/aerobat/goal", "/aerobat/odometry"
 MARKERS, REPORT, CLOCK = "/aerobat/markers", "/aerobat/report", "/clock"
@@ -31,7 +31,6 @@ _FOLDER = files("aerobat.links.ros") / "rviz"
 RVIZ = {"1": f"rviz -d {_FOLDER / 'ros1.rviz'}", "2": f"rviz2 -d {_FOLDER / 'ros2.rviz'}"}
 
 _ALONE = 1.0  # [s] duration of a goal of a single point, longer than it is followed
-_ZERO: Array = np.zeros(3)
 
 
 def goal_message(messages: Messages, piece: PathPiece, stamp: int, with_jerk: bool = True) -> RosMessage:
@@ -88,17 +87,17 @@ def _joints(goal: PathGoal) -> tuple[JointMotion, JointMotion]:
     position, velocity, acceleration, jerk, q, omega, omega_dot = goal
     return (
         JointMotion(position, q, velocity, omega, acceleration, omega_dot),
-        JointMotion(velocity, so3.IDENTITY, acceleration, _ZERO, jerk, _ZERO),
+        JointMotion(velocity, so3.IDENTITY, acceleration, ZERO, jerk, ZERO),
     )
 
 
 def _read_point(point: RosMessage) -> PathGoal:
     twists = [
-        (vector(found[0].linear), vector(found[0].angular)) if found else (_ZERO, _ZERO)
+        (vector(found[0].linear), vector(found[0].angular)) if found else (ZERO, ZERO)
         for found in (point.velocities, point.accelerations)
     ]
     (velocity, omega), (acceleration, omega_dot) = twists
-    jerk = vector(point.accelerations[1].linear) if len(point.accelerations) > 1 else _ZERO
+    jerk = vector(point.accelerations[1].linear) if len(point.accelerations) > 1 else ZERO
     place, q = vector(point.transforms[0].translation), quaternion(point.transforms[0].rotation)
     return PathGoal(place, velocity, acceleration, jerk, q, omega, omega_dot)
 

@@ -8,13 +8,12 @@ import numpy as np
 
 from aerobat.interchange.ros import NANOSECONDS, Messages, RosMessage
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
-from aerobat.links.goals import Mode, PathGoal
+from aerobat.links.goals import TAKEOFF_THRESHOLD, Mode, PathGoal
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Middleware, PacedClock
 
 _MAX_GOAL_DISTANCE = 0.5  # [m] largest distance of the first goal from the vehicle
 _MAX_VELOCITY_ERROR = 1.0  # [m/s] largest difference of velocity of the first goal from the vehicle
-_TAKEOFF_THRESHOLD = 0.01  # [m] height of a goal above the ground that means take-off
 _OVERLAP = 0.004  # [s] of a tick, added to the time at which the clock waits for the next goal
 _MAX_GOAL_AGE = 0.5  # [s] age from which a goal is rejected
 
@@ -110,7 +109,7 @@ class VehicleNode:
     def _begins_here(self, goal: PathGoal) -> bool:
         """Return True for a goal with which a vehicle may begin to follow."""
         state = self.vehicle.state
-        if self.vehicle.landed and goal.position[2] < _TAKEOFF_THRESHOLD:
+        if self.vehicle.landed and goal.position[2] < TAKEOFF_THRESHOLD:
             return False
         off = float(np.linalg.norm(goal.position - state.position))
         speed = float(np.linalg.norm(goal.velocity - state.velocity))
