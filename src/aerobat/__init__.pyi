@@ -1,308 +1,175 @@
-from .certification import Certificate, Envelope, certify
-from .control import ControlLaw, Controller, controller
-from .environment import (
-    Battery,
-    Box,
-    Capsule,
-    Cylinder,
-    Dispersion,
-    Environment,
-    Grid,
-    Gusts,
-    HalfSpace,
-    HandOff,
-    Imu,
-    Mesh,
-    MotionCapture,
-    Obstacle,
-    Outage,
-    Polytope,
-    Sphere,
-    dispersion_names,
-    load_dispersion,
-    mesh_parts,
-    obstacle,
-    occupied_boxes,
-    write_dispersion,
-)
-from .errors import AerobatError, BackendMissing, Infeasible, SpecError
-from .estimation import Ekf, Estimates, SensorLog, estimate
-from .evaluation import (
-    Gradient,
-    Opening,
-    Passage,
-    Score,
-    Sensitivity,
-    score,
-    score_flights,
-    sensitivity,
-    smallest_opening,
-)
-from .flatness import Reference, reference
-from .interchange.columns import write_columns
-from .interchange.csv import read_csv, write_csv
-from .interchange.exports import Export, Loss, export
-from .interchange.flight_log import read_flight_log
-from .interchange.read import read_plan, read_trajectory
-from .interchange.robots import import_vehicle
-from .interchange.tables import read_table, write_table
-from .planning import (
-    Assessment,
-    BisectionSearch,
-    FreeKnots,
-    GridSearch,
-    MinSnap,
-    Miqp,
-    Plan,
-    Planner,
-    TimeOptimal,
-    TimeScaling,
-    load_plan,
-    option,
-    plan,
-    planner,
-    registered_planners,
-    with_second_opinion,
-)
-from .problem import (
-    Attitude,
-    Ball,
-    BarrelRoll,
-    Condition,
-    Corkscrew,
-    Course,
-    CustomManeuver,
-    EndState,
-    Flip,
-    Gate,
-    GatePassage,
-    HalfFlip,
-    Heading,
-    Hold,
-    Immelmann,
-    InvertedPass,
-    KnifeEdgePass,
-    Limits,
-    Line,
-    Maneuver,
-    MattyFlip,
-    PassGate,
-    PassWaypoint,
-    PowerLoop,
-    Problem,
-    Quantity,
-    SplitS,
-    Stage,
-    StageSequence,
-    Wall,
-    Waypoint,
-    Waypoints,
-    at_rest,
-    load_problem,
-    maneuver,
-    problem_names,
-    registered_maneuvers,
-    tilted_gate,
-    write_problem,
-)
-from .registry import import_plugin
-from .reporting.comparison import comparison_figure
-from .reporting.feasibility.figure import map_figure
-from .reporting.figures import draw
-from .reporting.inspection import inspection_figure
-from .reporting.motion.video import write_video
-from .reporting.plain_data import to_dataframe
-from .reporting.sweeps.figure import sweep_figure
-from .simulation import Flight, FlightConfig, Outcome, fly, load_flight, prepare
-from .simulation.autopilot import Recoveries, recoveries
-from .states import BodyState, FlatState, Setpoint, Wrench
-from .studies.compare import Comparison, compare
-from .studies.error_causes import Cause, ErrorCauses, error_causes
-from .studies.feasibility import FeasibilityMap, Requirement, feasibility_map, min_requirements
-from .studies.inspection import ErrorShare, Inspection, inspect_flight
-from .studies.passing import Passing, plan_to_pass, steadied
-from .studies.sweep import Share, Sweep, sweep
-from .studies.tune import Tuning, tune
-from .studies.why import Remedy, Why, why
-from .trajectory import ContinuityRule, Trajectory, load_trajectory, minimum_effort, save_trajectory
-from .vehicle import Ellipsoid, Rotor, Vehicle, implausibilities, load_vehicle, vehicle_names, write_vehicle
-from .viewer.live.view_live import LiveView, view_live
-from .viewer.replay import Replay, view, write_replay
-
-__all__ = [
-    "AerobatError",
-    "Assessment",
-    "Attitude",
-    "BackendMissing",
-    "Ball",
-    "BarrelRoll",
-    "Battery",
-    "BisectionSearch",
-    "BodyState",
-    "Box",
-    "Capsule",
-    "Cause",
-    "Certificate",
-    "Comparison",
-    "Condition",
-    "ContinuityRule",
-    "ControlLaw",
-    "Controller",
-    "Corkscrew",
-    "Course",
-    "CustomManeuver",
-    "Cylinder",
-    "Dispersion",
-    "Ekf",
-    "Ellipsoid",
-    "EndState",
-    "Envelope",
-    "Environment",
-    "ErrorCauses",
-    "ErrorShare",
-    "Estimates",
-    "Export",
-    "FeasibilityMap",
-    "FlatState",
-    "Flight",
-    "FlightConfig",
-    "Flip",
-    "FreeKnots",
-    "Gate",
-    "GatePassage",
-    "Gradient",
-    "Grid",
-    "GridSearch",
-    "Gusts",
-    "HalfFlip",
-    "HalfSpace",
-    "HandOff",
-    "Heading",
-    "Hold",
-    "Immelmann",
-    "Imu",
-    "Infeasible",
-    "Inspection",
-    "InvertedPass",
-    "KnifeEdgePass",
-    "Limits",
-    "Line",
-    "LiveView",
-    "Loss",
-    "Maneuver",
-    "MattyFlip",
-    "Mesh",
-    "MinSnap",
-    "Miqp",
-    "MotionCapture",
-    "Obstacle",
-    "Opening",
-    "Outage",
-    "Outcome",
-    "PassGate",
-    "PassWaypoint",
-    "Passage",
-    "Passing",
-    "Plan",
-    "Planner",
-    "Polytope",
-    "PowerLoop",
-    "Problem",
-    "Quantity",
-    "Recoveries",
-    "Reference",
-    "Remedy",
-    "Replay",
-    "Requirement",
-    "Rotor",
-    "Score",
-    "Sensitivity",
-    "SensorLog",
-    "Setpoint",
-    "Share",
-    "SpecError",
-    "Sphere",
-    "SplitS",
-    "Stage",
-    "StageSequence",
-    "Sweep",
-    "TimeOptimal",
-    "TimeScaling",
-    "Trajectory",
-    "Tuning",
-    "Vehicle",
-    "Wall",
-    "Waypoint",
-    "Waypoints",
-    "Why",
-    "Wrench",
-    "at_rest",
-    "certify",
-    "compare",
-    "comparison_figure",
-    "controller",
-    "dispersion_names",
-    "draw",
-    "error_causes",
-    "estimate",
-    "export",
-    "feasibility_map",
-    "fly",
-    "implausibilities",
-    "import_plugin",
-    "import_vehicle",
-    "inspect_flight",
-    "inspection_figure",
-    "load_dispersion",
-    "load_flight",
-    "load_plan",
-    "load_problem",
-    "load_trajectory",
-    "load_vehicle",
-    "maneuver",
-    "map_figure",
-    "mesh_parts",
-    "min_requirements",
-    "minimum_effort",
-    "obstacle",
-    "occupied_boxes",
-    "option",
-    "plan",
-    "plan_to_pass",
-    "planner",
-    "prepare",
-    "problem_names",
-    "read_csv",
-    "read_flight_log",
-    "read_plan",
-    "read_table",
-    "read_trajectory",
-    "recoveries",
-    "reference",
-    "registered_maneuvers",
-    "registered_planners",
-    "save_trajectory",
-    "score",
-    "score_flights",
-    "sensitivity",
-    "smallest_opening",
-    "steadied",
-    "sweep",
-    "sweep_figure",
-    "tilted_gate",
-    "to_dataframe",
-    "tune",
-    "vehicle_names",
-    "view",
-    "view_live",
-    "why",
-    "with_second_opinion",
-    "write_columns",
-    "write_csv",
-    "write_dispersion",
-    "write_problem",
-    "write_replay",
-    "write_table",
-    "write_vehicle",
-    "write_video",
-]
+from .certification import Certificate as Certificate
+from .certification import Envelope as Envelope
+from .certification import certify as certify
+from .control import ControlLaw as ControlLaw
+from .control import Controller as Controller
+from .control import controller as controller
+from .environment import Battery as Battery
+from .environment import Box as Box
+from .environment import Capsule as Capsule
+from .environment import Cylinder as Cylinder
+from .environment import Dispersion as Dispersion
+from .environment import Environment as Environment
+from .environment import Grid as Grid
+from .environment import Gusts as Gusts
+from .environment import HalfSpace as HalfSpace
+from .environment import HandOff as HandOff
+from .environment import Imu as Imu
+from .environment import Mesh as Mesh
+from .environment import MotionCapture as MotionCapture
+from .environment import Obstacle as Obstacle
+from .environment import Outage as Outage
+from .environment import Polytope as Polytope
+from .environment import Sphere as Sphere
+from .environment import dispersion_names as dispersion_names
+from .environment import load_dispersion as load_dispersion
+from .environment import mesh_parts as mesh_parts
+from .environment import obstacle as obstacle
+from .environment import occupied_boxes as occupied_boxes
+from .environment import write_dispersion as write_dispersion
+from .errors import AerobatError as AerobatError
+from .errors import BackendMissing as BackendMissing
+from .errors import Infeasible as Infeasible
+from .errors import SpecError as SpecError
+from .estimation import Ekf as Ekf
+from .estimation import Estimates as Estimates
+from .estimation import SensorLog as SensorLog
+from .estimation import estimate as estimate
+from .evaluation import Gradient as Gradient
+from .evaluation import Opening as Opening
+from .evaluation import Passage as Passage
+from .evaluation import Score as Score
+from .evaluation import Sensitivity as Sensitivity
+from .evaluation import score as score
+from .evaluation import score_flights as score_flights
+from .evaluation import sensitivity as sensitivity
+from .evaluation import smallest_opening as smallest_opening
+from .flatness import Reference as Reference
+from .flatness import reference as reference
+from .interchange.columns import write_columns as write_columns
+from .interchange.csv import read_csv as read_csv
+from .interchange.csv import write_csv as write_csv
+from .interchange.exports import Export as Export
+from .interchange.exports import Loss as Loss
+from .interchange.exports import export as export
+from .interchange.flight_log import read_flight_log as read_flight_log
+from .interchange.read import read_plan as read_plan
+from .interchange.read import read_trajectory as read_trajectory
+from .interchange.robots import import_vehicle as import_vehicle
+from .interchange.tables import read_table as read_table
+from .interchange.tables import write_table as write_table
+from .planning import Assessment as Assessment
+from .planning import BisectionSearch as BisectionSearch
+from .planning import FreeKnots as FreeKnots
+from .planning import GridSearch as GridSearch
+from .planning import MinSnap as MinSnap
+from .planning import Miqp as Miqp
+from .planning import Plan as Plan
+from .planning import Planner as Planner
+from .planning import TimeOptimal as TimeOptimal
+from .planning import TimeScaling as TimeScaling
+from .planning import load_plan as load_plan
+from .planning import option as option
+from .planning import plan as plan
+from .planning import planner as planner
+from .planning import registered_planners as registered_planners
+from .planning import with_second_opinion as with_second_opinion
+from .problem import Attitude as Attitude
+from .problem import Ball as Ball
+from .problem import BarrelRoll as BarrelRoll
+from .problem import Condition as Condition
+from .problem import Corkscrew as Corkscrew
+from .problem import Course as Course
+from .problem import CustomManeuver as CustomManeuver
+from .problem import EndState as EndState
+from .problem import Flip as Flip
+from .problem import Gate as Gate
+from .problem import GatePassage as GatePassage
+from .problem import HalfFlip as HalfFlip
+from .problem import Heading as Heading
+from .problem import Hold as Hold
+from .problem import Immelmann as Immelmann
+from .problem import InvertedPass as InvertedPass
+from .problem import KnifeEdgePass as KnifeEdgePass
+from .problem import Limits as Limits
+from .problem import Line as Line
+from .problem import Maneuver as Maneuver
+from .problem import MattyFlip as MattyFlip
+from .problem import PassGate as PassGate
+from .problem import PassWaypoint as PassWaypoint
+from .problem import PowerLoop as PowerLoop
+from .problem import Problem as Problem
+from .problem import Quantity as Quantity
+from .problem import SplitS as SplitS
+from .problem import Stage as Stage
+from .problem import StageSequence as StageSequence
+from .problem import Wall as Wall
+from .problem import Waypoint as Waypoint
+from .problem import Waypoints as Waypoints
+from .problem import at_rest as at_rest
+from .problem import load_problem as load_problem
+from .problem import maneuver as maneuver
+from .problem import problem_names as problem_names
+from .problem import registered_maneuvers as registered_maneuvers
+from .problem import tilted_gate as tilted_gate
+from .problem import write_problem as write_problem
+from .registry import import_plugin as import_plugin
+from .reporting.comparison import comparison_figure as comparison_figure
+from .reporting.feasibility.figure import map_figure as map_figure
+from .reporting.figures import draw as draw
+from .reporting.inspection import inspection_figure as inspection_figure
+from .reporting.motion.video import write_video as write_video
+from .reporting.plain_data import to_dataframe as to_dataframe
+from .reporting.sweeps.figure import sweep_figure as sweep_figure
+from .simulation import Flight as Flight
+from .simulation import FlightConfig as FlightConfig
+from .simulation import Outcome as Outcome
+from .simulation import fly as fly
+from .simulation import load_flight as load_flight
+from .simulation import prepare as prepare
+from .simulation.autopilot import Recoveries as Recoveries
+from .simulation.autopilot import recoveries as recoveries
+from .states import BodyState as BodyState
+from .states import FlatState as FlatState
+from .states import Setpoint as Setpoint
+from .states import Wrench as Wrench
+from .studies.compare import Comparison as Comparison
+from .studies.compare import compare as compare
+from .studies.error_causes import Cause as Cause
+from .studies.error_causes import ErrorCauses as ErrorCauses
+from .studies.error_causes import error_causes as error_causes
+from .studies.feasibility import FeasibilityMap as FeasibilityMap
+from .studies.feasibility import Requirement as Requirement
+from .studies.feasibility import feasibility_map as feasibility_map
+from .studies.feasibility import min_requirements as min_requirements
+from .studies.inspection import ErrorShare as ErrorShare
+from .studies.inspection import Inspection as Inspection
+from .studies.inspection import inspect_flight as inspect_flight
+from .studies.passing import Passing as Passing
+from .studies.passing import plan_to_pass as plan_to_pass
+from .studies.passing import steadied as steadied
+from .studies.sweep import Share as Share
+from .studies.sweep import Sweep as Sweep
+from .studies.sweep import sweep as sweep
+from .studies.tune import Tuning as Tuning
+from .studies.tune import tune as tune
+from .studies.why import Remedy as Remedy
+from .studies.why import Why as Why
+from .studies.why import why as why
+from .trajectory import ContinuityRule as ContinuityRule
+from .trajectory import Trajectory as Trajectory
+from .trajectory import load_trajectory as load_trajectory
+from .trajectory import minimum_effort as minimum_effort
+from .trajectory import save_trajectory as save_trajectory
+from .vehicle import Ellipsoid as Ellipsoid
+from .vehicle import Rotor as Rotor
+from .vehicle import Vehicle as Vehicle
+from .vehicle import implausibilities as implausibilities
+from .vehicle import load_vehicle as load_vehicle
+from .vehicle import vehicle_names as vehicle_names
+from .vehicle import write_vehicle as write_vehicle
+from .viewer.live.view_live import LiveView as LiveView
+from .viewer.live.view_live import view_live as view_live
+from .viewer.replay import Replay as Replay
+from .viewer.replay import view as view
+from .viewer.replay import write_replay as write_replay

@@ -1,36 +1,24 @@
-from .dispersion import Battery, Dispersion, Gusts
-from .environment import Environment
-from .files import as_dispersion, dispersion_names, load_dispersion, write_dispersion
-from .obstacles import Obstacle, obstacle
-from .obstacles.grid import Grid, occupied_boxes
-from .obstacles.mesh import Mesh
-from .obstacles.mesh_file import mesh_parts
-from .obstacles.shapes import Box, Capsule, Cylinder, HalfSpace, Polytope, Sphere
-from .sensors import HandOff, Imu, MotionCapture, Outage
-
-__all__ = [
-    "Battery",
-    "Box",
-    "Capsule",
-    "Cylinder",
-    "Dispersion",
-    "Environment",
-    "Grid",
-    "Gusts",
-    "HalfSpace",
-    "HandOff",
-    "Imu",
-    "Mesh",
-    "MotionCapture",
-    "Obstacle",
-    "Outage",
-    "Polytope",
-    "Sphere",
-    "as_dispersion",
-    "dispersion_names",
-    "load_dispersion",
-    "mesh_parts",
-    "obstacle",
-    "occupied_boxes",
-    "write_dispersion",
-]
+from .dispersion import Battery as Battery
+from .dispersion import Dispersion as Dispersion
+from .dispersion import Gusts as Gusts
+from .environment import Environment as Environment
+from .files import as_dispersion as as_dispersion
+from .files import dispersion_names as dispersion_names
+from .files import load_dispersion as load_dispersion
+from .files import write_dispersion as write_dispersion
+from .obstacles import Obstacle as Obstacle
+from .obstacles import obstacle as obstacle
+from .obstacles.grid import Grid as Grid
+from .obstacles.grid import occupied_boxes as occupied_boxes
+from .obstacles.mesh import Mesh as Mesh
+from .obstacles.mesh_file import mesh_parts as mesh_parts
+from .obstacles.shapes import Box as Box
+from .obstacles.shapes import Capsule as Capsule
+from .obstacles.shapes import Cylinder as Cylinder
+from .obstacles.shapes import HalfSpace as HalfSpace
+from .obstacles.shapes import Polytope as Polytope
+from .obstacles.shapes import Sphere as Sphere
+from .sensors import HandOff as HandOff
+from .sensors import Imu as Imu
+from .sensors import MotionCapture as MotionCapture
+from .sensors import Outage as Outage

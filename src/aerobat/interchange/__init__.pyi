@@ -1,21 +1,12 @@
-from .blackbox import Blackbox, read_blackbox
-from .columns import column_groups, write_columns
-from .csv import read_csv, read_rows, write_csv
-from .flight_log import read_flight_log
-from .read import read_plan, read_trajectory
-from .tables import read_table, write_table
-
-__all__ = [
-    "Blackbox",
-    "column_groups",
-    "read_blackbox",
-    "read_csv",
-    "read_flight_log",
-    "read_plan",
-    "read_rows",
-    "read_table",
-    "read_trajectory",
-    "write_columns",
-    "write_csv",
-    "write_table",
-]
+from .blackbox import Blackbox as Blackbox
+from .blackbox import read_blackbox as read_blackbox
+from .columns import column_groups as column_groups
+from .columns import write_columns as write_columns
+from .csv import read_csv as read_csv
+from .csv import read_rows as read_rows
+from .csv import write_csv as write_csv
+from .flight_log import read_flight_log as read_flight_log
+from .read import read_plan as read_plan
+from .read import read_trajectory as read_trajectory
+from .tables import read_table as read_table
+from .tables import write_table as write_table

@@ -1,30 +1,19 @@
-from .autopilot.vehicle import SimulatedVehicle
-from .clock import Clock, WallClock
-from .commander import Commander, Doing
-from .goals import AttitudeGoal, Mode, Observed, PathGoal, PathPiece, PositionGoal
-from .mission import Mission, MissionSettings, Phase, require_flyable
-from .path_follower import PathFollower
-from .report import LinkReport, link_report
-from .stream import SetpointStream
-
-__all__ = [
-    "AttitudeGoal",
-    "Clock",
-    "Commander",
-    "Doing",
-    "LinkReport",
-    "Mission",
-    "MissionSettings",
-    "Mode",
-    "Observed",
-    "PathFollower",
-    "PathGoal",
-    "PathPiece",
-    "Phase",
-    "PositionGoal",
-    "SetpointStream",
-    "SimulatedVehicle",
-    "WallClock",
-    "link_report",
-    "require_flyable",
-]
+from .autopilot.vehicle import SimulatedVehicle as SimulatedVehicle
+from .clock import Clock as Clock
+from .clock import WallClock as WallClock
+from .commander import Commander as Commander
+from .commander import Doing as Doing
+from .goals import AttitudeGoal as AttitudeGoal
+from .goals import Mode as Mode
+from .goals import Observed as Observed
+from .goals import PathGoal as PathGoal
+from .goals import PathPiece as PathPiece
+from .goals import PositionGoal as PositionGoal
+from .mission import Mission as Mission
+from .mission import MissionSettings as MissionSettings
+from .mission import Phase as Phase
+from .mission import require_flyable as require_flyable
+from .path_follower import PathFollower as PathFollower
+from .report import LinkReport as LinkReport
+from .report import link_report as link_report
+from .stream import SetpointStream as SetpointStream

@@ -1,87 +1,48 @@
-from .ball import Ball
-from .condition import Attitude, Condition, ForceBalance, LinearBound, Quantity
-from .end_state import EndState, at_rest
-from .files import as_problem, load_problem, problem_names, problem_text, write_problem
-from .gate import Gate, tilted_gate
-from .heading import Heading
-from .limits import PAPER_LIMITS, Limits
-from .maneuvers import (
-    BarrelRoll,
-    Corkscrew,
-    Course,
-    CustomManeuver,
-    Figure,
-    Flip,
-    GatePassage,
-    HalfFlip,
-    Hold,
-    Immelmann,
-    InvertedPass,
-    KnifeEdgePass,
-    Line,
-    Maneuver,
-    MattyFlip,
-    PassGate,
-    PassWaypoint,
-    PowerLoop,
-    SplitS,
-    Waypoint,
-    Waypoints,
-)
-from .maneuvers.maneuver import maneuver, registered_maneuvers
-from .planned_passage import PlannedPassage, PlannedWaypoint
-from .problem import Problem
-from .stage import Stage, StageSequence
-from .tolerance import Tolerance
-from .wall import Wall
-
-__all__ = [
-    "PAPER_LIMITS",
-    "Attitude",
-    "Ball",
-    "BarrelRoll",
-    "Condition",
-    "Corkscrew",
-    "Course",
-    "CustomManeuver",
-    "EndState",
-    "Figure",
-    "Flip",
-    "ForceBalance",
-    "Gate",
-    "GatePassage",
-    "HalfFlip",
-    "Heading",
-    "Hold",
-    "Immelmann",
-    "InvertedPass",
-    "KnifeEdgePass",
-    "Limits",
-    "Line",
-    "LinearBound",
-    "Maneuver",
-    "MattyFlip",
-    "PassGate",
-    "PassWaypoint",
-    "PlannedPassage",
-    "PlannedWaypoint",
-    "PowerLoop",
-    "Problem",
-    "Quantity",
-    "SplitS",
-    "Stage",
-    "StageSequence",
-    "Tolerance",
-    "Wall",
-    "Waypoint",
-    "Waypoints",
-    "as_problem",
-    "at_rest",
-    "load_problem",
-    "maneuver",
-    "problem_names",
-    "problem_text",
-    "registered_maneuvers",
-    "tilted_gate",
-    "write_problem",
-]
+from .ball import Ball as Ball
+from .condition import Attitude as Attitude
+from .condition import Condition as Condition
+from .condition import ForceBalance as ForceBalance
+from .condition import LinearBound as LinearBound
+from .condition import Quantity as Quantity
+from .end_state import EndState as EndState
+from .end_state import at_rest as at_rest
+from .files import as_problem as as_problem
+from .files import load_problem as load_problem
+from .files import problem_names as problem_names
+from .files import problem_text as problem_text
+from .files import write_problem as write_problem
+from .gate import Gate as Gate
+from .gate import tilted_gate as tilted_gate
+from .heading import Heading as Heading
+from .limits import PAPER_LIMITS as PAPER_LIMITS
+from .limits import Limits as Limits
+from .maneuvers import BarrelRoll as BarrelRoll
+from .maneuvers import Corkscrew as Corkscrew
+from .maneuvers import Course as Course
+from .maneuvers import CustomManeuver as CustomManeuver
+from .maneuvers import Figure as Figure
+from .maneuvers import Flip as Flip
+from .maneuvers import GatePassage as GatePassage
+from .maneuvers import HalfFlip as HalfFlip
+from .maneuvers import Hold as Hold
+from .maneuvers import Immelmann as Immelmann
+from .maneuvers import InvertedPass as InvertedPass
+from .maneuvers import KnifeEdgePass as KnifeEdgePass
+from .maneuvers import Line as Line
+from .maneuvers import Maneuver as Maneuver
+from .maneuvers import MattyFlip as MattyFlip
+from .maneuvers import PassGate as PassGate
+from .maneuvers import PassWaypoint as PassWaypoint
+from .maneuvers import PowerLoop as PowerLoop
+from .maneuvers import SplitS as SplitS
+from .maneuvers import Waypoint as Waypoint
+from .maneuvers import Waypoints as Waypoints
+from .maneuvers.maneuver import maneuver as maneuver
+from .maneuvers.maneuver import registered_maneuvers as registered_maneuvers
+from .planned_passage import PlannedPassage as PlannedPassage
+from .planned_passage import PlannedWaypoint as PlannedWaypoint
+from .problem import Problem as Problem
+from .stage import Stage as Stage
+from .stage import StageSequence as StageSequence
+from .tolerance import Tolerance as Tolerance
+from .wall import Wall as Wall

@@ -1,46 +1,23 @@
-from .course import Course
-from .custom import CustomManeuver
-from .elements import Hold, PassGate, PassWaypoint
-from .figures import (
-    BarrelRoll,
-    Corkscrew,
-    Figure,
-    Immelmann,
-    InvertedPass,
-    KnifeEdgePass,
-    MattyFlip,
-    PowerLoop,
-    SplitS,
-)
-from .flip import Flip
-from .gate_passage import GatePassage
-from .half_flip import HalfFlip
-from .line import Line
-from .maneuver import MANEUVERS, Maneuver, registered_maneuvers
-from .waypoints import Waypoint, Waypoints
-
-__all__ = [
-    "MANEUVERS",
-    "BarrelRoll",
-    "Corkscrew",
-    "Course",
-    "CustomManeuver",
-    "Figure",
-    "Flip",
-    "GatePassage",
-    "HalfFlip",
-    "Hold",
-    "Immelmann",
-    "InvertedPass",
-    "KnifeEdgePass",
-    "Line",
-    "Maneuver",
-    "MattyFlip",
-    "PassGate",
-    "PassWaypoint",
-    "PowerLoop",
-    "SplitS",
-    "Waypoint",
-    "Waypoints",
-    "registered_maneuvers",
-]
+from .course import Course as Course
+from .custom import CustomManeuver as CustomManeuver
+from .elements import Hold as Hold
+from .elements import PassGate as PassGate
+from .elements import PassWaypoint as PassWaypoint
+from .figures import BarrelRoll as BarrelRoll
+from .figures import Corkscrew as Corkscrew
+from .figures import Figure as Figure
+from .figures import Immelmann as Immelmann
+from .figures import InvertedPass as InvertedPass
+from .figures import KnifeEdgePass as KnifeEdgePass
+from .figures import MattyFlip as MattyFlip
+from .figures import PowerLoop as PowerLoop
+from .figures import SplitS as SplitS
+from .flip import Flip as Flip
+from .gate_passage import GatePassage as GatePassage
+from .half_flip import HalfFlip as HalfFlip
+from .line import Line as Line
+from .maneuver import MANEUVERS as MANEUVERS
+from .maneuver import Maneuver as Maneuver
+from .maneuver import registered_maneuvers as registered_maneuvers
+from .waypoints import Waypoint as Waypoint
+from .waypoints import Waypoints as Waypoints

@@ -1,16 +1,9 @@
-from .figure import Figure
-from .loops import Immelmann, MattyFlip, PowerLoop, SplitS
-from .passes import InvertedPass, KnifeEdgePass
-from .rolls import BarrelRoll, Corkscrew
-
-__all__ = [
-    "BarrelRoll",
-    "Corkscrew",
-    "Figure",
-    "Immelmann",
-    "InvertedPass",
-    "KnifeEdgePass",
-    "MattyFlip",
-    "PowerLoop",
-    "SplitS",
-]
+from .figure import Figure as Figure
+from .loops import Immelmann as Immelmann
+from .loops import MattyFlip as MattyFlip
+from .loops import PowerLoop as PowerLoop
+from .loops import SplitS as SplitS
+from .passes import InvertedPass as InvertedPass
+from .passes import KnifeEdgePass as KnifeEdgePass
+from .rolls import BarrelRoll as BarrelRoll
+from .rolls import Corkscrew as Corkscrew
