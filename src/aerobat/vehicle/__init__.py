@@ -1,23 +1,14 @@
 """Vehicles, their rotors, and the effect of the rotors on the body."""
 
-from aerobat.vehicle.allocation import mixer, rotor_thrusts, wrench
-from aerobat.vehicle.ellipsoid import Ellipsoid
-from aerobat.vehicle.files import as_vehicle, load_vehicle, vehicle_names, vehicle_text, write_vehicle
-from aerobat.vehicle.plausibility import implausibilities
-from aerobat.vehicle.rotor import Rotor
-from aerobat.vehicle.vehicle import Vehicle
-
-__all__ = [
-    "Ellipsoid",
-    "Rotor",
-    "Vehicle",
-    "as_vehicle",
-    "implausibilities",
-    "load_vehicle",
-    "mixer",
-    "rotor_thrusts",
-    "vehicle_names",
-    "vehicle_text",
-    "wrench",
-    "write_vehicle",
-]
+from aerobat.vehicle.allocation import mixer as mixer
+from aerobat.vehicle.allocation import rotor_thrusts as rotor_thrusts
+from aerobat.vehicle.allocation import wrench as wrench
+from aerobat.vehicle.ellipsoid import Ellipsoid as Ellipsoid
+from aerobat.vehicle.files import as_vehicle as as_vehicle
+from aerobat.vehicle.files import load_vehicle as load_vehicle
+from aerobat.vehicle.files import vehicle_names as vehicle_names
+from aerobat.vehicle.files import vehicle_text as vehicle_text
+from aerobat.vehicle.files import write_vehicle as write_vehicle
+from aerobat.vehicle.plausibility import implausibilities as implausibilities
+from aerobat.vehicle.rotor import Rotor as Rotor
+from aerobat.vehicle.vehicle import Vehicle as Vehicle

@@ -6,23 +6,15 @@ has 15 components: position, velocity, attitude in body axes, biases of gyro and
 which fuses a possibly late pose. The filter does not depend on the vehicle.
 """
 
-from aerobat.kernels.ekf.fusion import carried_back, fuse
-from aerobat.kernels.ekf.prediction import predict_covariance, propagate
-from aerobat.kernels.ekf.states import EkfParameters, EkfState, NominalState, estimated_body, init, pose_of
-from aerobat.kernels.imu import ImuSample
-from aerobat.kernels.rigid_body import Pose
-
-__all__ = [
-    "EkfParameters",
-    "EkfState",
-    "ImuSample",
-    "NominalState",
-    "Pose",
-    "carried_back",
-    "estimated_body",
-    "fuse",
-    "init",
-    "pose_of",
-    "predict_covariance",
-    "propagate",
-]
+from aerobat.kernels.ekf.fusion import carried_back as carried_back
+from aerobat.kernels.ekf.fusion import fuse as fuse
+from aerobat.kernels.ekf.prediction import predict_covariance as predict_covariance
+from aerobat.kernels.ekf.prediction import propagate as propagate
+from aerobat.kernels.ekf.states import EkfParameters as EkfParameters
+from aerobat.kernels.ekf.states import EkfState as EkfState
+from aerobat.kernels.ekf.states import NominalState as NominalState
+from aerobat.kernels.ekf.states import estimated_body as estimated_body
+from aerobat.kernels.ekf.states import init as init
+from aerobat.kernels.ekf.states import pose_of as pose_of
+from aerobat.kernels.imu import ImuSample as ImuSample
+from aerobat.kernels.rigid_body import Pose as Pose
