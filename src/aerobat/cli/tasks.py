@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from math import isfinite, radians
 from typing import Literal
 
@@ -71,37 +72,21 @@ def read_run(
     """
     source = plan_source(name)
     columns = column_groups(options.columns) if isinstance(options, TableOptions) else ALL
+    made = partial(RunRecord, command=command, flight=flight, columns=columns, plugins=options.plugin_names)
     if source is not None:
         if flight.probability is not None:
             raise SpecError(f"--pass plans anew, and '{name}' is a plan; give a problem, or leave --pass out")
         saved = read_saved_plan(source, options)
         assert saved.vehicle is not None, "a plan that is read is certified for a vehicle"
-        record = RunRecord(
-            command=command,
-            problem=saved.problem,
-            vehicle=saved.vehicle,
-            source=name,
-            flight=flight,
-            columns=columns,
-            plugins=options.plugin_names,
-        )
-        return record, saved
+        return made(problem=saved.problem, vehicle=saved.vehicle, source=name), saved
     for flag, value in (("--rate", options.rate), ("--heading", options.heading)):
         if value is not None:
             raise SpecError(f"{flag} is for a CSV file, not for the problem '{name}'; leave it out")
     problem, vehicle = read_task(name, options, options.paper)
-    record = RunRecord(
-        command=command,
-        problem=problem,
-        vehicle=vehicle,
-        planner=make_planner(options, problem, vehicle, options.paper),
-        paper=options.paper,
-        angle=options.angle,
-        flight=flight,
-        columns=columns,
-        plugins=options.plugin_names,
-    )
-    return record, None
+    planner = make_planner(options, problem, vehicle, options.paper)
+    return made(
+        problem=problem, vehicle=vehicle, planner=planner, paper=options.paper, angle=options.angle
+    ), None
 
 
 def flight_settings(options: ConditionsOptions, plant: str | None = None) -> FlightSettings:

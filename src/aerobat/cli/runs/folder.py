@@ -47,19 +47,8 @@ FILES = (
     INSPECTION,
     "plan.npz",
     "plan.csv",
-    "report.json",
-    "report.png",
-    "compare.json",
-    "compare.png",
-    "flights.csv",
-    "flights.parquet",
-    "sweep.json",
-    "sweep.png",
-    "map.csv",
-    "map.parquet",
-    "map.json",
-    "map.png",
-    "need.json",
+    *(f"{name}.{kind}" for name in ("report", "compare", "sweep", "map", "need") for kind in ("json", "png")),
+    *(f"{name}.{kind}" for name in ("flights", "map") for kind in ("csv", "parquet")),
 )
 
 

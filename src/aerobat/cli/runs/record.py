@@ -41,10 +41,6 @@ LIBRARIES = (
 )
 
 
-def _planner(value: Any) -> Planner | None:
-    return None if value is None else PLANNERS.read(value)
-
-
 @declared
 class FlightSettings:
     """Settings by which a plan was flown."""
@@ -69,7 +65,7 @@ class RunRecord:
     command: Literal["fly", "plan", "compare", "sweep", "map", "need"]
     problem: Problem  # as it was planned, with --angle and --paper
     vehicle: Vehicle
-    planner: Annotated[Planner | None, PlainValidator(_planner)] = None
+    planner: Annotated[Planner, PlainValidator(PLANNERS.read)] | None = None
     paper: bool = False  # planned without the vehicle
     angle: float | None = None  # [deg] that --angle gave, for the folder's name
     source: str | None = None  # the file that the plan came from
