@@ -1,5 +1,3 @@
 """The command line; its commands are listed in `app`."""
 
-from aerobat.cli.entry import main
-
-__all__ = ["main"]
+from aerobat.cli.entry import main as main

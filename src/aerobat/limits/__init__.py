@@ -5,8 +5,9 @@ mixed-integer search, the refinement, the checks between samples and the certifi
 clearance of the body in a gate holds near one instant, and is defined for all optimizers in `body_in_gate`.
 """
 
-from aerobat.limits.along import limits_along, register_limits
-from aerobat.limits.limit import Asked, Limit
-from aerobat.limits.quantity import MEASURES, PathQuantity
-
-__all__ = ["MEASURES", "Asked", "Limit", "PathQuantity", "limits_along", "register_limits"]
+from aerobat.limits.along import limits_along as limits_along
+from aerobat.limits.along import register_limits as register_limits
+from aerobat.limits.limit import Asked as Asked
+from aerobat.limits.limit import Limit as Limit
+from aerobat.limits.quantity import MEASURES as MEASURES
+from aerobat.limits.quantity import PathQuantity as PathQuantity

@@ -1,9 +1,8 @@
 """Simulation: the loop of plant, sensors and controller, and the flights that it produces."""
 
-from aerobat.simulation.config import FlightConfig
-from aerobat.simulation.flight import Flight, load_flight
-from aerobat.simulation.fly import fly
-from aerobat.simulation.outcome import Outcome
-from aerobat.simulation.prepare import prepare
-
-__all__ = ["Flight", "FlightConfig", "Outcome", "fly", "load_flight", "prepare"]
+from aerobat.simulation.config import FlightConfig as FlightConfig
+from aerobat.simulation.flight import Flight as Flight
+from aerobat.simulation.flight import load_flight as load_flight
+from aerobat.simulation.fly import fly as fly
+from aerobat.simulation.outcome import Outcome as Outcome
+from aerobat.simulation.prepare import prepare as prepare

@@ -1,28 +1,15 @@
 """Passages of flights: through gates, with the body's clearance; by waypoints; past obstacles."""
 
-from aerobat.simulation.passages.log import log_rows, passages_in_log
-from aerobat.simulation.passages.obstacles import (
-    FlownBodies,
-    NearestObstacle,
-    nearest_in_log,
-    nearest_obstacles,
-)
-from aerobat.simulation.passages.passage import Passage, passage_names, passages
-from aerobat.simulation.passages.stage_attitude import StageAttitude, stage_attitudes
-from aerobat.simulation.passages.waypoint import WaypointPassage, waypoint_passages
-
-__all__ = [
-    "FlownBodies",
-    "NearestObstacle",
-    "Passage",
-    "StageAttitude",
-    "WaypointPassage",
-    "log_rows",
-    "nearest_in_log",
-    "nearest_obstacles",
-    "passage_names",
-    "passages",
-    "passages_in_log",
-    "stage_attitudes",
-    "waypoint_passages",
-]
+from aerobat.simulation.passages.log import log_rows as log_rows
+from aerobat.simulation.passages.log import passages_in_log as passages_in_log
+from aerobat.simulation.passages.obstacles import FlownBodies as FlownBodies
+from aerobat.simulation.passages.obstacles import NearestObstacle as NearestObstacle
+from aerobat.simulation.passages.obstacles import nearest_in_log as nearest_in_log
+from aerobat.simulation.passages.obstacles import nearest_obstacles as nearest_obstacles
+from aerobat.simulation.passages.passage import Passage as Passage
+from aerobat.simulation.passages.passage import passage_names as passage_names
+from aerobat.simulation.passages.passage import passages as passages
+from aerobat.simulation.passages.stage_attitude import StageAttitude as StageAttitude
+from aerobat.simulation.passages.stage_attitude import stage_attitudes as stage_attitudes
+from aerobat.simulation.passages.waypoint import WaypointPassage as WaypointPassage
+from aerobat.simulation.passages.waypoint import waypoint_passages as waypoint_passages

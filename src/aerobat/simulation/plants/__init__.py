@@ -1,5 +1,7 @@
 """Plants, which turn rotor commands into a vehicle's state; here the simulators of others."""
 
-from aerobat.simulation.plants.plant import PLANTS, Actuation, Plant, PlantRun, PlantScene
-
-__all__ = ["PLANTS", "Actuation", "Plant", "PlantRun", "PlantScene"]
+from aerobat.simulation.plants.plant import PLANTS as PLANTS
+from aerobat.simulation.plants.plant import Actuation as Actuation
+from aerobat.simulation.plants.plant import Plant as Plant
+from aerobat.simulation.plants.plant import PlantRun as PlantRun
+from aerobat.simulation.plants.plant import PlantScene as PlantScene
