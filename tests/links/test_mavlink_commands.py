@@ -253,7 +253,7 @@ def test_a_server_by_tcp_lets_the_next_client_in_where_one_has_hung_up(how: str)
 
 def test_without_pymavlink_the_command_that_installs_it_is_told(plan: Path, capsys, monkeypatch) -> None:
     connection.dialect.cache_clear()
-    monkeypatch.setattr(connection, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20.common", None)
     code, _, err = run(capsys, "link", "mavlink", str(plan))
     assert code == 2
     assert err.endswith('install it with pip install "aerobat[mavlink]"\n')

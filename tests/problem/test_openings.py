@@ -209,7 +209,7 @@ STAR = [(np.cos(a), np.sin(a)) for a in np.arange(5) * 4 * np.pi / 5]
         ({"radius": 0.4, "polygon": TRIANGLE}, "polygon stands beside radius, an opening of another kind"),
         ({"radius": 0.0}, "radius must be positive"),
         ({"diameter": 0.8, "radius": 0.4}, "diameter stands beside radius; give one or the other"),
-        ({"diameter": -0.8}, "diameter must be a positive number, got -0.8"),
+        ({"diameter": -0.8}, "diameter must be positive, got -0.8"),
         ({"polygon": TRIANGLE[:2]}, "polygon must have from 3 to 24 corners, got 2"),
         ({"polygon": 3}, "polygon must be a list of corners, two numbers each, got 3"),
         ({"polygon": [1.0, 2.0, 3.0]}, r"polygon\[0\] must be 2 numbers, got 1.0"),

@@ -86,7 +86,7 @@ def test_a_rotors_own_keys_win_over_whatever_the_defaults_say_by_other_keys() ->
             {},
             "rotors[0].min_thrust and torque_coefficient are missing; add them there or",
         ),
-        ({"k_f": -1e-5, "max_rpm": 7000}, {}, "rotor_defaults.k_f must be 0 or more, got -1e-05"),
+        ({"k_f": -1e-5, "max_rpm": 7000}, {}, "rotor_defaults.k_f must be positive, got -1e-05"),
         ({"k_f": 0, "max_rpm": 7000}, {}, "rotor_defaults.k_f must be positive, got 0"),
         ({"k_f": "x", "max_rpm": 7000}, {}, "rotor_defaults.k_f must be a number, got 'x'"),
         (

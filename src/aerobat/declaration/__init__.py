@@ -34,6 +34,7 @@ from aerobat.declaration.field_types import VectorLike as VectorLike
 from aerobat.declaration.field_types import finite as finite
 from aerobat.declaration.field_types import in_degrees as in_degrees
 from aerobat.declaration.field_types import number as number
+from aerobat.declaration.field_types import positive as positive
 from aerobat.declaration.field_types import unit as unit
 from aerobat.declaration.sentences import FieldError as FieldError
 from aerobat.declaration.sentences import missing_fields as missing_fields

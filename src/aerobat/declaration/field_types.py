@@ -112,6 +112,14 @@ def number(value: Any, name: str) -> float:
         return _bounded(made)
 
 
+def positive(value: Any, name: str) -> float:
+    """Return a positive number that a file gives under `name`. Raises FieldError for anything else."""
+    made = number(value, name)
+    if made <= 0.0:
+        raise FieldError(name, f"must be positive, got {made:g}")
+    return made
+
+
 def _numbers(value: Any, place: str, infinite: bool) -> Any:
     """Return nested lists of floats from lists or arrays. Raises FieldError for the first invalid entry."""
     if isinstance(value, float) and (isfinite(value) or (infinite and value == value)):

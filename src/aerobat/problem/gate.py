@@ -23,6 +23,7 @@ from aerobat.declaration import (
     declared,
     from_table,
     number,
+    positive,
     unit,
     unknown_name,
     validated,
@@ -101,7 +102,7 @@ class Gate:
         if "diameter" in table:
             if "radius" in table:
                 raise FieldError("diameter", "stands beside radius; give one or the other")
-            table["radius"] = _radius_of(table.pop("diameter"))
+            table["radius"] = positive(table.pop("diameter"), "diameter") / 2.0
         angles = {key: table.pop(key) for key in cls.ANGLES if key in table}
         if "normal" not in table and "up" not in table:
             attitude = [radians(number(angles.get(key, 0.0), key)) for key in cls.ANGLES]
@@ -321,14 +322,6 @@ def _around(gate: Gate, wall: Wall, name: str, heights: Array) -> tuple[ConvexPi
         ConvexPiece((levels + part @ gate.plane_axes).reshape(-1, 3), name=name, motion=gate.motion)
         for part in parts
     )
-
-
-def _radius_of(diameter: Any) -> float:
-    """Return the radius for a diameter [m]. Raises FieldError for an invalid diameter."""
-    whole = number(diameter, "diameter")
-    if whole <= 0.0:
-        raise FieldError("diameter", f"must be a positive number, got {whole:g}")
-    return whole / 2.0
 
 
 def _directions(heading: float, elevation: float, tilt: float) -> tuple[Array, Array]:

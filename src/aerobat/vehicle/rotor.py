@@ -11,7 +11,7 @@ from pydantic import BeforeValidator
 
 from aerobat.arrays import Array
 from aerobat.declaration.declared import declared
-from aerobat.declaration.field_types import Finite, NonNegative, Positive, Vector3, finite, number
+from aerobat.declaration.field_types import Finite, NonNegative, Positive, Vector3, finite, number, positive
 from aerobat.declaration.sentences import FieldError, shown, within_field
 
 RAD_PER_S = 2 * pi / 60  # [rad/s] per revolution per minute
@@ -132,7 +132,7 @@ def _of_speeds(table: Mapping[str, Any], own: Mapping[str, Any]) -> Iterator[_Ke
         return
     if "k_f" not in table:
         raise FieldError("k_f", f"is missing; {needing[0]} says nothing without it")
-    k_f = _positive(table, "k_f")
+    k_f = positive(table["k_f"], "k_f")
     for key, name in (("max_rpm", "max_thrust"), ("min_rpm", "min_thrust")):
         if key in table:
             yield _KeyedValue(
@@ -172,13 +172,6 @@ def _curve(value: Any) -> Array:
                 f"must continue the rise: {name}, column {column}, go from idle to full throttle",
             )
     return rows
-
-
-def _positive(table: Mapping[str, Any], key: str) -> float:
-    value = _not_negative(table, key)
-    if value == 0.0:
-        raise FieldError(key, "must be positive, got 0")
-    return value
 
 
 def _not_negative(table: Mapping[str, Any], key: str) -> float:

@@ -18,7 +18,7 @@ from aerobat.declaration import (
     Vector3,
     VectorLike,
     finite,
-    number,
+    positive,
     shown,
     validated,
     within_field,
@@ -129,9 +129,7 @@ class Grid(Obstacle):
                 raise FieldError("file", "stands beside boxes; give one or the other")
             if "cell" not in table:
                 raise FieldError("cell", "is missing; add it")
-            cell = number(table["cell"], "cell")
-            if cell <= 0.0:
-                raise FieldError("cell", f"must be positive, got {shown(table['cell'])}")
+            cell = positive(table["cell"], "cell")
             with within_field("origin"):
                 origin = finite(table.get("origin", (0.0, 0.0, 0.0)), 3)
             with within_field("file"):

@@ -8,20 +8,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from aerobat.declaration import Angle, FieldError, Label, Vector3, number, shown, within_field
+from aerobat.declaration import Angle, FieldError, Label, Vector3, positive, within_field
 from aerobat.documents import file_name
 from aerobat.environment.obstacles.attitude import ATTITUDE, axes_of
 from aerobat.environment.obstacles.convex_piece import ConvexPiece
 from aerobat.environment.obstacles.mesh_file import mesh_parts
 from aerobat.environment.obstacles.obstacle import Obstacle, obstacle
 from aerobat.environment.obstacles.shapes import Points
-
-
-def _scale(value: Any) -> float:
-    scale = number(value, "scale")
-    if scale <= 0.0:
-        raise FieldError("scale", f"must be positive, got {shown(value)}")
-    return scale
 
 
 @obstacle("mesh")
@@ -51,7 +44,7 @@ class Mesh(Obstacle):
         if "file" in table:
             if "parts" in table:
                 raise FieldError("file", "stands beside parts; give one or the other")
-            scale = _scale(table.pop("scale", 1.0))
+            scale = positive(table.pop("scale", 1.0), "scale")
             with within_field("file"):
                 table["parts"] = mesh_parts(file_name(table.pop("file")), scale)
         elif "scale" in table:

@@ -9,12 +9,11 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, partial
-from importlib.util import find_spec
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from aerobat.errors import BackendMissing, SpecError
+from aerobat.errors import SpecError, import_extra
 from aerobat.links.clock import Clock
 
 _KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
@@ -39,12 +38,8 @@ class Connection(Protocol):
 @cache
 def dialect() -> Any:
     """Return pymavlink's dialect `common`. Raises BackendMissing where pymavlink is not installed."""
-    if find_spec("pymavlink") is None:
-        raise BackendMissing('MAVLink needs pymavlink; install it with pip install "aerobat[mavlink]"')
     os.environ["MAVLINK20"] = "1"  # read by pymavlink when it is imported
-    from pymavlink.dialects.v20 import common
-
-    return common
+    return import_extra("pymavlink.dialects.v20.common", "MAVLink needs pymavlink", "aerobat[mavlink]")
 
 
 def message_class(name: str) -> Any:
