@@ -9,7 +9,6 @@ import os
 import re
 import shutil
 import stat
-import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -43,16 +42,14 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
             raise OSError("it is a pipe or a device, not a file")
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_abandoned(target.parent)
-        suffix = f".{os.getpid()}{_STAGING}{target.suffix}"
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}.", suffix=suffix)
-        os.close(handle)
+        mark = f"{os.urandom(4).hex()}.{os.getpid()}{_STAGING}"
+        temporary = target.with_name(f".{target.stem}.{mark}{target.suffix}")
+        temporary.touch(exist_ok=False)
     except OSError as error:
         raise CannotWrite(path, error) from None
-    temporary = Path(name)
     try:
         yield temporary
         _sync(temporary)
-        temporary.chmod(0o666 & ~_umask())
         _keep_mode(temporary, target)
         temporary.replace(target)
     except OSError as error:
@@ -280,9 +277,3 @@ def _remove(path: Path) -> None:
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

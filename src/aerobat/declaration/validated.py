@@ -12,7 +12,7 @@ import inspect
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
-from functools import wraps
+from functools import cache, wraps
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
@@ -60,14 +60,11 @@ def suggest_for(function: Callable[..., Any], suggest: Suggest) -> None:
 
 
 def _checked(function: Callable[..., Any], name: str, annotated: Any) -> Callable[..., Any]:
-    arguments: _Arguments | None = None
+    arguments = cache(lambda: _Arguments(function, name, annotated))
 
     @wraps(function)
     def checked(*args: Any, **kwargs: Any) -> Any:
-        nonlocal arguments
-        if arguments is None:
-            arguments = _Arguments(function, name, annotated)
-        fitting = arguments.fitting(args, kwargs)
+        fitting = arguments().fitting(args, kwargs)
         return function(*fitting.args, **fitting.kwargs)
 
     return checked
@@ -204,13 +201,11 @@ def _check_of_one(hint: Any) -> Check:
 
 def _declared_as(hint: Any) -> Check:
     """Return the check by a type of fields, as in declared classes."""
-    adapter: Any = None
+    adapter = cache(lambda: TypeAdapter(hint, config=CONFIG))
 
     def check(value: Any) -> Any:
-        nonlocal adapter
-        adapter = adapter or TypeAdapter(hint, config=CONFIG)
         try:
-            return adapter.validate_python(plain(value))
+            return adapter().validate_python(plain(value))
         except ValidationError as error:
             raise first_complaint(error) from None
 
