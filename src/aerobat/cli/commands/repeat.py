@@ -18,11 +18,12 @@ from aerobat.cli.failures import ExitCode
 from aerobat.cli.options import ExplainingOptions, OutputOptions, output
 from aerobat.cli.runs.folder import FLIGHT, finish, require_place
 from aerobat.cli.runs.record import RunRecord, beside, read_record, versions_now
+from aerobat.cli.runs.saved_plans import whole_plan
 from aerobat.cli.tasks import plan_of
 from aerobat.cli.terminal import say
 from aerobat.documents import read_json
 from aerobat.errors import SpecError
-from aerobat.interchange import read_plan, read_table
+from aerobat.interchange import read_table
 from aerobat.planning import Plan
 from aerobat.registry import imported_plugins
 from aerobat.simulation import Flight, load_flight
@@ -70,11 +71,12 @@ def repeat(folder: Path, options: RepeatOptions = RepeatOptions()) -> ExitCode:
         _run_study(folder, record, options)
         names = [name for name, value in _results(out, record).items() if not _same(value, earlier.get(name))]
         return _compared(folder, record, f"{', '.join(names)} differ" if names else "", ExitCode.WELL)
-    run = _Run.read(folder, record)
-    plan = plan_of(record, run.plan if record.planner is None else None, options.explain)
-    flight = flown(plan, record.flight) if record.command == "fly" else None
-    code = finish(plan, record, options, flight, options.explain)
-    return _compared(folder, record, run.difference(_Run(plan, flight.flight if flight else None)), code)
+    before = whole_plan(folder, "run anew")
+    flight = load_flight(folder / FLIGHT) if record.command == "fly" else None
+    plan = plan_of(record, before if record.planner is None else None, options.explain)
+    again = None if flight is None else flown(plan, record.flight)
+    code = finish(plan, record, options, again, options.explain)
+    return _compared(folder, record, _difference(before, flight, plan, again.flight if again else None), code)
 
 
 def _run_study(folder: Path, record: RunRecord, options: RepeatOptions) -> None:
@@ -82,7 +84,7 @@ def _run_study(folder: Path, record: RunRecord, options: RepeatOptions) -> None:
     if record.command in STUDIES:
         STUDIES[record.command](record, options)
     else:
-        plan = _Run.read(folder, record).plan if record.planner is None else plan_of(record)
+        plan = whole_plan(folder, "run anew") if record.planner is None else plan_of(record)
         run_sweep(plan, record, options)
 
 
@@ -123,34 +125,19 @@ def _compared(folder: Path, record: RunRecord, difference: str, code: ExitCode) 
     return ExitCode.NOT_WELL
 
 
-@dataclass(frozen=True)
-class _Run:
-    """What a run came to."""
-
-    plan: Plan
-    flight: Flight | None
-
-    @classmethod
-    def read(cls, folder: Path, record: RunRecord) -> _Run:
-        """Read a run from its folder."""
-        plan = read_plan(folder)
-        if not isinstance(plan, Plan):
-            raise SpecError(f"{folder}/ holds no .plan file; run anew")
-        return cls(plan, load_flight(folder / FLIGHT) if record.command == "fly" else None)
-
-    def difference(self, other: _Run) -> str:
-        """Return how another run differs, in words; nothing where it does not."""
-        own, its = self.plan.trajectory, other.plan.trajectory
-        same = _same(own.durations, its.durations) and _same(own.coefficients, its.coefficients)
-        if same and own != its:
-            return "the plan's heading is another"
-        if not same:
-            return f"the plan takes {its.duration:.9g} s, there {own.duration:.9g} s"
-        if self.flight is None or other.flight is None:
-            return ""
-        its_series = other.flight.series
-        names = [name for name, series in self.flight.series.items() if not _same(series, its_series[name])]
-        return f"the plan is the same, the flight's {', '.join(names)} are not" if names else ""
+def _difference(plan: Plan, flight: Flight | None, again: Plan, flown_again: Flight | None) -> str:
+    """Return how a repeated plan and its flight, if any, differ, in words; nothing where they do not."""
+    own, its = plan.trajectory, again.trajectory
+    same = _same(own.durations, its.durations) and _same(own.coefficients, its.coefficients)
+    if same and own != its:
+        return "the plan's heading is another"
+    if not same:
+        return f"the plan takes {its.duration:.9g} s, there {own.duration:.9g} s"
+    if flight is None or flown_again is None:
+        return ""
+    its_series = flown_again.series
+    names = [name for name, series in flight.series.items() if not _same(series, its_series[name])]
+    return f"the plan is the same, the flight's {', '.join(names)} are not" if names else ""
 
 
 def _same(a: Any, b: Any) -> bool:
