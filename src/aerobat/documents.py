@@ -63,7 +63,10 @@ class Presets(Generic[T]):
         return read_document(path, self.cls, self.kind, name=path.name.removesuffix(".toml"))
 
     def text(self, name_or_path: str | os.PathLike[str]) -> str:
-        """Return the text of one of them as it stands, with its remarks, or of a file as it was read."""
+        """Return the text of one of them as it stands, with its remarks, or of a file as it was read.
+
+        Raises SpecError as `load` does.
+        """
         if name_or_path in self.names():
             return (self.folder / f"{name_or_path}.toml").read_text(encoding="utf-8")
         return to_toml(to_table(self.load(name_or_path)))

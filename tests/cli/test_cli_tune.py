@@ -12,7 +12,7 @@ import pytest
 import aerobat as ab
 from aerobat import cli
 from aerobat.cli.progress import Progress
-from aerobat.problem import problem_text
+from aerobat.problem.files import PROBLEMS
 from aerobat.studies.tune import TUNED
 from shared_plans import shared_plan
 
@@ -70,7 +70,7 @@ def test_an_interrupted_search_writes_nothing(folder: Path, monkeypatch: pytest.
 def test_what_is_no_vehicles_file_is_not_replaced_by_one(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    problem = problem_text("line")
+    problem = PROBLEMS.text("line")
     Path("mine.toml").write_text(problem)
     Path("folder.toml").mkdir()
     for place in ("mine.toml", "folder.toml"):

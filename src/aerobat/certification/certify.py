@@ -32,7 +32,7 @@ from aerobat.certification.enclosure.queries import (
 from aerobat.certification.envelope import Envelope
 from aerobat.certification.path.ends import end_findings
 from aerobat.certification.path.kinematics import kinematic_findings
-from aerobat.certification.path.passages import passage_findings, waypoint_findings
+from aerobat.certification.path.passages import passage_findings, waypoint_finding
 from aerobat.certification.series_columns import SeriesColumns
 from aerobat.certification.subdivision import subdivide, vanishing
 from aerobat.certification.thrust_curve import ThrustCurve
@@ -111,7 +111,7 @@ def certify(
     findings += end_findings(trajectory, envelope.start, envelope.goal)
     findings += passage_findings(curve, envelope.passages)
     findings += [frame_finding(*bodies, passage) for passage in envelope.passages] if bodies else []
-    findings += waypoint_findings(trajectory, envelope.waypoints)
+    findings += [waypoint_finding(trajectory, waypoint) for waypoint in envelope.waypoints]
     jumps = discontinuities(curve, series)
     if envelope.closed:
         jumps += seam(curve)

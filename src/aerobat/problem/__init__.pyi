@@ -9,7 +9,6 @@ from .end_state import at_rest as at_rest
 from .files import as_problem as as_problem
 from .files import load_problem as load_problem
 from .files import problem_names as problem_names
-from .files import problem_text as problem_text
 from .files import write_problem as write_problem
 from .gate import Gate as Gate
 from .gate import tilted_gate as tilted_gate

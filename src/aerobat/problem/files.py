@@ -31,15 +31,6 @@ def as_problem(problem: Problem | str) -> Problem:
 
 
 @validated
-def problem_text(name: PathName) -> str:
-    """Return the text of a problem's file: a preset's own, or another file as understood.
-
-    Raises SpecError as `load_problem` does.
-    """
-    return PROBLEMS.text(name)
-
-
-@validated
 def write_problem(problem: Problem | str, path: PathName) -> None:
     """Write a problem as TOML, whole or not at all. Raises SpecError when the file cannot be written."""
     write_document(path, to_table(as_problem(problem)))

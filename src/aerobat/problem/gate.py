@@ -33,7 +33,7 @@ from aerobat.environment.obstacles.convex_piece import ConvexPiece, ObstacleMoti
 from aerobat.environment.obstacles.obstacle import Obstacle
 from aerobat.environment.obstacles.path_rows import PathRows
 from aerobat.errors import SpecError
-from aerobat.problem.condition import Condition, ConeAngle, Quantity, fixed
+from aerobat.problem.condition import Condition, ConeAngle, Quantity
 from aerobat.problem.opening import Circle, Corners, OpeningShape, Polygon, Rectangle
 from aerobat.problem.wall import Wall
 
@@ -267,11 +267,6 @@ def tilted_gate(
     """
     normal, up = _directions(heading, elevation, tilt)
     return Gate(cast(Array, position), normal, up, width, height, name, radius=radius, polygon=polygon)
-
-
-def at_centre(gate: Gate) -> tuple[Condition, ...]:
-    """Return conditions that fix the position at the centre of a gate's opening."""
-    return fixed(Quantity.POSITION, gate.position)
 
 
 def in_opening(gate: Gate, clearance: float) -> tuple[Condition, ...]:

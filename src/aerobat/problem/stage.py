@@ -13,8 +13,8 @@ from pydantic import Field, PlainValidator
 from aerobat.arrays import Array
 from aerobat.declaration import Count, FieldError, Label, NonNegative, Positive, declared, shown
 from aerobat.problem.ball import Ball
-from aerobat.problem.condition import Attitude, Condition, Quantity
-from aerobat.problem.gate import Gate, at_centre, in_opening, named_gate
+from aerobat.problem.condition import Attitude, Condition, Quantity, fixed
+from aerobat.problem.gate import Gate, in_opening, named_gate
 
 
 def _crossing_time(value: Any) -> Any:
@@ -163,8 +163,9 @@ class Stage:
                 attitude = replace(attitude, tolerance=min(attitude.tolerance, tolerance))
         there: tuple[Condition, ...] = ()
         if gate is not None:
-            is_free = self.crossing_point == "free"
-            there = in_opening(gate, body_radius + self.margin) if is_free else at_centre(gate)
+            there = fixed(Quantity.POSITION, gate.position)
+            if self.crossing_point == "free":
+                there = in_opening(gate, body_radius + self.margin)
             there += self._moving_through(gate)
         pointing = () if attitude is None else attitude.conditions
         conditions = (*there, *self.conditions, *pointing)

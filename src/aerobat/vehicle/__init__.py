@@ -7,7 +7,6 @@ from aerobat.vehicle.ellipsoid import Ellipsoid as Ellipsoid
 from aerobat.vehicle.files import as_vehicle as as_vehicle
 from aerobat.vehicle.files import load_vehicle as load_vehicle
 from aerobat.vehicle.files import vehicle_names as vehicle_names
-from aerobat.vehicle.files import vehicle_text as vehicle_text
 from aerobat.vehicle.files import write_vehicle as write_vehicle
 from aerobat.vehicle.plausibility import implausibilities as implausibilities
 from aerobat.vehicle.rotor import Rotor as Rotor

@@ -32,15 +32,6 @@ def as_vehicle(vehicle: Vehicle | str) -> Vehicle:
 
 
 @validated
-def vehicle_text(name_or_path: PathName) -> str:
-    """Return the text of a vehicle's file: a preset's own, with its sources, or another file as understood.
-
-    Raises SpecError as `load_vehicle` does.
-    """
-    return VEHICLES.text(name_or_path)
-
-
-@validated
 def write_vehicle(vehicle: Vehicle | str, path: PathName) -> None:
     """Write a vehicle as TOML, whole or not at all. Raises SpecError when the file cannot be written."""
     write_document(path, to_table(as_vehicle(vehicle)))

@@ -27,12 +27,8 @@ def passage_findings(curve: ThrustCurve, passages: Sequence[PlannedPassage]) -> 
     return [finding for passage in passages for finding in _Instant.of(curve, passage).findings()]
 
 
-def waypoint_findings(trajectory: Trajectory, waypoints: Sequence[PlannedWaypoint]) -> list[Finding]:
-    """Return the findings about each waypoint: the distance from its centre."""
-    return [_distance_finding(trajectory, waypoint) for waypoint in waypoints]
-
-
-def _distance_finding(trajectory: Trajectory, waypoint: PlannedWaypoint) -> Finding:
+def waypoint_finding(trajectory: Trajectory, waypoint: PlannedWaypoint) -> Finding:
+    """Return the finding about a waypoint: the distance from its centre."""
     ball, time = waypoint.ball, min(waypoint.time, trajectory.duration)
     distance = float(np.linalg.norm(trajectory.evaluate(time) - ball.centre))
     verdict = Verdict.HOLDS if distance <= ball.radius + PASSAGE_TOLERANCE else Verdict.VIOLATED

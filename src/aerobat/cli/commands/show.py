@@ -16,12 +16,14 @@ from aerobat.declaration import unknown_name
 from aerobat.documents import in_document
 from aerobat.errors import SpecError
 from aerobat.interchange.robots import SUFFIXES, VehicleDescription, import_vehicle, read_robot_description
-from aerobat.problem import Problem, load_problem, problem_names, problem_text
+from aerobat.problem import Problem, load_problem, problem_names
+from aerobat.problem.files import PROBLEMS
 from aerobat.reporting.facts import Fact, Facts
 from aerobat.reporting.tables import print_table, table
 from aerobat.reporting.vehicles import vehicle_row
 from aerobat.storage import write_whole
-from aerobat.vehicle import Vehicle, load_vehicle, vehicle_names, vehicle_text
+from aerobat.vehicle import Vehicle, load_vehicle, vehicle_names
+from aerobat.vehicle.files import VEHICLES
 
 OF_VEHICLES, OF_PROBLEMS = (
     {*(field.name for field in fields(cls)), *cls.SHORTHANDS} for cls in (Vehicle, Problem)
@@ -53,14 +55,14 @@ def show(name: str | None = None, /, *, out: Annotated[Path | None, Parameter(gr
         print()
         print_table(table(Facts([Fact("vehicles", vehicles, "vehicles")])))
     elif out is not None:
-        text = _text(name) if _is_vehicle(name) else problem_text(name)
+        text = _text(name) if _is_vehicle(name) else PROBLEMS.text(name)
         if out.exists():
             raise SpecError(f"--out {out} is there already; name a new file")
         write_whole(out, text)
     elif _is_vehicle(name):
         _show_vehicle(name)
     else:
-        print(problem_text(name), end="")
+        print(PROBLEMS.text(name), end="")
 
 
 def _is_vehicle(name: str) -> bool:
@@ -95,7 +97,7 @@ def _text(name: str) -> str:
     """A vehicle's file. What is missing in it, or hardly can be, is told."""
     if not name.endswith(SUFFIXES):
         named_vehicle(name)
-        return vehicle_text(name)
+        return VEHICLES.text(name)
     found = _robot(name)
     if found.missing:
         say(f"warning: {name} says nothing of the rotors' {', '.join(found.missing)}; add them")
