@@ -11,9 +11,10 @@ Z_m = τ^m Y_m + T^m fixed_m. The k-th derivative of position on the segment is
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import log, perm
 from typing import NamedTuple
 
@@ -126,6 +127,9 @@ class _Variable(NamedTuple):
     row: int  # of the segment's data, (10,)
     direction: Array  # of the derivative that it changes, (3,)
     column: int  # its index among the variables
+
+
+_FreeData = tuple[Array, list[tuple[int, int]]]  # the direction of a variable, and its segments with rows
 
 
 class _Layout(NamedTuple):
@@ -324,56 +328,27 @@ class Spline:
     @cached_property
     def _layout(self) -> _Layout:
         """The order of the variables."""
-        free: list[_Variable] = []
-        count = 0
-
-        def add(direction: Array, *where: tuple[int, int]) -> None:
-            nonlocal count
-            free.extend(_Variable(segment, row, direction, count) for segment, row in where)
-            count += 1
-
-        def add_end(*end: tuple[int, int, EndState]) -> None:
-            for each in end:
-                for direction, where in self._end_variables(*each):
-                    add(direction, where)
-
-        def add_knot(before: int, after: int, shared: int) -> None:
-            for order in range(END_ORDER):
-                sides = [(before, END_ORDER + order), (after, order)]
-                for where in [sides] if order < shared else [[side] for side in sides]:
-                    for axis in np.eye(3):
-                        add(axis, *where)
-
-        add_end(*self._end_states[:1])
-        for joint in self._joints[: self.segments - 1]:
-            add_knot(*joint)
-        add_end(*self._end_states[1:])
-        band = count
-        for seam in self._joints[self.segments - 1 :]:
-            add_knot(*seam)
-        return _Layout(free, band, count + self.segments)
-
-    def _end_variables(
-        self, segment: int, first: int, state: EndState
-    ) -> list[tuple[Array, tuple[int, int]]]:
-        """Return the directions in which an end's data are free, each with its segment and row."""
-        orders = range(END_ORDER if state.leaves_attitude_free else JERK)
-        free: list[tuple[Array, tuple[int, int]]] = [
-            (axis, (segment, first + order))
-            for order in orders
-            if order not in state.asked
-            for axis in np.eye(3)
+        ends = [self._end_data(*end) for end in self._end_states] or [[], []]
+        knots = [_knot_data(*joint) for joint in self._joints]
+        inner, seam = knots[: self.segments - 1], knots[self.segments - 1 :]
+        in_band = [*ends[0], *chain(*inner), *ends[1]]
+        data = [*in_band, *chain(*seam)]
+        free = [
+            _Variable(segment, row, direction, column)
+            for column, (direction, places) in enumerate(data)
+            for segment, row in places
         ]
-        if state.leaves_attitude_free:
-            return free
-        along = self._thrust_direction(state)
-        if not self.still_ends:
-            free.append((along, (segment, first + JERK)))
-        if self._shared == END_ORDER:
-            free.append((along, (segment, first + SNAP)))
-        else:
-            free.extend((axis, (segment, first + SNAP)) for axis in np.eye(3))
-        return free
+        return _Layout(free, len(in_band), len(data) + self.segments)
+
+    def _end_data(self, segment: int, first: int, state: EndState) -> list[_FreeData]:
+        """Return the free data of an end, whose position is the row `first` of a segment's data."""
+        orders = END_ORDER if state.leaves_attitude_free else JERK
+        free = [(order, axis) for order in range(orders) if order not in state.asked for axis in np.eye(3)]
+        if not state.leaves_attitude_free:
+            along = self._thrust_direction(state)
+            free += [] if self.still_ends else [(JERK, along)]
+            free += [(SNAP, axis) for axis in ([along] if self._shared == END_ORDER else np.eye(3))]
+        return [(axis, [(segment, first + order)]) for order, axis in free]
 
     @cached_property
     def _arranged(self) -> tuple[Indices, Array]:
@@ -391,3 +366,11 @@ class Spline:
             effect[segment, row, :, place] += direction * self._sizes[row % END_ORDER]
         columns[:, -2], columns[:, -1] = self.ratio_columns, self.mean_column
         return columns, effect
+
+
+def _knot_data(before: int, after: int, shared: int) -> Iterator[_FreeData]:
+    """Yield the free data at the knot between two segments, the first `shared` derivatives in common."""
+    for order in range(END_ORDER):
+        sides = [(before, END_ORDER + order), (after, order)]
+        for places in [sides] if order < shared else [[side] for side in sides]:
+            yield from ((axis, places) for axis in np.eye(3))
