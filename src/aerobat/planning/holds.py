@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import wraps
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
@@ -29,30 +28,25 @@ from aerobat.vehicle import Vehicle
 P = TypeVar("P")
 
 
-def between_holds(method: PlanMethod[P]) -> PlanMethod[P]:
-    """Return a planner's method `plan`, extended to problems with holds: parts between holds are joined."""
-
-    @wraps(method)
-    def plan(
-        self: P, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
-    ) -> Plan:
-        if not any(stage.hold for stage in problem.stages(1.0).stages):
-            return method(self, problem, vehicle, progress)
-        planner = _without_start(self)
-        found: list[Plan | Stage] = []
-        heading = problem.heading.start
-        with within_time(getattr(self, "time_limit", None)):
-            for part in _parts(problem):
-                if isinstance(part, Stage):
-                    found.append(part)
-                    continue
-                each = method(planner, replace(part, heading=Heading(heading)), vehicle, progress)
-                found.append(each)
-                heading = heading if vehicle is None else _heading_at_end(each, vehicle)
-        joined = _joined(problem, found)
-        return joined if vehicle is None else joined.for_vehicle(vehicle)
-
-    return plan
+def between_holds(
+    method: PlanMethod[P], planner: P, problem: Problem, vehicle: Vehicle | None, progress: Progress | None
+) -> Plan:
+    """Return a problem's plan by a planner's method, which plans the parts between holds one by one."""
+    if not any(stage.hold for stage in problem.stages(1.0).stages):
+        return method(planner, problem, vehicle, progress)
+    of_part = _without_start(planner)
+    found: list[Plan | Stage] = []
+    heading = problem.heading.start
+    with within_time(getattr(planner, "time_limit", None)):
+        for part in _parts(problem):
+            if isinstance(part, Stage):
+                found.append(part)
+                continue
+            each = method(of_part, replace(part, heading=Heading(heading)), vehicle, progress)
+            found.append(each)
+            heading = heading if vehicle is None else _heading_at_end(each, vehicle)
+    joined = _joined(problem, found)
+    return joined if vehicle is None else joined.for_vehicle(vehicle)
 
 
 def _without_start(planner: P) -> P:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import wraps
 from typing import TypeVar
 
 import numpy as np
@@ -31,34 +30,29 @@ POSITION_TOLERANCE = 5e-3
 STEPS = 6  # steps of Newton's method for the time of crossing
 
 
-def through_moving_gates(method: PlanMethod[P]) -> PlanMethod[P]:
-    """Return a planner's method `plan`, extended to moving gates by fixed-point iteration."""
-
-    @wraps(method)
-    def plan(
-        self: P, problem: Problem, vehicle: Vehicle | None = None, progress: Progress | None = None
-    ) -> Plan:
-        moving = {gate.name: gate for gate in problem.gates if gate.motion is not None}
-        if not moving:
-            return method(self, problem, vehicle, progress)
-        _require_once(problem, moving)
-        gates, why = as_passed(problem.gates, ()), ""
-        with within_time(getattr(self, "time_limit", None)):
-            for _ in range(ROUNDS):
-                found = method(self, replace(problem, gates=gates), vehicle, progress)
-                planned, gates = gates, as_passed(problem.gates, found.stages)
-                if _farthest(planned, gates) < POSITION_TOLERANCE:
-                    crossing = _crossing(found, problem, moving)
-                    if crossing.certificate is None or crossing.certified:
-                        return crossing
-                    why = crossing.certificate.why
-        sentence = (
-            f"'{problem.name}' has no plan through its gates as they move: after {ROUNDS} rounds "
-            f"{why or 'they are not where they are planned when they are passed'}; let them move more slowly"
-        )
-        raise Infeasible(Reason(sentence, tuple(f"gate '{name}'" for name in moving)), found.attempts)
-
-    return plan
+def through_moving_gates(
+    method: PlanMethod[P], planner: P, problem: Problem, vehicle: Vehicle | None, progress: Progress | None
+) -> Plan:
+    """Return a problem's plan by a planner's method, through moving gates by fixed-point iteration."""
+    moving = {gate.name: gate for gate in problem.gates if gate.motion is not None}
+    if not moving:
+        return method(planner, problem, vehicle, progress)
+    _require_once(problem, moving)
+    gates, why = as_passed(problem.gates, ()), ""
+    with within_time(getattr(planner, "time_limit", None)):
+        for _ in range(ROUNDS):
+            found = method(planner, replace(problem, gates=gates), vehicle, progress)
+            planned, gates = gates, as_passed(problem.gates, found.stages)
+            if _farthest(planned, gates) < POSITION_TOLERANCE:
+                crossing = _crossing(found, problem, moving)
+                if crossing.certificate is None or crossing.certified:
+                    return crossing
+                why = crossing.certificate.why
+    sentence = (
+        f"'{problem.name}' has no plan through its gates as they move: after {ROUNDS} rounds "
+        f"{why or 'they are not where they are planned when they are passed'}; let them move more slowly"
+    )
+    raise Infeasible(Reason(sentence, tuple(f"gate '{name}'" for name in moving)), found.attempts)
 
 
 def _require_once(problem: Problem, moving: dict[str, Gate]) -> None:

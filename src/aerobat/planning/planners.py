@@ -10,7 +10,7 @@ import dataclasses
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
-from functools import wraps
+from functools import partial, wraps
 from types import MappingProxyType, ModuleType
 from typing import (
     Annotated,
@@ -239,7 +239,7 @@ def _for_all_problems(name: str, cls: type[P]) -> PlanMethod[P]:
     The method refuses closed courses if the planner does not know them. Linear algebra runs on one thread, as
     the matrices are small.
     """
-    planned = through_moving_gates(between_holds(cls.plan))
+    planned = partial(between_holds, cls.plan)
     knows_closed_courses = getattr(cls, "PLANS_CLOSED_COURSES", False)
 
     @wraps(cls.plan)
@@ -254,7 +254,7 @@ def _for_all_problems(name: str, cls: type[P]) -> PlanMethod[P]:
         from aerobat.optimization.threads import one_thread  # SciPy is imported when something is planned
 
         with one_thread():
-            return planned(self, problem, vehicle, progress)
+            return through_moving_gates(planned, self, problem, vehicle, progress)
 
     return plan
 
