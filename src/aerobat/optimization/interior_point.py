@@ -332,13 +332,8 @@ class _InteriorPoint:
     def _accepts(self, before: _Value, after: _Value, predicted: float, length: float) -> bool:
         """Return True where a step lowers the merit function enough (Armijo condition).
 
-        The weight of the violation is raised first where the predicted decrease needs it.
-
-        Args:
-            before: Violation and barrier function at the start of the step.
-            after: Violation and barrier function at its end.
-            predicted: Predicted change of the barrier function for a whole step.
-            length: Length of the step, 1 for a whole one.
+        The weight of the violation is raised first where the `predicted` change of the barrier function, for
+        a whole step of length 1, needs it.
         """
         if predicted > 0.0 and before.violation > 0.0:
             least = predicted / (_PENALTY_FRACTION * before.violation)
@@ -363,16 +358,7 @@ class _InteriorPoint:
         step: _Step,
         predicted: float,
     ) -> tuple[_Step, float, _Trial] | None:
-        """Return a step with second-order correction if it is accepted, else None.
-
-        Args:
-            at: The start of the step.
-            equations: The linear equations of the step.
-            trial: The rejected trial point of the step.
-            before: Violation and barrier function at the start.
-            step: The step to correct.
-            predicted: Predicted change of the barrier function for the step.
-        """
+        """Return a rejected step with second-order correction; None where that is rejected, too."""
         longest = length = self._longest(at, step)
         residual, equal = at.point.inequalities + at.slacks, at.point.equalities
         violation = np.inf

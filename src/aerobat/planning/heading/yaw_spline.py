@@ -55,8 +55,8 @@ class YawSpline:
 
     def with_yaw(self, variables: Array) -> Trajectory:
         """Return the path with the yaw that variables (3 (n + 1),) at all knots give."""
-        path = self.cut_path
-        yaw = (self._blocks @ self._own(variables))[..., 0]
+        path, knots = self.cut_path, variables.reshape(-1, PER_KNOT)
+        yaw = (self._blocks @ np.concatenate([knots[:-1], knots[1:]], axis=1)[..., None])[..., 0]
         return Trajectory(path.durations, path.coefficients, path.heading, yaw)
 
     def times(self, s: Array) -> Array:
@@ -79,8 +79,3 @@ class YawSpline:
         """The matrices from each part's variables to its coefficients, (n, 6, 6)."""
         scale = np.tile((self.seconds[:, None] / KNOT_STEP) ** np.arange(PER_KNOT), 2)
         return np.asarray(HERMITE * scale[:, None])
-
-    def _own(self, variables: Array) -> Array:
-        """Return the variables of each part, (n, 6, 1)."""
-        knots = variables.reshape(-1, PER_KNOT)
-        return np.concatenate([knots[:-1], knots[1:]], axis=1)[..., None]
