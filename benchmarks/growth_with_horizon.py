@@ -17,6 +17,7 @@ import numpy as np
 
 from aerobat.errors import AerobatError
 from aerobat.optimization import AssignmentProgram, solver
+from aerobat.optimization.deadline import within_time
 from paper_programs import paper_program
 
 INTERVALS = (20, 40, 80, 160)
@@ -54,7 +55,8 @@ def builtin(program: AssignmentProgram, runs: int) -> tuple[int, float, float]:
 
 def other(name: str, program: AssignmentProgram, limit: float) -> str:
     try:
-        result = solver(name).solve(program, time_limit=limit)
+        with within_time(limit):
+            result = solver(name).solve(program)
     except AerobatError:
         return f"{name}: beyond the licence"
     return f"{name}: {result.time:.2f} s, {result.status}"

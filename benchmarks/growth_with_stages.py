@@ -21,6 +21,7 @@ import numpy as np
 
 from aerobat.errors import AerobatError
 from aerobat.optimization import AssignmentProgram, solver
+from aerobat.optimization.deadline import within_time
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.task import Task
 from aerobat.problem import CustomManeuver, load_problem
@@ -66,7 +67,8 @@ def others(limit: float) -> None:
     short = flips(2, 16, 4.0)
     for name in ("builtin", "gurobi", "scip"):
         try:
-            result = solver(name).solve(short, time_limit=limit)
+            with within_time(limit):
+                result = solver(name).solve(short)
         except AerobatError as error:
             print(f"{name}: {error}")
             continue

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from aerobat.arrays import Array, frozen, frozen_bounds
 from aerobat.errors import SpecError
-from aerobat.optimization.deadline import shorter, time_left, wall, work
+from aerobat.optimization.deadline import time_left, wall, work
 
 _WARM = {
     "ipopt.warm_start_init_point": "yes",
@@ -136,7 +136,6 @@ def solve_nonlinear(
     tolerance: float = 1e-8,
     initial_barrier: float | None = None,
     multipliers: tuple[Array, Array] | None = None,
-    time_limit: float | None = None,
     exact_hessian: bool = True,
     options: Mapping[str, Any] = MappingProxyType({}),
 ) -> NonlinearResult:
@@ -150,7 +149,6 @@ def solve_nonlinear(
         initial_barrier: the first barrier parameter; None is IPOPT's 0.1, and 1e-4 or less keeps a start that
             is nearly optimal.
         multipliers: of a result near the start, which with a small first barrier parameter saves iterations.
-        time_limit: [s]; None sets no limit.
         exact_hessian: False has the Hessian built up by BFGS updates.
         options: of IPOPT beside these, by their names.
 
@@ -162,7 +160,7 @@ def solve_nonlinear(
     settings: dict[str, Any] = {**_OPTIONS, "ipopt.max_iter": max_iterations, "ipopt.tol": tolerance}
     settings |= program.derivatives
     settings |= {f"ipopt.{name}": value for name, value in options.items()}
-    if (limit := shorter(time_limit, wall)) is not None:
+    if (limit := time_left(wall)) is not None:
         settings["ipopt.max_wall_time"] = max(limit, _SHORTEST)
     if (limit := time_left(work)) is not None:
         settings["ipopt.max_cpu_time"] = max(limit, _SHORTEST)

@@ -271,14 +271,16 @@ def test_the_same_program_has_the_same_answer_twice() -> None:
 
 @pytest.mark.parametrize("backend", ["builtin", "gurobi", "scip"])
 def test_without_any_time_nothing_is_claimed(backend: str) -> None:
-    result = solver(backend).solve(flip(FLIP_ROLL), time_limit=0.0)
+    with deadline.within_time(0.0):
+        result = solver(backend).solve(flip(FLIP_ROLL))
     assert (result.status, result.x, result.gap) == ("unknown", None, inf)
     assert result.bound <= 273196.13
 
 
 def test_without_time_a_start_is_still_a_solution_with_its_gap() -> None:
     start, best = (7, 6, 10, 13, 5), 273196.1243
-    result = solver().solve(flip(FLIP_ROLL), time_limit=0.0, start=start)
+    with deadline.within_time(0.0):
+        result = solver().solve(flip(FLIP_ROLL), start=start)
     assert (result.status, result.slots) == ("time_limit", start)
     assert result.bound <= best <= result.cost
     assert result.gap == pytest.approx((result.cost - result.bound) / result.cost)
@@ -290,7 +292,8 @@ def test_when_time_runs_out_the_optimum_is_between_bound_and_cost(
 ) -> None:
     clock = count()
     monkeypatch.setattr(deadline, "clock", lambda: float(next(clock)))
-    result = solver().solve(flip(FLIP_ROLL), time_limit=ticks)
+    with deadline.within_time(ticks):
+        result = solver().solve(flip(FLIP_ROLL))
     assert result.bound * (1 - 1e-9) <= 273196.1243 <= result.cost * (1 + 1e-9)
     assert result.status in ({"optimal"} if result.gap < 1e-9 else {"time_limit", "unknown"})
     assert (result.x is not None) == (ticks > 6)  # one dive down four stages

@@ -6,6 +6,7 @@ import pytest
 
 from aerobat.errors import Infeasible
 from aerobat.optimization import solver
+from aerobat.optimization.deadline import within_time
 from aerobat.planning import Miqp, plan
 from aerobat.planning.miqp.miqp import formulate
 from aerobat.planning.task import Task
@@ -28,7 +29,8 @@ def test_gurobi_finds_what_the_built_in_search_finds(name: str, order: int) -> N
     own = plan(problem, Miqp(order=order), vehicle=None)
     program = formulate(Task.of(problem), order, 20).program(own.dt)
     exact = solver("builtin").solve(program)
-    found = solver("gurobi").solve(program, time_limit=60.0)
+    with within_time(60.0):
+        found = solver("gurobi").solve(program)
     assert found.x is not None
     assert exact.x is not None
     assert found.cost == pytest.approx(exact.cost, rel=1e-3)

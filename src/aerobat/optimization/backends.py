@@ -26,18 +26,14 @@ class Solver(Protocol):
     extra: ClassVar[str | None]
 
     def solve(
-        self,
-        program: AssignmentProgram,
-        *,
-        time_limit: float | None = None,
-        node_limit: int | None = None,
-        start: Sequence[int] | None = None,
+        self, program: AssignmentProgram, *, node_limit: int | None = None, start: Sequence[int] | None = None
     ) -> AssignmentResult:
-        """Return the assignment of minimum cost, or the best one found within the limits.
+        """Return the assignment of minimum cost, or the best one found by a deadline or the node limit.
+
+        The deadline is that of `deadline.within_time`.
 
         Args:
             program: the program to solve.
-            time_limit: limit of the time [s]; None sets no limit.
             node_limit: limit of the solved relaxations, as the solver counts them; None sets no limit.
             start: one slot for each stage, an assignment that may be good; SCIP only checks its length.
 

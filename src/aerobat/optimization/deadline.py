@@ -80,9 +80,3 @@ def time_left(*clocks: Clock) -> float | None:
 def out_of_time(*clocks: Clock) -> bool:
     """Return True after a deadline by one of some clocks (default: all)."""
     return time_left(*clocks) == 0.0
-
-
-def shorter(limit: float | None, *clocks: Clock) -> float | None:
-    """Return the shorter of a solver's own limit [s] and the time left; None where there is neither."""
-    limits = [each for each in (limit, time_left(*clocks)) if each is not None]
-    return min(limits, default=None)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from aerobat.errors import AerobatError
 from aerobat.optimization import big_m
 from aerobat.optimization.assignment import AssignmentProgram
-from aerobat.optimization.deadline import shorter
+from aerobat.optimization.deadline import time_left
 from aerobat.optimization.result import AssignmentResult, Status
 
 _TOO_LARGE = 10010  # Gurobi's error number for a model beyond the size of the licence
@@ -28,12 +28,7 @@ class Gurobi:
     free_variables: ClassVar[int] = 200  # with a quadratic objective
 
     def solve(
-        self,
-        program: AssignmentProgram,
-        *,
-        time_limit: float | None = None,
-        node_limit: int | None = None,
-        start: Sequence[int] | None = None,
+        self, program: AssignmentProgram, *, node_limit: int | None = None, start: Sequence[int] | None = None
     ) -> AssignmentResult:
         """Solve as `Solver.solve` does. The result's time is Gurobi's own Runtime.
 
@@ -52,7 +47,7 @@ class Gurobi:
                 env.start()
                 with gurobipy.Model(env=env) as model:
                     model.Params.FeasibilityTol = model.Params.IntFeasTol = model.Params.MIPGap = 1e-9
-                    limit = shorter(time_limit)
+                    limit = time_left()
                     model.Params.TimeLimit = inf if limit is None else limit
                     model.Params.NodeLimit = inf if node_limit is None else node_limit
                     claim = _claim(gurobipy, model, scaling.program, start)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from aerobat.optimization import big_m
 from aerobat.optimization.assignment import AssignmentProgram
-from aerobat.optimization.deadline import shorter
+from aerobat.optimization.deadline import time_left
 from aerobat.optimization.result import AssignmentResult, Status
 
 _MEANING: dict[str, Status] = {"optimal": "optimal", "infeasible": "infeasible"}
@@ -22,12 +22,7 @@ class Scip:
     extra: ClassVar[str | None] = "scip"
 
     def solve(
-        self,
-        program: AssignmentProgram,
-        *,
-        time_limit: float | None = None,
-        node_limit: int | None = None,
-        start: Sequence[int] | None = None,
+        self, program: AssignmentProgram, *, node_limit: int | None = None, start: Sequence[int] | None = None
     ) -> AssignmentResult:
         """Solve as `Solver.solve` does. The result's time is SCIP's own.
 
@@ -38,7 +33,7 @@ class Scip:
         program.check_start(start)
         model = pyscipopt.Model()
         model.hideOutput()
-        if (limit := shorter(time_limit)) is not None:
+        if (limit := time_left()) is not None:
             model.setParam("limits/time", limit)
         if node_limit is not None:
             model.setParam("limits/nodes", node_limit)
