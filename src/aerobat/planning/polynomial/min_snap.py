@@ -81,12 +81,10 @@ class MinSnap(Planner):
         """
         planning = _Planning(self, problem, vehicle, Recorder(progress))
         first = float(planning.durations.sum())
+        search = GridSearch(first, first, 1) if vehicle is None else self._search(planning.scaling, first)
 
         def shortest() -> Plan | None:
-            if vehicle is None:
-                found = planning.attempt(first)
-            else:
-                found = self._search(planning.scaling, first).smallest(planning.attempt)
+            found = search.smallest(planning.attempt)
             return None if found is None else planning.result(found)
 
         plan = best_in_time(problem, self.time_limit, planning.recorder, shortest)
