@@ -215,22 +215,16 @@ class Formulation:
         return stage.slots(self.chain.intervals)
 
     @cached_property
-    def _stage_rows(self) -> tuple[Indices, ...]:
-        """The indices of the rows of each stage's conditions, (slots, conditions)."""
-        index = {row: i for i, row in enumerate(self._rows)}
-        tables = (
-            [[index[self._row(c, n)] for c in stage.conditions] for n in self._slots(stage)]
-            for stage in self.sequence.stages
-        )
-        return tuple(np.array(table, dtype=np.intp) for table in tables)
-
-    @cached_property
-    def _stage_bounds(self) -> tuple[Array, ...]:
-        """The bounds of each stage's conditions in SI units, (conditions, 2)."""
-        bounds = ([c.bound(self.task.balance) for c in stage.conditions] for stage in self.sequence.stages)
-        return tuple(np.array([b.limits for b in stage]).reshape(-1, 2) for stage in bounds)
+    def _stage_rows(self) -> tuple[tuple[Indices, Array], ...]:
+        """The rows of each stage's conditions (slots, conditions), and their SI bounds (conditions, 2)."""
+        index, found = {row: i for i, row in enumerate(self._rows)}, list[tuple[Indices, Array]]()
+        for stage in self.sequence.stages:
+            rows = [[index[self._row(c, n)] for c in stage.conditions] for n in self._slots(stage)]
+            bounds = [c.bound(self.task.balance).limits for c in stage.conditions]
+            found.append((np.array(rows, dtype=np.intp), np.array(bounds).reshape(-1, 2)))
+        return tuple(found)
 
     def _assigned(self, i: int, scale: Array, free: Array) -> SlottedStage:
-        stage, rows, bounds = self.sequence.stages[i], self._stage_rows[i], self._stage_bounds[i]
+        stage, (rows, bounds) = self.sequence.stages[i], self._stage_rows[i]
         lower, upper = (bounds[:, side] * scale[rows] - free[rows] for side in (0, 1))
         return SlottedStage(stage.name, tuple(self._slots(stage)), rows, lower, upper)
