@@ -81,7 +81,8 @@ class MultiStart:
         found = best_in_time(task.problem, time_limit, recorder, self._fastest)
         if found is not None:
             return found
-        last = recorder.last_outcome
+        made = recorder.attempts
+        last = made[-1].outcome if made else "no path to begin from was found"
         is_closed = len(task.environment.pieces) and next(guesses(task), None) is None
         where = "between obstacles no way was found, and " if is_closed else ""
         sentence = (
@@ -89,7 +90,7 @@ class MultiStart:
             f"attempt {last}, which does not prove that there is none; widen what binds there, or give other "
             f"--segments{', or take --planner time-optimal' * (self.planner == 'free-knots')}"
         )
-        raise Infeasible(Reason(sentence, limits_of(last)), recorder.attempts)
+        raise Infeasible(Reason(sentence, limits_of(last)), made)
 
     @property
     def _task(self) -> Task:

@@ -31,11 +31,6 @@ class Recorder:
     progress: Progress | None = None
     attempts: list[Attempt] = field(default_factory=list)
 
-    @property
-    def last_outcome(self) -> str:
-        """The outcome of the last attempt, or a sentence that there was none."""
-        return self.attempts[-1].outcome if self.attempts else "no path to begin from was found"
-
     def record(self, attempt: Attempt) -> None:
         """Record an attempt and report it."""
         self.attempts.append(attempt)

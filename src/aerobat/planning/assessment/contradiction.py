@@ -15,7 +15,7 @@ import numpy as np
 from aerobat.flatness import force_balance
 from aerobat.limits.box import FIELDS, field_with_value
 from aerobat.optimization import AssignmentProgram, solver
-from aerobat.problem.condition import Attitude, Condition, LinearBound, Quantity
+from aerobat.problem.condition import Condition, LinearBound, Quantity
 from aerobat.problem.limits import Limits
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
@@ -47,16 +47,12 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
         if bounds and not is_possible(bounds, problem.path_limits):
             return _contradiction(stage, bounds, problem.path_limits)
         if stage.attitude is not None:
-            tilt, tolerance = _tilt(stage.attitude), stage.attitude.tolerance
+            tilt = float(np.arccos(np.clip(stage.attitude.up[2], -1.0, 1.0)))  # without the tolerance
+            tolerance = stage.attitude.tolerance
             if tilt - tolerance > problem.limits.max_tilt + ROUNDING:
                 sentence = _tilt_sentence(stage.name, tilt, tolerance, problem.limits.max_tilt)
                 return Contradiction(stage.name, ("limits.max_tilt",), sentence)
     return None
-
-
-def _tilt(attitude: Attitude) -> float:
-    """Return the tilt of an attitude without its tolerance [rad]."""
-    return float(np.arccos(np.clip(attitude.up[2], -1.0, 1.0)))
 
 
 def _tilt_sentence(stage: str, tilt: float, tolerance: float, most: float) -> str:

@@ -113,12 +113,6 @@ class _Place:
     velocity: float = 0.0  # [m/s]
     is_passed: bool = False  # whether the velocity there is free, as at a goal with free velocity
 
-    @classmethod
-    def of_end(cls, end: EndState, direction: Array) -> _Place:
-        """Return the position at which a motion begins or ends."""
-        position, velocity = (float(vector @ direction) for vector in (end.position, end.velocity))
-        return cls(0, position, velocity, end.free_velocity)
-
 
 @dataclass(frozen=True)
 class _Line:
@@ -141,7 +135,10 @@ class _Line:
         crossed = np.flatnonzero(direction)
         speeds = np.asarray(problem.limits.velocity)[crossed]
         places = [_places(stage, direction) for stage in sequence.stages]
-        ends = [(_Place.of_end(end, direction),) for end in problem.ends.values()]
+        ends = [
+            (_Place(0, float(end.position @ direction), float(end.velocity @ direction), end.free_velocity),)
+            for end in problem.ends.values()
+        ]
         return cls(
             groups=(ends[0], *places, ends[1]) if ends else tuple(places),
             ordered=sequence.ordered,

@@ -124,8 +124,9 @@ def heading_error(plan: Plan) -> HeadingError | None:
 
 def _turned(plan: Plan, spline: YawSpline, variables: Array) -> Plan:
     """Return the plan with a yaw; the path gets the yaw's knots, too."""
-    parts, is_cut = spline.last_parts, len(spline.seconds) > plan.trajectory.segments
-    stages = tuple(replace(stage, interval=int(parts[stage.interval])) for stage in plan.stages)
+    last_parts = np.flatnonzero(np.diff(spline.parts.interval, append=-1)).tolist()  # of each segment
+    is_cut = len(spline.seconds) > plan.trajectory.segments
+    stages = tuple(replace(stage, interval=last_parts[stage.interval]) for stage in plan.stages)
     dt = None if is_cut else plan.dt
     return replace(plan, trajectory=spline.with_yaw(variables), stages=stages, dt=dt)
 

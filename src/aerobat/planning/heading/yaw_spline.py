@@ -7,7 +7,6 @@ from functools import cached_property
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerobat.arrays import Array
 from aerobat.trajectory import Trajectory, polynomial
@@ -47,11 +46,6 @@ class YawSpline:
         whole = self.path.coefficients[self.parts.interval]
         coefficients = polynomial.restricted(whole, self.parts.start, self.parts.length)
         return Trajectory(self.seconds, coefficients, self.path.heading)
-
-    @property
-    def last_parts(self) -> NDArray[np.intp]:
-        """The last part of each segment of the path, (S,)."""
-        return np.flatnonzero(np.diff(self.parts.interval, append=-1))
 
     def with_yaw(self, variables: Array) -> Trajectory:
         """Return the path with the yaw that variables (3 (n + 1),) at all knots give."""

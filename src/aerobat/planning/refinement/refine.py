@@ -413,7 +413,8 @@ class Rounds:
         self._max_places, self._last_violation = self._fractions.shape[1] + MAX_ADDED_PLACES, np.inf
         self._radius, self._stretch = radius, stretch
         trajectory = guess.trajectory
-        self._segments = tuple(_segment_that_ends(trajectory, time) for time in guess.times)
+        away = (np.abs(trajectory.knots[1:] - time) for time in guess.times)  # of segments' ends from stages
+        self._segments = tuple(int(np.argmin(each)) for each in away)
         kept = limits.reserve + BACKOFF
         self._backoff = np.tile(kept, (trajectory.segments, 1))
         self._multipliers = multipliers
@@ -577,8 +578,3 @@ def _with_exact_equalities(program: RefinementProgram, answer: InteriorPointResu
             break
         x = x - np.linalg.lstsq(rows, values, rcond=None)[0]
     return np.asarray(x)
-
-
-def _segment_that_ends(trajectory: Trajectory, time: float) -> int:
-    """Return the segment whose end is nearest to a stage's time."""
-    return int(np.argmin(np.abs(trajectory.knots[1:] - time)))
