@@ -25,7 +25,14 @@ from aerobat.planning.miqp.miqp import Miqp
 from aerobat.planning.polynomial.closed_forms import SLOWER_PACES, closed_forms
 from aerobat.planning.polynomial.starts import starts
 from aerobat.planning.refinement.flown import FlownPath
-from aerobat.planning.refinement.refine import MAX_SEGMENTS, SEGMENTS, RefinedPath, Refinement, segments_for
+from aerobat.planning.refinement.refine import (
+    LEG_SEGMENTS,
+    MAX_SEGMENTS,
+    SEGMENTS,
+    RefinedPath,
+    Refinement,
+    segments_for,
+)
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
 from aerobat.planning.time_limit import best_in_time
@@ -60,12 +67,16 @@ class MultiStart:
 
     planner: str
     refinement: Refinement
-    starts: int  # number of starts tried together; on a course one at a time, until one is clear of frames
     segments: int  # largest number of a path's segments, but at least one a phase between stages
-    leg_segments: int  # largest number of segments of a course's leg
     start: Plan | None  # a plan whose path is tried alone, before the other starts
-    guess: Miqp  # the planner whose plan is one of the starts
-    finalists: int  # number of fastest rough paths that get twice as many segments; one then gets four times
+    # Number of starts tried together; on a course one at a time, until one is clear of frames. Eight, with
+    # twice as many segments, gain 0.3 % at the median of 300 random problems, in twice the time.
+    starts: int = 3
+    # Number of fastest rough paths that get twice as many segments; one then gets four times. Three of them
+    # gain 0.1 % on average of 91 random problems, in a third more time.
+    finalists: int = 1
+    leg_segments: int = LEG_SEGMENTS  # largest number of segments of a course's leg
+    guess: Miqp = field(default_factory=quick_guess)  # the planner whose plan is one of the starts
     _given_up: dict[WarmStart, None] = field(default_factory=dict, init=False, repr=False)  # starts, in order
 
     def plan(self, time_limit: float | None) -> Plan:

@@ -70,10 +70,10 @@ class TimeOptimal(Planner):
         return MultiStart(
             planner="time-optimal",
             refinement=replace(refinement, high_accuracy=is_course(task.stages)),
-            starts=self.starts,
             segments=self.segments,
-            leg_segments=LEG_SEGMENTS,
             start=self.start,
-            guess=self.guess,
+            starts=self.starts,
             finalists=FINALISTS,
+            leg_segments=LEG_SEGMENTS,
+            guess=self.guess,
         ).plan(self.time_limit)
