@@ -67,18 +67,14 @@ def _quickly_refined(
     known: dict[float, Refinement] = {}  # by clearance, so that each is compiled once
     for guess in batch:
         own = known.setdefault(guess.task.clearance, replace(refinement, task=guess.task))
-        count = _segments(guess.path, segments)
+        path = guess.path.trajectory
+        count = min(max(segments, path.segments, ceil(path.duration / LONGEST)), MAX_SEGMENTS)
         start = _start_path(refinement, guess, segments, stretch)
-        path = _quick(own, start, segments, stretch) if count < LONG else own.rough(start, count)
-        if own.is_promising(path):
-            yield _Rough(own, path)
+        rough = _quick(own, start, segments, stretch) if count < LONG else own.rough(start, count)
+        if own.is_promising(rough):
+            yield _Rough(own, rough)
         if out_of_time():
             return
-
-
-def _segments(guess: WarmStart, segments: int) -> int:
-    start = guess.trajectory
-    return min(max(segments, start.segments, ceil(start.duration / LONGEST)), MAX_SEGMENTS)
 
 
 def _quick(refinement: Refinement, guess: WarmStart, segments: int, stretch: float) -> RefinedPath:
