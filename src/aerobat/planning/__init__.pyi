@@ -1,78 +1,45 @@
-from .assessment.assessment import Assessment, PositionRange, SecondOpinion
-from .assessment.lower_bound import least_duration
-from .certified_solve import Judged, Solution, certified_solve
-from .evidence import Evidence
-from .flyability import FLYABLE_ERROR, FlownPassage, Flyability, OwnFlight, nominal_flight, own_flight
-from .miqp.miqp import Miqp
-from .passages import PlacedStage, planned_passages, planned_waypoints
-from .planners import (
-    Planner,
-    PlannerOption,
-    as_planner,
-    command_settings,
-    option,
-    plan,
-    planner,
-    planner_class,
-    planner_for,
-    planner_options,
-    registered_planners,
-    suited_planner,
-)
-from .polynomial.free_knots import FreeKnots
-from .polynomial.min_snap import MinSnap, TimeScaling
-from .recorder import Attempt, Recorder
-from .result import Plan, load_plan
-from .rotor_margin import RotorMargin
-from .search import BisectionSearch, GridSearch
-from .second_opinion import with_explanation, with_recoveries, with_second_opinion
-from .time_optimal import TimeOptimal
-from .tube import Tube
-
-__all__ = [
-    "FLYABLE_ERROR",
-    "Assessment",
-    "Attempt",
-    "BisectionSearch",
-    "Evidence",
-    "FlownPassage",
-    "Flyability",
-    "FreeKnots",
-    "GridSearch",
-    "Judged",
-    "MinSnap",
-    "Miqp",
-    "OwnFlight",
-    "PlacedStage",
-    "Plan",
-    "Planner",
-    "PlannerOption",
-    "PositionRange",
-    "Recorder",
-    "RotorMargin",
-    "SecondOpinion",
-    "Solution",
-    "TimeOptimal",
-    "TimeScaling",
-    "Tube",
-    "as_planner",
-    "certified_solve",
-    "command_settings",
-    "least_duration",
-    "load_plan",
-    "nominal_flight",
-    "option",
-    "own_flight",
-    "plan",
-    "planned_passages",
-    "planned_waypoints",
-    "planner",
-    "planner_class",
-    "planner_for",
-    "planner_options",
-    "registered_planners",
-    "suited_planner",
-    "with_explanation",
-    "with_recoveries",
-    "with_second_opinion",
-]
+from .assessment.assessment import Assessment as Assessment
+from .assessment.assessment import PositionRange as PositionRange
+from .assessment.assessment import SecondOpinion as SecondOpinion
+from .assessment.lower_bound import least_duration as least_duration
+from .certified_solve import Judged as Judged
+from .certified_solve import Solution as Solution
+from .certified_solve import certified_solve as certified_solve
+from .evidence import Evidence as Evidence
+from .flyability import FLYABLE_ERROR as FLYABLE_ERROR
+from .flyability import FlownPassage as FlownPassage
+from .flyability import Flyability as Flyability
+from .flyability import OwnFlight as OwnFlight
+from .flyability import nominal_flight as nominal_flight
+from .flyability import own_flight as own_flight
+from .miqp.miqp import Miqp as Miqp
+from .passages import PlacedStage as PlacedStage
+from .passages import planned_passages as planned_passages
+from .passages import planned_waypoints as planned_waypoints
+from .planners import Planner as Planner
+from .planners import PlannerOption as PlannerOption
+from .planners import as_planner as as_planner
+from .planners import command_settings as command_settings
+from .planners import option as option
+from .planners import plan as plan
+from .planners import planner as planner
+from .planners import planner_class as planner_class
+from .planners import planner_for as planner_for
+from .planners import planner_options as planner_options
+from .planners import registered_planners as registered_planners
+from .planners import suited_planner as suited_planner
+from .polynomial.free_knots import FreeKnots as FreeKnots
+from .polynomial.min_snap import MinSnap as MinSnap
+from .polynomial.min_snap import TimeScaling as TimeScaling
+from .recorder import Attempt as Attempt
+from .recorder import Recorder as Recorder
+from .result import Plan as Plan
+from .result import load_plan as load_plan
+from .rotor_margin import RotorMargin as RotorMargin
+from .search import BisectionSearch as BisectionSearch
+from .search import GridSearch as GridSearch
+from .second_opinion import with_explanation as with_explanation
+from .second_opinion import with_recoveries as with_recoveries
+from .second_opinion import with_second_opinion as with_second_opinion
+from .time_optimal import TimeOptimal as TimeOptimal
+from .tube import Tube as Tube

@@ -3,6 +3,4 @@
 Other packages use only `BranchAndBound`; the modules of this folder are private.
 """
 
-from aerobat.optimization.branch_and_bound.solver import BranchAndBound
-
-__all__ = ["BranchAndBound"]
+from aerobat.optimization.branch_and_bound.solver import BranchAndBound as BranchAndBound
