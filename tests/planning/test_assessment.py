@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 from math import cos, radians, sin
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -108,6 +109,22 @@ def test_a_line_that_takes_twice_the_time_it_need_says_so_and_names_what_does_be
     assert found.assessment.opinion.duration < found.duration / 2.0
     assert str(found.assessment).startswith("poor: ")
     assert f"{found.assessment.opinion.duration:.3f} s ({found.assessment.opinion.options})" in str(found)
+
+
+def test_a_plan_that_takes_long_for_its_reserve_is_not_poor(tmp_path: Path) -> None:
+    found = along([(0.0, 0.0, 1.0), (2.0, 0.0, 1.0), (4.0, 0.0, 1.0)], duration=1.41)
+    with_reserve = replace(found, reserve=0.265)
+    assert with_reserve.keeps(0.265)
+    with_reserve.save(tmp_path / "reserve.plan")
+    told = with_second_opinion(ab.load_plan(tmp_path / "reserve.plan")).assessment
+    assert not told.poor
+    assert told.opinion.options == "--planner free-knots --reserve 0.265"
+    assert f"; free-knots finds {told.opinion.duration:.3f} s (" in str(told)
+
+
+def test_a_plan_tells_the_reserve_that_its_planner_was_to_keep() -> None:
+    assert line().reserve == 0.15
+    assert ab.plan(LINE, ab.MinSnap(), QUAD).reserve == 0.0
 
 
 @pytest.mark.parametrize("fraction", [0.5, 0.9])

@@ -117,3 +117,16 @@ def test_the_sentence_counts_both_plans_of_all_their_flights():
         for count in (2, 3)
     )
     assert _explained(few, many).rescue.endswith(": 2 of 2 flights succeed instead of 3 of 3")
+
+
+def test_a_plan_that_is_longer_so_that_flights_succeed_wants_no_second_opinion():
+    plan = ab.plan("line", PLANNER, "agile-quad")
+    path = replace(plan.trajectory, durations=3.0 * plan.trajectory.durations)
+    slow = replace(plan, trajectory=path)
+    assert slow.wants_second_opinion
+    scores = ab.score_flights(plan, conditions="lab", flights=range(2))
+    first, longer = (FlownPlan(each, scores, FLYING_RESERVE, plan.problem) for each in (plan, slow))
+    found = _explained(longer, first)
+    assert not found.wants_second_opinion
+    told = found.assessment.sentence
+    assert told.endswith("; no second opinion: it is longer so that more flights succeed")

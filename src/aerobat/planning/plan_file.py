@@ -40,7 +40,7 @@ from aerobat.trajectory.files import arrays_of, trajectory_in
 from aerobat.vehicle import Vehicle
 
 FORMAT = "aerobat-plan-1"  # gets another number where content is removed or changes its meaning
-REVISION = 6  # of the format: increased by one where content is added
+REVISION = 7  # of the format: increased by one where content is added
 RECOMPUTED = {"certificate", "flyability", "assessment"}  # computed from a plan's path, never read
 ON_REQUEST = {"recoveries", "opinion", "tube"}  # take seconds, read from files with a digest only
 MAX_EVIDENCE = 2**23  # largest document [bytes]; a plan through twenty gates has some hundred thousand
@@ -74,6 +74,7 @@ class PlanRecord:
     starts: tuple[float, ...] = ()
     tube: Tube | None = None
     opinion: SecondOpinion | None = None
+    reserve: float = 0.0
 
 
 def write_plan_file(

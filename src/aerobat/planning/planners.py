@@ -254,7 +254,9 @@ def _for_all_problems(name: str, cls: type[P]) -> PlanMethod[P]:
         from aerobat.optimization.threads import one_thread  # SciPy is imported when something is planned
 
         with one_thread():
-            return through_moving_gates(planned, self, problem, vehicle, progress)
+            found = through_moving_gates(planned, self, problem, vehicle, progress)
+        asked = getattr(self, "reserve", 0.0)
+        return dataclasses.replace(found, reserve=asked) if asked and isinstance(found, Plan) else found
 
     return plan
 

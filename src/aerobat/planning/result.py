@@ -53,6 +53,7 @@ class Plan:
     opinion: SecondOpinion | None = None  # another planner's answer; None where not asked
     rescue: str = ""  # how the plan was found, where the requested settings found none
     starts: tuple[float, ...] = ()  # [s] durations of the rough paths from several starts, ascending
+    reserve: float = 0.0  # fraction of every limit's range that its planner was to keep from either end
     tube: Tube | None = None  # of simulated flights, where the plan was tightened until they pass
     evidence: Evidence | None = None  # for the plan's own path, vehicle and stages; None without a vehicle
 
@@ -197,6 +198,11 @@ class Plan:
             f"{self.problem.name}: {self.duration:.3f} s in {self.pieces}{dt}, {self.status} by "
             f"{self.planner}{backend}; {stages}{margin}{proof}{flown}{given_up}{assessed}{rescue}{tube}"
         )
+
+
+def reserve_kept(found: Plan, asked: float) -> float:
+    """Return the reserve that a plan keeps: what was asked, the part that fallbacks keep of it, or none."""
+    return next((part * asked for part in (1.0, KEPT_PART) if found.keeps(part * asked)), 0.0)
 
 
 P = TypeVar("P")

@@ -11,11 +11,11 @@ from aerobat.optimization.deadline import out_of_time, within_time
 from aerobat.planning.assessment.assessment import SecondOpinion
 from aerobat.planning.planners import planner_class
 from aerobat.planning.recorder import Progress
-from aerobat.planning.result import Plan
+from aerobat.planning.result import FLYING_RESERVE, Plan, reserve_kept
 from aerobat.simulation.autopilot import UndeterminedAttitude, recoveries
 
 OPINION = "free-knots"  # the planner that gives second opinions
-OPINION_RESERVE = 0.03  # reserve of its plan, as a fraction of limits' ranges: enough for small disturbances
+OPINION_RESERVE = 0.03  # least reserve of its plan, as a fraction of limits' ranges, for small disturbances
 OPINION_TIME = 20.0  # time limit [s]: from a poor plan of a long course, free-knots would take an hour
 
 
@@ -23,9 +23,10 @@ OPINION_TIME = 20.0  # time limit [s]: from a poor plan of a long course, free-k
 def with_second_opinion(plan: Plan, progress: Progress | None = None) -> Plan:
     """Return the plan, with the answer of free-knots to the same problem if the plan is suspicious.
 
-    The planner free-knots starts from the plan. It takes seconds, OPINION_TIME at most, and no more than is
-    left of a time limit (`optimization.deadline.within_time`); the best plan by then counts. Plans of
-    time-optimal, and plans that a time limit ended, get no second opinion.
+    The planner free-knots starts from the plan, and keeps as much reserve as the plan was to keep. It takes
+    seconds, OPINION_TIME at most, and no more than is left of a time limit
+    (`optimization.deadline.within_time`); the best plan by then counts. Plans of time-optimal, and plans
+    that a time limit ended, get no second opinion.
     Raises SpecError without a vehicle.
 
     Args:
@@ -68,7 +69,8 @@ def with_explanation(plan: Plan, progress: Progress | None = None) -> Plan:
 def _second_opinion(plan: Plan, progress: Progress | None) -> SecondOpinion:
     """Return the second opinion, with the duration of a shorter plan that is certified and flies, if any."""
     free_knots: Any = planner_class(OPINION)
-    planner, shorter = free_knots(start=plan, reserve=OPINION_RESERVE), None
+    reserve = max(reserve_kept(plan, plan.reserve), OPINION_RESERVE)
+    planner, shorter = free_knots(start=plan, reserve=reserve), None
     try:
         found = planner.plan(plan.problem, plan.vehicle, progress)
         if found.certified and found.duration < plan.duration and found.flies:
@@ -76,7 +78,8 @@ def _second_opinion(plan: Plan, progress: Progress | None) -> SecondOpinion:
     except (Infeasible, SpecError):
         pass
     missing = "the time was over" if shorter is None and out_of_time() else ""
-    return SecondOpinion(f"--planner {OPINION}", shorter, missing)
+    other = "" if reserve == FLYING_RESERVE else f" --reserve {reserve:g}"
+    return SecondOpinion(f"--planner {OPINION}{other}", shorter, missing)
 
 
 def _require_vehicle(plan: Plan) -> None:

@@ -144,7 +144,7 @@ class Assessment:
             return f"{at_most}; {self.opinion.options} finds none that is shorter"
         if self.poor:
             at_most = f"poor: {self.duration / self.opinion.duration:.1f} times as long as need be"
-        planner = self.opinion.options.removeprefix("--planner ")
+        planner = self.opinion.options.removeprefix("--planner ").partition(" ")[0]
         return f"{at_most}; {planner} finds {self.opinion.duration:.3f} s ({self.opinion.options})"
 
     @property

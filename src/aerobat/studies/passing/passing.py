@@ -13,6 +13,7 @@ from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
 from aerobat.evaluation.opening import Probability
 from aerobat.planning import Attempt, Planner, as_planner, plan
+from aerobat.planning.result import reserve_kept
 from aerobat.planning.tube import Tube
 from aerobat.problem import Problem, as_problem
 from aerobat.studies.flights import Flights, cut, passed
@@ -20,7 +21,7 @@ from aerobat.studies.passing.causes import main_failure_cause
 from aerobat.studies.passing.result import Passing, Round
 from aerobat.studies.passing.spread import LEVEL, tube_series
 from aerobat.studies.passing.steadying import steadier
-from aerobat.studies.passing.task import FlownPlan, PassingTask, reserve_kept
+from aerobat.studies.passing.task import FlownPlan, PassingTask
 from aerobat.studies.share import CONFIDENCE, Share, percent
 from aerobat.studies.workers import Workers, pool
 from aerobat.vehicle import Vehicle, as_vehicle
@@ -157,7 +158,7 @@ def _with_proof(task: PassingTask, first: FlownPlan, best: FlownPlan, share: Sha
         lower_bound=share.interval[0],
     )
     return Passing(
-        plan=replace(best.plan, tube=tube),
+        plan=replace(best.plan if best is first else best.without_second_opinion, tube=tube),
         plain=first.plan,
         before=share if best is first else task.share(first.plan, fresh),
         after=share,

@@ -14,12 +14,12 @@ from aerobat.environment import Dispersion, as_dispersion
 from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, within_time, work
 from aerobat.planning import Attempt, Plan, Planner, as_planner
-from aerobat.planning.result import FLYING_RESERVE
+from aerobat.planning.result import FLYING_RESERVE, reserve_kept
 from aerobat.problem import Problem
 from aerobat.simulation.nested import joined
 from aerobat.studies.flights import LOOKS, passed
 from aerobat.studies.passing.spread import with_more_thrust, with_narrower_gates
-from aerobat.studies.passing.task import FlownPlan, PassingTask, reserve_kept, warm_started_refinement
+from aerobat.studies.passing.task import FlownPlan, PassingTask, warm_started_refinement
 from aerobat.studies.passing.tightening import Tightening, rounds
 from aerobat.studies.share import Trials
 from aerobat.studies.workers import Pool
@@ -162,4 +162,5 @@ def _explained(found: FlownPlan, first: FlownPlan) -> Plan:
         f"{found.tightening.described(first.reserve)}: {found.share.count} of {found.share.of} "
         f"flights succeed instead of {first.share.count} of {first.share.of}"
     )
-    return replace(found.plan, attempts=(*first.plan.attempts, *found.plan.attempts), rescue=why)
+    attempts = (*first.plan.attempts, *found.plan.attempts)
+    return replace(found.without_second_opinion, attempts=attempts, rescue=why)

@@ -11,9 +11,8 @@ from aerobat.control import named_controller
 from aerobat.environment import Dispersion
 from aerobat.evaluation import Score
 from aerobat.optimization.deadline import count_work, within_time, work
-from aerobat.planning import Attempt, Plan, Planner, plan
+from aerobat.planning import Attempt, Plan, Planner, SecondOpinion, plan
 from aerobat.planning.planners import planner_with_reserve
-from aerobat.planning.result import KEPT_PART
 from aerobat.problem import Problem
 from aerobat.simulation.nested import joined
 from aerobat.studies.flights import FlightTask, fly_scores, passed
@@ -46,6 +45,14 @@ class FlownPlan:
     def share(self) -> Share:
         """The share of the flights that succeed."""
         return passed(self.scores)
+
+    @property
+    def without_second_opinion(self) -> Plan:
+        """The plan, for which no other planner is asked: that would give flights no chance to succeed."""
+        if not self.plan.wants_second_opinion:
+            return self.plan
+        longer = SecondOpinion("", None, "it is longer so that more flights succeed")
+        return replace(self.plan, opinion=longer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +131,6 @@ class PassingTask:
         fraction = share.fraction
         least = self.proving * fraction - sqrt(self.proving * fraction * (1.0 - fraction))
         return self.is_proof(Share(max(int(least), 0), self.proving))
-
-
-def reserve_kept(found: Plan, asked: float) -> float:
-    """Return the reserve that a plan keeps: what was asked, the part that fallbacks keep of it, or none."""
-    return next((part * asked for part in (1.0, KEPT_PART) if found.keeps(part * asked)), 0.0)
 
 
 def warm_started_refinement(planner: Any, start: Plan, reserve: float) -> Planner:
