@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from aerobat.errors import Infeasible
+from aerobat.errors import Infeasible, SpecError
 from aerobat.planning import FreeKnots, MinSnap, Miqp, Planner, TimeOptimal, plan
 from aerobat.planning.assessment.contradiction import contradiction
 from aerobat.planning.miqp import rescue
@@ -142,6 +142,24 @@ def test_a_refused_tilt_names_the_attitude_and_what_frees_it() -> None:
     assert found is not None
     assert "asks 90° of tilt, at least 89.5° within its tolerance" in found.sentence
     assert found.sentence.endswith("set limits.max_tilt to 90° or more, or ask 88.9° at most")
+
+
+@pytest.mark.parametrize("planner", ["miqp", "min-snap", "free-knots", "time-optimal"])
+@pytest.mark.parametrize("end", ["start", "goal"])
+def test_an_end_in_free_fall_is_refused_by_its_field(planner: str, end: str) -> None:
+    falling = replace(LINE.ends[end], acceleration=(0.0, 0.0, -LINE.environment.gravity))
+    with pytest.raises(SpecError, match=rf"^{end}\.acceleration asks no thrust.*give another"):
+        plan(replace(LINE, **{end: falling}), planner, QUAD)
+
+
+@pytest.mark.parametrize("end", ["start", "goal"])
+def test_an_end_that_asks_more_thrust_than_rotors_give_is_refused_as_proven(end: str) -> None:
+    rising = replace(LINE.ends[end], acceleration=(0.0, 0.0, 90.0))
+    with pytest.raises(Infeasible, match=rf"no plan: {end}\.acceleration asks .* N of thrust") as refusal:
+        plan(replace(LINE, **{end: rising}), "miqp", QUAD)
+    assert refusal.value.limits == (f"{end}.acceleration",)
+    full = QUAD.max_specific_thrust - LINE.environment.gravity
+    assert contradiction(replace(LINE, **{end: replace(rising, acceleration=(0.0, 0.0, full))}), QUAD) is None
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.errors import Reason, SpecError
 from aerobat.flatness import force_balance
+from aerobat.flatness.inverse_dynamics import UNDETERMINED
 from aerobat.limits.clearance import Clearance
 from aerobat.problem.gate import Gate
 from aerobat.problem.planned_passage import PlannedPassage, PlannedWaypoint
@@ -103,6 +104,18 @@ def require_clear_ends(problem: Problem, vehicle: Vehicle | None) -> None:
             raise SpecError(
                 f"{end}.position: the body of {vehicle.name} reaches {length(-left)} into '{name}' there; "
                 "move one of them"
+            )
+
+
+def require_attitudes_at_ends(problem: Problem, vehicle: Vehicle) -> None:
+    """Raise SpecError for ends in free fall, where the thrust is zero and the attitude undetermined."""
+    balance = force_balance(problem.environment, vehicle)
+    for end, state in problem.ends.items():
+        thrust = balance.specific_thrust(state.velocity, state.acceleration)
+        if np.linalg.norm(thrust) < UNDETERMINED * problem.environment.gravity:
+            raise SpecError(
+                f"{end}.acceleration asks no thrust, as in free fall, which leaves the attitude there open; "
+                "give another, such as [0, 0, 0]"
             )
 
 

@@ -32,7 +32,7 @@ from aerobat.planning.courses import is_course
 from aerobat.planning.heading.follow import with_heading
 from aerobat.planning.holds import between_holds
 from aerobat.planning.moving_gates import through_moving_gates
-from aerobat.planning.passages import require_clear_ends, require_openings
+from aerobat.planning.passages import require_attitudes_at_ends, require_clear_ends, require_openings
 from aerobat.planning.recorder import Progress
 from aerobat.planning.result import FLYING_CLEARANCE, FLYING_RESERVE, Plan, PlanMethod
 from aerobat.problem import Problem, as_problem
@@ -100,6 +100,7 @@ def plan(
     if vehicle is not None:
         vehicle = vehicle.without_dead_rotors()
         vehicle.require_hover(problem.environment.gravity)
+        require_attitudes_at_ends(problem, vehicle)
         require_openings(problem, vehicle)
         _require_consistency(problem, vehicle)
     elif problem.heading.mode is not HeadingMode.FREE:

@@ -10,7 +10,7 @@ from numpy.polynomial import Polynomial
 
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
-from aerobat.flatness.inverse_dynamics import UNDETERMINED
+from aerobat.planning.passages import require_attitudes_at_ends
 from aerobat.planning.result import Plan
 from aerobat.planning.task import Task
 from aerobat.problem.problem import Problem
@@ -103,11 +103,5 @@ def flown_task(
     """
     if vehicle is None:
         raise SpecError(f"the {planner} planner needs a vehicle: no limits, no least time; give --vehicle")
-    task = Task.of(problem, vehicle, reserve, clearance)
-    for name, state in problem.ends.items():
-        thrust = task.balance.specific_thrust(state.velocity, state.acceleration)
-        if np.linalg.norm(thrust) < UNDETERMINED * problem.environment.gravity:
-            raise SpecError(
-                f"{name}.acceleration asks no thrust, which leaves the attitude there open; change it"
-            )
-    return task
+    require_attitudes_at_ends(problem, vehicle)
+    return Task.of(problem, vehicle, reserve, clearance)

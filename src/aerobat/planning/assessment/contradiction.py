@@ -1,8 +1,8 @@
 """Infeasibility proofs in milliseconds: stages whose conditions and the limits exclude each other.
 
 Conditions on position, velocity and acceleration are linear, as are the limits per axis, so that a linear
-program decides. Of attitudes only the tilt is tested. Rotor limits are ignored: a problem without a
-contradiction may still have no plan.
+program decides. Of attitudes only the tilt is tested, and of rotor limits only their sum at the ends: a
+problem without a contradiction may still have no plan.
 """
 
 from __future__ import annotations
@@ -12,17 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerobat.flatness import force_balance
+from aerobat.flatness import force_balance, reference_of
 from aerobat.limits.box import FIELDS, field_with_value
 from aerobat.optimization import AssignmentProgram, solver
 from aerobat.problem.condition import Condition, LinearBound, Quantity
+from aerobat.problem.end_state import EndState
 from aerobat.problem.limits import Limits
 from aerobat.problem.problem import Problem
 from aerobat.problem.stage import Stage
+from aerobat.states import FlatState
 from aerobat.vehicle import Vehicle
 
 STAGE_DERIVATIVES = 3  # number of derivatives that stages constrain: position, velocity, acceleration
-ROUNDING = 1e-9  # excess of tilt that is rounding [rad]
+ROUNDING = 1e-9  # excess of tilt [rad], or of thrust relative to its range, that is rounding
 LINEAR = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 
 
@@ -30,7 +32,7 @@ LINEAR = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 class Contradiction:
     """A stage whose conditions and the limits exclude each other at any time."""
 
-    stage: str
+    stage: str  # or the end, start or goal
     limits: tuple[str, ...]  # fields of the problem; removing any one of them resolves the contradiction
     sentence: str
 
@@ -39,8 +41,14 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
     """Return the contradiction of the first stage that has one, or None, which proves nothing.
 
     A contradiction means that no instant within the limits has the position, velocity, acceleration and tilt
-    that the stage asks. Raises SpecError for gates that do not suit the maneuver.
+    that the stage asks, or that start or goal ask a thrust which the rotors together cannot give. Raises
+    SpecError for gates that do not suit the maneuver.
     """
+    for end, state in problem.ends.items():
+        if state.acceleration.any() and not state.leaves_attitude_free:
+            found = _beyond_rotors(end, state, problem, vehicle)
+            if found is not None:
+                return found
     balance = force_balance(problem.environment, vehicle)
     for stage in problem.stages(vehicle.max_specific_thrust, vehicle.body_radius).stages:
         bounds = [c.bound(balance) for c in _linear(stage)]
@@ -53,6 +61,22 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
                 sentence = _tilt_sentence(stage.name, tilt, tolerance, problem.limits.max_tilt)
                 return Contradiction(stage.name, ("limits.max_tilt",), sentence)
     return None
+
+
+def _beyond_rotors(end: str, state: EndState, problem: Problem, vehicle: Vehicle) -> Contradiction | None:
+    """Return the contradiction of an end whose collective thrust all rotors together cannot give."""
+    there = FlatState(*state.derivatives(5)[:, None])
+    at_end = reference_of([0.0], there, vehicle, problem.environment)
+    thrust = float(at_end.setpoint.wrench.thrust[0])
+    least, most = float(vehicle.min_thrusts.sum()), float(vehicle.max_thrusts.sum())
+    rounding = ROUNDING * (most - least)
+    if least - rounding <= thrust <= most + rounding:
+        return None
+    sentence = (
+        f"{end}.acceleration asks {thrust:.3g} N of thrust, and the rotors of {vehicle.name} give "
+        f"{least:.3g} to {most:.3g} N together; ask {'less' if thrust > most else 'more'} there"
+    )
+    return Contradiction(end, (f"{end}.acceleration",), sentence)
 
 
 def _tilt_sentence(stage: str, tilt: float, tolerance: float, most: float) -> str:
