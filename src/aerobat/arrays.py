@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 AXES = "xyz"  # the names of a vector's components
+ORDERS = (AXES, "wxyz")  # the order of components that have these labels
 
 
 def xyz(vectors: Any) -> tuple[Any, Any, Any]:
@@ -48,12 +49,39 @@ def frozen_bounds(value: ArrayLike, name: str, shape: Sequence[int | None] | Non
 def numbers(value: ArrayLike, name: str) -> Array:
     """The numbers, NaN among them, copied only where they are no float64 array. Raises SpecError."""
     try:
-        array = np.asarray(value)
+        array = np.asarray(by_labels(value, name))
+    except SpecError:
+        raise
     except (ValueError, TypeError, OverflowError):  # ragged, or nothing of the kind
         raise SpecError(f"{name} must be numbers, got {_shown(value)}") from None
     if array.dtype.kind not in "fiu":  # text, truth and complex numbers are none
         raise SpecError(f"{name} must be numbers, got {_shown(value)}")
     return array.astype(np.float64, copy=False)
+
+
+def text_labels(value: object) -> list[str]:
+    """Return the labels of a series, or of a table's columns, as pandas have them; none but text counts."""
+    labels = getattr(value, "columns", getattr(value, "index", None))
+    if not hasattr(value, "__array__") or not isinstance(labels, Iterable):
+        return []
+    found = list(labels)
+    return found if all(isinstance(label, str) for label in found) else []
+
+
+def by_labels(value: Any, name: str = "") -> Any:
+    """Return the value, a series labelled x, y, z (or w, x, y, z) in that order of its components.
+
+    Columns of a table are ordered likewise, those of other names left as they are. Raises SpecError for a
+    series with other labels.
+    """
+    labels = text_labels(value)
+    for order in ORDERS:
+        if labels != list(order) and sorted(labels) == sorted(order):
+            return np.asarray(value)[..., [labels.index(axis) for axis in order]]
+    if labels and "".join(labels) not in ORDERS and np.ndim(value) == 1:
+        names = _shown(labels)
+        raise SpecError(f"{name} must be labelled x, y, z, got the labels {names}; give .to_numpy()".lstrip())
+    return value
 
 
 def _shown(value: object) -> str:

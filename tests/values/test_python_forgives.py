@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import aerobat as ab
+from aerobat.arrays import numbers
 from aerobat.viewer import replay
 from public_calls import NoPlan, flight, plan
 from refusals import complaint
@@ -236,6 +237,23 @@ def test_degrees_where_radians_are_meant_are_told_in_radians(name: str) -> None:
 def test_a_tilt_without_limit_and_any_number_of_degrees_are_what_they_say() -> None:
     assert ab.Envelope(tilt=inf) == ab.Envelope()
     assert ab.Flip(axis_deg=270.0).axis_deg == 270.0
+
+
+def test_series_are_read_by_their_labels_and_refused_by_others() -> None:
+    """They were read by position, without a word."""
+    pd = pytest.importorskip("pandas")
+    labelled = pd.Series({"y": 2.0, "x": 1.0, "z": 3.0})
+    assert ab.tilted_gate(labelled).position.tolist() == [1.0, 2.0, 3.0]
+    assert ab.EndState(pd.Series({"z": 3.0, "y": 2.0, "x": 1.0})).position.tolist() == [1.0, 2.0, 3.0]
+    assert ab.Waypoint(pd.Series({"z": 3.0, "x": 1.0})).position[[0, 2]].tolist() == [1.0, 3.0]
+    numbered = pd.Series([1.0, 2.0, 3.0], index=[4, 5, 6])
+    assert ab.tilted_gate(numbered).position.tolist() == [1.0, 2.0, 3.0]
+    rows = pd.DataFrame([labelled, 2.0 * labelled])
+    assert numbers(rows, "rows").tolist() == [[1.0, 2.0, 3.0], [2.0, 4.0, 6.0]]
+    strange = pd.Series({"roll": 1.0, "pitch": 2.0, "yaw": 3.0})
+    for make in (lambda: ab.at_rest(strange), lambda: numbers(strange, "v"), lambda: ab.EndState(strange)):
+        said = complaint(make)
+        assert "must be labelled x, y, z, got the labels ['roll', 'pitch', 'yaw']; give .to_numpy()" in said
 
 
 def test_numbers_of_numpy_are_numbers() -> None:

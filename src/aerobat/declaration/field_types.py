@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator, ConfigDict, Field, GetCoreSchemaHandler, PlainSerializer, PlainValidator
 from pydantic_core import CoreSchema, core_schema
 
-from aerobat.arrays import AXES, Array
+from aerobat.arrays import AXES, Array, by_labels, text_labels
 from aerobat.declaration.sentences import FieldError, shown, unknown_key, within_field
 from aerobat.errors import SpecError
 
@@ -125,7 +125,7 @@ def _numbers(value: Any, place: str, infinite: bool) -> Any:
     if isinstance(value, float) and (isfinite(value) or (infinite and value == value)):
         return float(value) + 0.0  # no negative zeros: equal values have equal bytes
     if hasattr(value, "__array__"):
-        return _numbers(np.asarray(value).tolist(), place, infinite)
+        return _numbers(_listed(value, place), place, infinite)
     if isinstance(value, list | tuple):
         return [_numbers(each, f"{place}[{i}]", infinite) for i, each in enumerate(value)]
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -133,6 +133,14 @@ def _numbers(value: Any, place: str, infinite: bool) -> Any:
     if isinstance(value, float) or abs(value) > sys.float_info.max:
         raise FieldError(place, f"must be a finite number, got {shown(value)}")
     return float(value)
+
+
+def _listed(value: Any, place: str) -> Any:
+    """Return an array as lists, its components by their labels. Raises FieldError for other labels."""
+    try:
+        return np.asarray(by_labels(value)).tolist()
+    except SpecError as error:
+        raise FieldError(place, str(error)) from None
 
 
 def _vector(value: Any) -> Array:
@@ -161,6 +169,9 @@ def _direction(value: Any) -> Array:
 
 def _partial(value: Any) -> Array:
     """Return three numbers, from themselves or a table of some of them; NaN stands for a free component."""
+    labels = text_labels(value)
+    if labels and set(labels) <= set(AXES):
+        value = dict(zip(labels, np.asarray(value).tolist(), strict=True))
     given = value
     if isinstance(value, Mapping):
         for key in value:
@@ -168,7 +179,7 @@ def _partial(value: Any) -> Array:
                 raise unknown_key(str(key), AXES)
         given = [value.get(axis, nan) for axis in AXES]
     elif hasattr(value, "__array__"):
-        given = np.asarray(value).tolist()
+        given = _listed(value, "")
     if not isinstance(given, list | tuple) or len(given) != 3:
         raise FieldError("", f"must be three numbers or a table of some of x, y, z, got {shown(value)}")
     places = AXES if isinstance(value, Mapping) else ("[0]", "[1]", "[2]")
