@@ -177,3 +177,12 @@ def test_what_31_pieces_do_not_follow_and_what_is_far_away_is_refused(flip: ab.P
     with pytest.raises(ab.SpecError, match="100 m"):
         ab.export(replace(flip, trajectory=far), tmp_path / "x", "crazyflie")
     assert not (tmp_path / "x").exists()
+
+
+def test_a_piece_that_goes_far_away_between_its_ends_is_refused(flip: ab.Plan, tmp_path: Path) -> None:
+    there_and_back = np.zeros((1, 3, 3))
+    there_and_back[0, :, 0] = (0.0, 600.0, -600.0)  # 150 m away at half of the time
+    path = ab.Trajectory([60.0], there_and_back)
+    with pytest.raises(ab.SpecError, match="100 m of the origin along each axis, and this one reaches 150 m"):
+        ab.export(replace(flip, trajectory=path), tmp_path / "x", "crazyflie")
+    assert not (tmp_path / "x").exists()

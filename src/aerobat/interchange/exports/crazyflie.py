@@ -24,7 +24,7 @@ PIECE = np.dtype([("polynomials", "<f4", (4, POWERS)), ("duration", "<f4")])  # 
 MEMORY = 4096  # bytes that the firmware has for trajectories
 MAX_PIECES = MEMORY // PIECE.itemsize
 MAX_ERROR = 2e-3  # [m] a fortieth of the vehicle's width: more is another path
-MAX_EXTENT = 100.0  # [m] from the origin, where float32 has a resolution of 8 µm
+MAX_EXTENT = 100.0  # [m] from the origin along each axis, where float32 has a resolution of 8 µm
 PIECES = ("trajectory.bin", "trajectory.csv")
 AXES = ("x", "y", "z", "yaw")
 Pieces: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.void]]"  # of the type PIECE
@@ -44,8 +44,12 @@ def fitted_pieces(plan: Plan) -> tuple[Pieces, Loss]:
     Raises SpecError where 31 pieces do not follow the path, and where the path is too far from the origin.
     """
     fitted = refit(plan.trajectory, MAX_PIECES)
-    if not np.abs(fitted.coefficients[:, 0]).max() <= MAX_EXTENT:
-        raise SpecError(f"a path for the Crazyflie keeps within {MAX_EXTENT:g} m of the origin; move it")
+    farthest = float(np.abs(fitted.component_range(0)).max())
+    if not farthest <= MAX_EXTENT:
+        raise SpecError(
+            f"a path for the Crazyflie keeps within {MAX_EXTENT:g} m of the origin along each axis, and this "
+            f"one reaches {farthest:.4g} m; move it"
+        )
     pieces = np.zeros(fitted.segments, dtype=PIECE)
     pieces["duration"] = fitted.durations
     powers = fitted.durations[:, None, None] ** np.arange(fitted.degree + 1)[:, None]
