@@ -133,6 +133,17 @@ def test_the_rate_of_rows_without_times_is_told_where_nobody_gave_it(
     assert ("100 rows a second (--rate)" in assumed) == told
 
 
+@pytest.mark.parametrize("command", ["check", "fly"])
+def test_a_rate_beside_rows_with_times_is_told_to_be_unused(
+    command: str, tmp_path: Path, monkeypatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("path.csv").write_text("t,x,y,z\n" + "".join(f"{k / 10},{0.001 * k**2},0,1\n" for k in range(9)))
+    assert code(command, "path.csv", "--rate", "50") in (0, 1)
+    told = " ".join("".join(capsys.readouterr()).split())
+    assert "the times of its rows, not the 50 rows a second of --rate" in told
+
+
 @pytest.mark.parametrize(
     "header",
     ["t,x,y,z", "# t,x,y,z", '"t","x","y","z"', "TIME,X,Y,Z", "time,px,py,pz", "t, x, y, z", ",t,x,y,z"],

@@ -83,6 +83,8 @@ def read_source(path: Path, rate: float | None) -> tuple[Plan | Trajectory, list
         return read_plan(path, each_second), []
     rows = read_rows(path, each_second)
     facts = [] if rows.timed or rate is not None else [f"{USUAL_RATE:g} rows a second (--rate)"]
+    if rows.timed and rate is not None:
+        facts.append(f"the times of its rows, not the {rate:g} rows a second of --rate")
     facts += [f"{each} left out" for each in rows.unused]
     error = rows.fit_error
     if error is None:
