@@ -64,8 +64,11 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
 
     Whatever ends it, at `path` is either what was there before or all of the new, never a mixture, and no
     parent is left that was made for nothing. What is replaced keeps its mode, and a link to the folder stays.
-    What killed processes have left in its parent is removed. Raises CannotWrite when the place cannot be
-    written, and SpecError for a folder that holds anything whose name is not ours: that is somebody's work.
+    What killed processes have left in its parent is removed. The current folder itself stays, since whoever
+    is in it would see nothing of the new one: its files are replaced one by one.
+
+    Raises CannotWrite when the place cannot be written, and SpecError for a folder that holds anything whose
+    name is not ours: that is somebody's work.
 
     Args:
         path: The folder to make or to replace; missing parents are made.
@@ -76,8 +79,10 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
         require_replaceable(path, is_ours)
         made = [parent for parent in target.parents if not parent.exists()]
         target.parent.mkdir(parents=True, exist_ok=True)
-        _remove_abandoned(target.parent)
-        staging = target.parent / f".{target.name}.{os.getpid()}{_STAGING}"
+        stays = target.exists() and target.samefile(".")
+        beside = target if stays else target.parent
+        _remove_abandoned(beside)
+        staging = beside / f".{target.name}.{os.getpid()}{_STAGING}"
         shutil.rmtree(staging, ignore_errors=True)
         staging.mkdir()
     except OSError as error:
@@ -87,7 +92,9 @@ def whole_folder(path: str | os.PathLike[str], is_ours: Callable[[str], bool]) -
         for written in (*staging.iterdir(), staging):
             _sync(written)
             _keep_mode(written, target / written.relative_to(staging))
-        if target.exists():
+        if stays:
+            _move_into(target, staging, is_ours)
+        elif target.exists():
             _exchange(staging, target)
         else:
             staging.rename(target)
@@ -220,6 +227,15 @@ def _entries(folder: Path) -> list[str]:
         return os.listdir(folder)
     except FileNotFoundError:
         return []
+
+
+def _move_into(target: Path, staging: Path, is_ours: Callable[[str], bool]) -> None:
+    """Move the files of a folder in a target to the target, then remove others of ours there."""
+    made = _entries(staging)
+    for name in made:
+        (staging / name).replace(target / name)
+    for name in filter(is_ours, set(_entries(target)) - {*made}):
+        _remove(target / name)
 
 
 def _exchange(a: Path, b: Path) -> None:

@@ -52,6 +52,20 @@ def test_a_folder_is_replaced_as_one(tmp_path: Path) -> None:
     assert [path.name for path in target.parent.iterdir()] == ["run"]
 
 
+def test_the_current_folder_stays_and_has_the_new_files_alone(tmp_path: Path, monkeypatch) -> None:
+    """It was replaced: whoever was in it saw an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    Path("part-5").write_text("old")
+    for mark in ("first", "second"):
+        with whole_folder(".", ours) as folder:
+            (folder / "part-0").write_text(mark)
+        assert contents(Path()) == {("part-0", mark)}
+    Path("notes").write_text("of others")
+    with pytest.raises(SpecError, match="holds notes"):
+        written(Path(), "third")
+    assert contents(Path()) == {("part-0", "second"), ("notes", "of others")}
+
+
 def test_a_block_that_fails_leaves_the_old_folder_and_nothing_else(tmp_path: Path) -> None:
     target = tmp_path / "run"
     written(target, "old")
