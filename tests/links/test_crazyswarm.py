@@ -101,6 +101,14 @@ def test_a_plan_is_flown_on_board_of_a_crazyflie_alone(capsys: pytest.CaptureFix
     assert err.endswith("--onboard is for a Crazyflie; give --goal crazyswarm2:/NAME, or leave it out\n")
 
 
+@pytest.mark.parametrize("command", ["ros", "ros-vehicle"])
+def test_odometry_of_another_topic_than_the_crazyflie_s_is_refused(command: str, capsys) -> None:
+    """It was left unread."""
+    code, _, err = run(capsys, "link", command, "--goal", "crazyswarm2:/cf231", "--odometry", "/mocap/odom")
+    assert code == 2
+    assert err.endswith("--odometry is not for a Crazyflie, whose own is /cf231/odom; leave it out\n")
+
+
 def test_a_trajectory_that_was_not_uploaded_does_not_begin() -> None:
     sky = crazyflie_aloft(True)
     start = {"trajectory_id": 7, "timescale": 1.0, "reversed": False, "relative": False}

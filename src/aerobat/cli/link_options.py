@@ -71,8 +71,8 @@ class RosNodeOptions(EndOptions):
     goal: Annotated[str, Parameter(group=linking)] = "/aerobat/goal"
     """The topic of goals; or, as crazyswarm2:/cf231, a Crazyflie of crazyswarm2's server to stand in for."""
 
-    odometry: Annotated[str, Parameter(group=linking)] = "/aerobat/odometry"
-    """The topic of the vehicle's state."""
+    odometry: Annotated[str | None, Parameter(group=linking)] = None
+    """The topic of the vehicle's state. Default: /aerobat/odometry, or that of the Crazyflie."""
 
 
 @dataclass(frozen=True, kw_only=True)

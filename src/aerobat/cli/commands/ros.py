@@ -25,7 +25,7 @@ from aerobat.links.ros.maneuver_node import OWN_SERVICES, ManeuverNode, NodeSett
 from aerobat.links.ros.middleware import Middleware, PacedClock
 from aerobat.links.ros.preparation import MANEUVERS, ManeuverRequest, prepare, shared_gravity
 from aerobat.links.ros.run import run
-from aerobat.links.ros.topics import RVIZ
+from aerobat.links.ros.topics import ODOMETRY, RVIZ
 from aerobat.links.ros.vehicle_node import VehicleNode
 from aerobat.planning import Planner, planner_class, suited_planner
 from aerobat.problem import Problem, load_problem
@@ -60,7 +60,7 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
         with_jerk=options.jerk,
         goal=options.goal,
         in_pieces=options.onboard,
-        odometry=f"{crazyflie}/odom" if crazyflie else options.odometry,
+        odometry=_odometry(options, crazyflie),
         mission=options.mission,
     )
     named = {service: load_problem(name) for service, name in _services(problems).items()}
@@ -109,16 +109,15 @@ def ros_vehicle(
     found, environment = named_vehicle(vehicle), named_environment(options.environment)
     clock = None if options.speed is None else PacedClock(options.speed)
     crazyflie = _crazyflie(options)
-    _require_topics(*((f"{crazyflie}/odom",) if crazyflie else (options.goal, options.odometry)))
+    odometry = _odometry(options, crazyflie)
+    _require_topics(*(() if crazyflie else (options.goal,)), odometry)
     with closing(_joined("aerobat_vehicle", options.generation, clock)) as middleware:
         simulated = SimulatedVehicle(found, environment)
         settings: dict[str, Any] = {"rate": options.rate, "clock": clock, "say": say}
         if crazyflie:
             node: VehicleNode = CrazyswarmServer(cast(Ros2, middleware), simulated, crazyflie, **settings)
         else:
-            node = VehicleNode(
-                middleware, simulated, goal=options.goal, odometry=options.odometry, **settings
-            )
+            node = VehicleNode(middleware, simulated, goal=options.goal, odometry=odometry, **settings)
         say(f"{found.name} stands on the ground, and obeys {options.goal}")
         run(node, middleware, _VEHICLE_RATE, options.seconds or inf)
 
@@ -172,6 +171,15 @@ def _crazyflie(options: RosNodeOptions) -> str:
     if options.generation == "1":
         raise SpecError("crazyswarm2 is a server of ROS 2; leave --ros 1 out")
     return options.goal.removeprefix(PREFIX)
+
+
+def _odometry(options: RosNodeOptions, crazyflie: str) -> str:
+    """The topic of the vehicle's state. Raises SpecError where one is named beside a Crazyflie's own."""
+    if not crazyflie:
+        return ODOMETRY if options.odometry is None else options.odometry
+    if options.odometry is not None:
+        raise SpecError(f"--odometry is not for a Crazyflie, whose own is {crazyflie}/odom; leave it out")
+    return f"{crazyflie}/odom"
 
 
 def _paper_maneuvers(gravity: float) -> dict[str, Problem]:
