@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ import aerobat as ab
 from aerobat import cli
 from aerobat.cli.progress import Progress
 from aerobat.interchange import read_table
+from aerobat.studies.kept import KeptParts
 
 MAP = ("feasibility", "half-flip", "--over", "angle=0:90:90", "--over", "speed=4:12:8")
 LEAST = ("--least", "gate", "--least", "ceiling", "--tolerance", "0.2", "--workers", "1")
@@ -154,6 +156,28 @@ def test_what_nothing_suffices_for_ends_with_its_own_code(capsys) -> None:
     assert code("feasibility", *arguments, "--over", "vehicle.mass=0.9,1") == 0
     assert capsys.readouterr().out.count("no plan") == 2
     assert [path.name for path in Path("out").iterdir()] == ["line-stuck-map-vehicle.mass-0.9-1"]
+
+
+def test_a_map_goes_on_from_cells_of_its_own_grid_and_says_how_many(monkeypatch, capsys) -> None:
+    """Cells at other values counted as finished."""
+    write = KeptParts.write
+
+    def write_and_interrupt(*cell: object) -> None:
+        write(*cell)
+        signal.raise_signal(signal.SIGINT)
+
+    def made(values: str) -> list[str]:
+        command = ("feasibility", "line", "--over", f"vehicle.mass={values}", "--planner", "min-snap")
+        ended = code(*command, "--workers", "1", "--out", "there")
+        return [str(ended), *capsys.readouterr().err.splitlines()]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(KeptParts, "write", write_and_interrupt)
+        told = "aerobat: 1 of 2 cells are kept: the same command goes on from there"
+        assert made("3.5,4") == ["130", told, "aerobat: interrupted"]  # too heavy to hover
+        assert made("4,5,6") == ["130", told.replace("of 2", "of 3"), "aerobat: interrupted"]
+    assert made("5,4") == ["0", "aerobat: goes on from 1 of 2 cells, which are kept"]
+    assert [path.name for path in Path().iterdir()] == ["there"]
 
 
 # is interrupted when the first plan is there

@@ -119,6 +119,7 @@ def test_the_same_command_goes_on_where_a_signal_ended_it(ended_by, code, word, 
     assert swept("--out", "there/broken", seed=8) == 2
     assert "keeps flights of another sweep (seed)" in capsys.readouterr().err
     assert swept("--out", "there/broken") == 0
+    assert capsys.readouterr().err == "aerobat: goes on from 50 of 60 flights, which are kept\n"
     assert [path.name for path in Path("there").iterdir()] == ["broken"]
     assert Path("there/broken/flights.csv").read_bytes() == Path("whole/flights.csv").read_bytes()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,6 @@ from aerobat.storage import digest_of, read_arrays, whole_file, write_whole
 from aerobat.studies.workers import LIBRARIES
 
 _FINGERPRINT = "fingerprint.json"  # the file that tells which study a folder belongs to
-_FLIGHTS = re.compile(r"flights-(\d+)-(\d+)\.npz")
 _PART = re.compile(r"(flights|cell)-.*\.npz")
 
 
@@ -98,15 +97,20 @@ def cell_name(values: Sequence[float]) -> str:
     return "-".join(["cell", *map(str, values)])
 
 
-def kept_flights(folder: Path) -> int:
-    """Return the number of flights that a folder keeps; files of others do not count."""
-    spans = (_FLIGHTS.fullmatch(path.name) for path in folder.glob("flights-*.npz"))
-    return sum(int(span[2]) - int(span[1]) for span in spans if span)
+def kept_flights(folder: Path, chunks: Iterable[range]) -> int:
+    """Return the number of flights in a sweep's chunks that a folder keeps; other chunks do not count."""
+    names = _names(folder)
+    return sum(len(chunk) for chunk in chunks if flights_name(chunk) in names) if names else 0
 
 
-def kept_cells(folder: Path) -> int:
-    """Return the number of cells that a folder keeps."""
-    return len(list(folder.glob("cell-*.npz")))
+def kept_cells(folder: Path, places: Iterable[Sequence[float]]) -> int:
+    """Return the number of cells of a map that a folder keeps; cells at other values do not count."""
+    names = _names(folder)
+    return sum(cell_name(values) in names for values in places) if names else 0
+
+
+def _names(folder: Path) -> set[str]:
+    return {path.stem for path in folder.glob("*.npz")}
 
 
 def is_kept_file(name: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from math import prod
 from pathlib import Path
 from typing import Annotated, Literal
@@ -112,7 +113,11 @@ def run_map(record: RunRecord, options: OutputOptions, workers: str | None = Non
     count = prod(len(axis.values) for axis in axes)
     name = f"map.{record.flight.table}"
     unfinished = Unfinished.beside(options.out or record.folder)
-    with unfinished.kept("cells", count, kept_cells) as kept:
+
+    def finished(folder: Path) -> int:
+        return kept_cells(folder, product(*(axis.values for axis in axes)))
+
+    with unfinished.kept("cells", count, finished) as kept:
         with showing(Progress("cells", count, kept=kept)) as progress:
             found = feasibility_map(
                 record.problem,

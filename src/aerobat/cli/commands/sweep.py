@@ -20,6 +20,7 @@ from aerobat.environment import load_dispersion
 from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.planning import Plan, load_plan
+from aerobat.studies.flights import cut
 from aerobat.studies.kept import kept_flights
 from aerobat.studies.sweep.sweep import sweep as sweep_plan
 
@@ -109,7 +110,11 @@ def run_sweep(plan: Plan, record: RunRecord, options: OutputOptions, workers: st
     flight = record.flight
     assert flight.conditions is not None, "a sweep has conditions"
     unfinished = Unfinished.beside(options.out or record.folder)
-    with unfinished.kept("flights", flight.runs, kept_flights) as kept:
+
+    def finished(folder: Path) -> int:
+        return kept_flights(folder, cut(range(flight.runs)))
+
+    with unfinished.kept("flights", flight.runs, finished) as kept:
         with showing(Progress("flown", flight.runs, kept=kept)) as progress:
             swept = sweep_plan(
                 plan,

@@ -42,17 +42,20 @@ class Unfinished:
 
     @contextmanager
     def kept(self, what: str, count: int, finished: Callable[[Path], int]) -> Iterator[int]:
-        """Give the number of parts that an earlier run kept, and remove the folder after the block.
+        """Give the number of parts that an earlier run kept, say it, and remove the folder after the block.
 
         If the block ends early, the parts that are kept by then are reported.
 
         Args:
             what: The name of the parts.
             count: The number of all parts.
-            finished: Returns the number of parts in a folder.
+            finished: Returns the number of these parts in a folder, which may hold others.
         """
+        already = finished(self.parts)
+        if already:
+            say(f"goes on from {already} of {count} {what}, which are kept")
         try:
-            yield finished(self.parts)
+            yield already
         except BaseException as error:
             done = finished(self.parts)
             if not done:
