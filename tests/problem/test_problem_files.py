@@ -132,6 +132,20 @@ def test_a_start_too_fast_for_the_limits_is_refused() -> None:
         replace(load_problem("line"), start=EndState((0, 0, 0), (11, 0, 0)))
 
 
+def test_a_start_below_the_ground_is_refused_with_what_frees_it() -> None:
+    """The remedy was to widen limits.upper."""
+    with pytest.raises(SpecError, match=r"start\.position.* move it or lower environment\.ground$"):
+        Problem("low", at_rest((0, 0, -1)), at_rest((4, 0, 1)), environment=Environment(ground=0.0))
+    with pytest.raises(SpecError, match=r"move it or widen limits\.lower and limits\.upper$"):
+        Problem(
+            "high",
+            at_rest((0, 0, 9)),
+            at_rest((4, 0, 1)),
+            limits=Limits(upper=(5, 5, 5)),
+            environment=Environment(ground=0.0),
+        )
+
+
 def test_a_ground_above_the_limits_is_refused() -> None:
     with pytest.raises(SpecError, match=r"environment.ground must be below limits.upper, got 9 and 5 m"):
         replace(

@@ -226,12 +226,13 @@ class Problem:
         for axis, x, low, high in zip("xyz", value, lower, upper, strict=True):
             if not low <= x <= high:
                 limit = f"limits.{DERIVATIVES[derivative]}" if derivative else "limits.lower and limits.upper"
-                if not derivative and axis == "z" and low == self.environment.ground:
-                    limit = "limits.upper, or lower environment.ground"
+                remedy = f"widen {limit}"
+                if not derivative and axis == "z" and x < low == self.environment.ground:
+                    remedy = "lower environment.ground"
                 raise FieldError(
                     name,
                     f": its {axis} component, {x:g} {UNITS[derivative]}, lies outside the limits "
-                    f"[{low:g}, {high:g}]; move it or widen {limit}",
+                    f"[{low:g}, {high:g}]; move it or {remedy}",
                 )
 
     @property
