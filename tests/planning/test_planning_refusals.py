@@ -144,6 +144,14 @@ def test_a_refused_tilt_names_the_attitude_and_what_frees_it() -> None:
     assert found.sentence.endswith("set limits.max_tilt to 90° or more, or ask 88.9° at most")
 
 
+@pytest.mark.parametrize("vehicle", [QUAD, None])
+def test_a_goal_that_is_the_start_is_refused_where_nothing_is_passed_between(vehicle: Vehicle | None) -> None:
+    """It was planned, in a millisecond."""
+    for line in (replace(LINE, gates=(), goal=LINE.start), replace(LINE, gates=(), start=LINE.goal)):
+        with pytest.raises(SpecError, match=r"^goal: it is the start, .*; move it, or give gates$"):
+            plan(line, "miqp", vehicle)
+
+
 @pytest.mark.parametrize("planner", ["miqp", "min-snap", "free-knots", "time-optimal"])
 @pytest.mark.parametrize("end", ["start", "goal"])
 def test_an_end_in_free_fall_is_refused_by_its_field(planner: str, end: str) -> None:
@@ -160,6 +168,16 @@ def test_an_end_that_asks_more_thrust_than_rotors_give_is_refused_as_proven(end:
     assert refusal.value.limits == (f"{end}.acceleration",)
     full = QUAD.max_specific_thrust - LINE.environment.gravity
     assert contradiction(replace(LINE, **{end: replace(rising, acceleration=(0.0, 0.0, full))}), QUAD) is None
+
+
+@pytest.mark.parametrize("end", ["start", "goal"])
+def test_an_end_that_asks_more_tilt_than_the_limit_allows_is_refused_as_proven(end: str) -> None:
+    leaning = replace(LINE.ends[end], acceleration=(LINE.environment.gravity, 0.0, 0.0))
+    steep = replace(LINE, limits=Limits(max_tilt=radians(30.0)), **{end: leaning})
+    with pytest.raises(Infeasible, match=rf"no plan: {end}\.acceleration asks 45° of tilt") as refusal:
+        plan(steep, "miqp", QUAD)
+    assert refusal.value.limits == ("limits.max_tilt", f"{end}.acceleration")
+    assert contradiction(replace(steep, limits=Limits(max_tilt=radians(46.0))), QUAD) is None
 
 
 @pytest.mark.slow

@@ -96,6 +96,7 @@ def plan(
         progress: A function that is called with every attempt as it ends.
     """
     problem = as_problem(problem)
+    _require_motion(problem)
     vehicle = None if vehicle is None else as_vehicle(vehicle)
     if vehicle is not None:
         vehicle = vehicle.without_dead_rotors()
@@ -127,6 +128,15 @@ def _option_of(name: str) -> str:
 
 
 suggest_for(plan, _option_of)
+
+
+def _require_motion(problem: Problem) -> None:
+    """Raise SpecError for a problem whose shortest path has no duration: its goal is its start."""
+    if not problem.ends or problem.stages(1.0).stages:
+        return
+    start, goal = problem.start, problem.goal
+    if all((start.derivatives(2)[k] == goal.derivatives(2)[k]).all() for k in goal.fixed(2)):
+        raise SpecError("goal: it is the start, and nothing is passed between; move it, or give gates")
 
 
 def _require_consistency(problem: Problem, vehicle: Vehicle) -> None:

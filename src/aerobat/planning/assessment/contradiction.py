@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerobat import so3
 from aerobat.flatness import force_balance, reference_of
 from aerobat.limits.box import FIELDS, field_with_value
 from aerobat.optimization import AssignmentProgram, solver
@@ -46,7 +47,7 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
     """
     for end, state in problem.ends.items():
         if state.acceleration.any() and not state.leaves_attitude_free:
-            found = _beyond_rotors(end, state, problem, vehicle)
+            found = _beyond_vehicle(end, state, problem, vehicle)
             if found is not None:
                 return found
     balance = force_balance(problem.environment, vehicle)
@@ -63,11 +64,18 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
     return None
 
 
-def _beyond_rotors(end: str, state: EndState, problem: Problem, vehicle: Vehicle) -> Contradiction | None:
-    """Return the contradiction of an end whose collective thrust all rotors together cannot give."""
+def _beyond_vehicle(end: str, state: EndState, problem: Problem, vehicle: Vehicle) -> Contradiction | None:
+    """Return the contradiction of an end whose thrust the rotors cannot give, or whose tilt is too large."""
     there = FlatState(*state.derivatives(5)[:, None])
-    at_end = reference_of([0.0], there, vehicle, problem.environment)
-    thrust = float(at_end.setpoint.wrench.thrust[0])
+    at_end = reference_of([0.0], there, vehicle, problem.environment).setpoint
+    thrust, most_tilt = float(at_end.wrench.thrust[0]), problem.limits.max_tilt
+    tilt = float(np.arccos(np.clip(so3.thrust_axis(at_end.q_world_body[0])[2], -1.0, 1.0)))
+    if tilt > most_tilt + ROUNDING:
+        sentence = (
+            f"{end}.acceleration asks {math.degrees(tilt):.3g}° of tilt, more than limits.max_tilt "
+            f"({math.degrees(most_tilt):.3g}°) allows; ask less, or widen that"
+        )
+        return Contradiction(end, ("limits.max_tilt", f"{end}.acceleration"), sentence)
     least, most = float(vehicle.min_thrusts.sum()), float(vehicle.max_thrusts.sum())
     rounding = ROUNDING * (most - least)
     if least - rounding <= thrust <= most + rounding:
