@@ -119,7 +119,7 @@ def _require_enough(name: str, flights: int, probability: float) -> None:
     least = _least_flights(probability)
     if flights < least:
         raise SpecError(
-            f"{name}: {flights} flights cannot prove {100 * probability:g} %; take {least} or more, or a "
+            f"{name}: {flights} flights cannot prove {100 * probability:.12g} %; take {least} or more, or a "
             "smaller probability"
         )
 
