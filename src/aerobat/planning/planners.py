@@ -96,11 +96,11 @@ def plan(
         progress: A function that is called with every attempt as it ends.
     """
     problem = as_problem(problem)
-    _require_motion(problem)
     vehicle = None if vehicle is None else as_vehicle(vehicle)
     if vehicle is not None:
         vehicle = vehicle.without_dead_rotors()
         vehicle.require_hover(problem.environment.gravity)
+        _require_motion(problem)
         require_attitudes_at_ends(problem, vehicle)
         require_openings(problem, vehicle)
         _require_consistency(problem, vehicle)
@@ -131,7 +131,7 @@ suggest_for(plan, _option_of)
 
 
 def _require_motion(problem: Problem) -> None:
-    """Raise SpecError for a problem whose shortest path has no duration: its goal is its start."""
+    """Raise SpecError for a goal that is the start: no duration is the shortest that a vehicle flies."""
     if not problem.ends or problem.stages(1.0).stages:
         return
     start, goal = problem.start, problem.goal
