@@ -144,13 +144,6 @@ def test_a_refused_tilt_names_the_attitude_and_what_frees_it() -> None:
     assert found.sentence.endswith("set limits.max_tilt to 90° or more, or ask 88.9° at most")
 
 
-def test_a_goal_that_is_the_start_is_refused_where_nothing_is_passed_between() -> None:
-    """It was planned, in a millisecond."""
-    for line in (replace(LINE, gates=(), goal=LINE.start), replace(LINE, gates=(), start=LINE.goal)):
-        with pytest.raises(SpecError, match=r"^goal: it is the start, .*; move it, or give gates$"):
-            plan(line, "miqp", QUAD)
-
-
 @pytest.mark.parametrize("planner", ["miqp", "min-snap", "free-knots", "time-optimal"])
 @pytest.mark.parametrize("end", ["start", "goal"])
 def test_an_end_in_free_fall_is_refused_by_its_field(planner: str, end: str) -> None:

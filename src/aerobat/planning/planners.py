@@ -100,7 +100,6 @@ def plan(
     if vehicle is not None:
         vehicle = vehicle.without_dead_rotors()
         vehicle.require_hover(problem.environment.gravity)
-        _require_motion(problem)
         require_attitudes_at_ends(problem, vehicle)
         require_openings(problem, vehicle)
         _require_consistency(problem, vehicle)
@@ -128,15 +127,6 @@ def _option_of(name: str) -> str:
 
 
 suggest_for(plan, _option_of)
-
-
-def _require_motion(problem: Problem) -> None:
-    """Raise SpecError for a goal that is the start: no duration is the shortest that a vehicle flies."""
-    if not problem.ends or problem.stages(1.0).stages:
-        return
-    start, goal = problem.start, problem.goal
-    if all((start.derivatives(2)[k] == goal.derivatives(2)[k]).all() for k in goal.fixed(2)):
-        raise SpecError("goal: it is the start, and nothing is passed between; move it, or give gates")
 
 
 def _require_consistency(problem: Problem, vehicle: Vehicle) -> None:
