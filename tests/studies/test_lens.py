@@ -86,6 +86,7 @@ def test_units_are_those_that_the_page_on_files_tells() -> None:
         "limits.upper[2]": "m",
         "planner.order": "",
     }
+    units |= {"tolerance.attitude": "rad", "limits.max_tilt": "rad", "planner.clearance": "m"}
     units |= {"planner.time_limit": "s", "conditions.mass": "", "conditions.imu.gyro_range_deg": "°/s"}
     for name, unit in units.items():
         assert lens(name, scenario()).unit == unit

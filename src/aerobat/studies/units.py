@@ -9,14 +9,15 @@ DEGREES = "_deg"  # suffix of the names of angles in files
 # as in the comments beside the fields and in docs/files.md; names that are not here have no unit
 UNITS = MappingProxyType(
     {
-        "acceleration": "m/s²", "attitude_frequency": "rad/s", "attitude_integral_gain": "1/s³",
-        "attitude_tolerance": "rad", "centre": "m", "centre_of_mass": "m", "crackle": "m/s⁵",
-        "drag_body": "kg/s",
+        "acceleration": "m/s²", "attitude": "rad", "attitude_frequency": "rad/s",
+        "attitude_integral_gain": "1/s³", "attitude_tolerance": "rad", "centre": "m", "centre_of_mass": "m",
+        "crackle": "m/s⁵", "disturbance_filter": "s", "drag_body": "kg/s",
         "duration": "s", "gravity": "m/s²", "ground": "m", "heading": "rad", "height": "m", "hold": "s",
         "inertia": "kg·m²", "integral_gain": "1/s³", "jerk": "m/s³", "jerk_filter": "s", "lag": "s",
         "lead": "m",
         "lead_time_constant": "s", "margin": "m", "mass": "kg", "max_attitude_integral": "rad·s",
         "max_body_rate": "rad/s", "max_feedback": "m/s²", "max_integral": "m·s", "max_thrust": "N",
+        "max_tilt": "rad",
         "min_inverted_thrust": "m/s²", "min_lateral_thrust": "m/s²", "min_speed": "m/s",
         "min_upright_thrust": "m/s²", "polygon": "m", "position": "m", "position_body": "m",
         "position_gain": "1/s²", "radius": "m", "semi_axes": "m", "snap": "m/s⁴", "speed": "m/s",
@@ -40,7 +41,7 @@ OF = MappingProxyType(  # units of names that mean something else in these owner
             "start": "s", "start_attitude": "rad", "start_position": "m", "start_velocity": "m/s",
             "translation": "m", "warp": "m", "warp_depth": "m",
         },
-        "planner": {"time_limit": "s"},
+        "planner": {"clearance": "m", "time_limit": "s"},
     }
 )  # fmt: skip
 
