@@ -185,9 +185,9 @@ def test_turns_beyond_those_that_stages_ask_are_counted_and_told(quad: Vehicle) 
     begun = np.array([np.zeros(3), np.zeros(3), thrust[0] - [0.0, 0.0, 9.80665]])
     twice = Trajectory.from_inputs(begun, np.diff(thrust, axis=0) / 0.1, 0.1)
     tasks = [Task.of(one_flip(count), quad) for count in (1, 2, 3)]
-    assert [extra_turns(twice, task) for task in tasks] == [1, 0, 0]
+    assert [extra_turns(twice, task.stages, task.balance) for task in tasks] == [1, 0, 0]
     never_asked = Task.of(replace(one_flip(), maneuver=ab.Line()), quad)
-    assert extra_turns(twice, never_asked) == 0
+    assert extra_turns(twice, never_asked.stages, never_asked.balance) == 0
     assessment = Plan(one_flip(), twice, "own", vehicle=quad).assessment
     assert assessment is not None
     assert "turns over once more than the stages ask" in str(assessment)

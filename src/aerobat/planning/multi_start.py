@@ -221,13 +221,15 @@ class MultiStart:
             return
         with within_share(ROUGH_TIME):
             others = list(starts(task, guess))
-            if not any(plan and not extra_turns(path.trajectory, task) for plan, path in others):
+            if not any(
+                plan and not extra_turns(path.trajectory, task.stages, task.balance) for plan, path in others
+            ):
                 finer = starts(task, replace(guess, segments=SEGMENTS))
                 others += [each for each in finer if each[0] is not None]
         yield self.refinement, list(islice(_varied(sorted(others, key=_likeliest)), self.starts))
 
     def _priced(self, path: Plan | WarmStart) -> float:
-        return priced_duration(path.trajectory, self._task)
+        return priced_duration(path.trajectory, self._task.stages, self._task.balance)
 
     def _of_more(self, guess: Miqp) -> Iterator[_Start]:
         """Yield starts from mixed-integer plans with more intervals; none for closed courses."""
@@ -324,13 +326,15 @@ class _Found:
 
     def rank(self) -> tuple[bool, float]:
         """Return the sort key, smallest is best: paths clear of frames first, then by priced duration."""
-        path = self.path.judged.solution.source.path
-        return not self.path.is_clear, priced_duration(path.trajectory, self.path.refinement.task)
+        return not self.path.is_clear, self._priced(self.path.judged.solution.source)
 
     def is_ahead_of(self, rough: RefinedPath) -> bool:
         """Return whether this path is clear of frames and not slower than a rough path."""
-        known = priced_duration(rough.path.trajectory, self.path.refinement.task)
-        return self.rank() <= (False, known)
+        return self.path.is_clear and self.rank()[1] <= self._priced(rough)
+
+    def _priced(self, refined: RefinedPath) -> float:
+        task = self.path.refinement.task
+        return priced_duration(refined.path.trajectory, task.stages, task.balance)
 
 
 def _likeliest(start: _Start) -> tuple[bool, bool, float]:

@@ -92,7 +92,7 @@ class Assessment:
             ground=task.environment.ground,
             rate_limit=task.vehicle.max_body_rate,
             obstructed=bool(task.environment.obstacles),
-            extra_turns=extra_turns(trajectory, task),
+            extra_turns=extra_turns(trajectory, task.stages, task.balance),
         )
 
     @property

@@ -228,4 +228,4 @@ class Rescue:
 def _priced(plan: Plan) -> float:
     """Return the duration of a vehicle's plan [s], increased for each turn that its stages do not ask."""
     assert plan.evidence is not None
-    return priced_duration(plan.trajectory, plan.evidence.task)
+    return priced_duration(plan.trajectory, plan.evidence.task.stages, plan.evidence.task.balance)
