@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import aerobat as ab
-from aerobat.interchange.exports.crazyflie import MAX_PIECES, PIECE
+from aerobat.interchange.exports.crazyflie import MAX_EXTENT, MAX_PIECES, PIECE
 from aerobat.interchange.exports.heading import fit_yaw
 from aerobat.interchange.exports.loss import peak_difference
 from aerobat.interchange.exports.refit import refit
@@ -96,6 +96,7 @@ def test_any_tumble_is_fitted_and_its_loss_bounds_what_is_seen(
     rng = np.random.default_rng(seed)
     inputs = 400.0 * rng.normal(size=(8, 3)) * [1.0, not planar, 1.0]
     tumble = ab.Trajectory.from_inputs(np.zeros((4, 3)), inputs, 0.2, heading)
+    assume(np.abs(tumble.component_range(0)).max() <= MAX_EXTENT)
     plan = replace(flip, trajectory=tumble)
     folder = tmp_path_factory.mktemp("tumble") / "x"
     made = ab.export(plan, folder, "crazyflie")

@@ -224,7 +224,7 @@ def test_what_is_no_blackbox_log_is_refused_in_a_sentence(tmp_path: Path) -> Non
         file.write_bytes(content)
         with pytest.raises(SpecError, match="no flight with gyro, setpoint and motors"):
             read_blackbox(file)
-    with pytest.raises(SpecError, match="No such file"):
+    with pytest.raises(SpecError, match="no such file"):
         read_blackbox(tmp_path / "none.bfl")
 
 
