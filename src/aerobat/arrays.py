@@ -48,10 +48,9 @@ def frozen_bounds(value: ArrayLike, name: str, shape: Sequence[int | None] | Non
 
 def numbers(value: ArrayLike, name: str) -> Array:
     """The numbers, NaN among them, copied only where they are no float64 array. Raises SpecError."""
+    labelled = by_labels(value, name)
     try:
-        array = np.asarray(by_labels(value, name))
-    except SpecError:
-        raise
+        array = np.asarray(labelled)
     except (ValueError, TypeError, OverflowError):  # ragged, or nothing of the kind
         raise SpecError(f"{name} must be numbers, got {_shown(value)}") from None
     if array.dtype.kind not in "fiu":  # text, truth and complex numbers are none
@@ -75,10 +74,12 @@ def by_labels(value: Any, name: str = "") -> Any:
     series with other labels.
     """
     labels = text_labels(value)
+    if not labels or "".join(labels) in ORDERS:
+        return value
     for order in ORDERS:
-        if labels != list(order) and sorted(labels) == sorted(order):
+        if sorted(labels) == sorted(order):
             return np.asarray(value)[..., [labels.index(axis) for axis in order]]
-    if labels and "".join(labels) not in ORDERS and np.ndim(value) == 1:
+    if np.ndim(value) == 1:
         names = _shown(labels)
         raise SpecError(f"{name} must be labelled x, y, z, got the labels {names}; give .to_numpy()".lstrip())
     return value

@@ -47,8 +47,9 @@ FILES = (
     INSPECTION,
     "plan.npz",
     "plan.csv",
-    *(f"{name}.{kind}" for name in ("report", "compare", "sweep", "map", "need") for kind in ("json", "png")),
+    *(f"{name}.{kind}" for name in ("report", "compare", "sweep", "map") for kind in ("json", "png")),
     *(f"{name}.{kind}" for name in ("flights", "map") for kind in ("csv", "parquet")),
+    "need.json",
 )
 
 

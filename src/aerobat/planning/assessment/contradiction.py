@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerobat import so3
+from aerobat.arrays import Array
 from aerobat.flatness import force_balance, reference_of
 from aerobat.limits.box import FIELDS, field_with_value
 from aerobat.optimization import AssignmentProgram, solver
@@ -42,8 +43,8 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
     """Return the contradiction of the first stage that has one, or None, which proves nothing.
 
     A contradiction means that no instant within the limits has the position, velocity, acceleration and tilt
-    that the stage asks, or that start or goal ask a thrust which the rotors together cannot give. Raises
-    SpecError for gates that do not suit the maneuver.
+    that the stage asks. Start and goal contradict the vehicle if they ask a tilt beyond the limit, or a
+    thrust which the rotors together cannot give. Raises SpecError for gates that do not suit the maneuver.
     """
     for end, state in problem.ends.items():
         if state.acceleration.any() and not state.leaves_attitude_free:
@@ -56,8 +57,7 @@ def contradiction(problem: Problem, vehicle: Vehicle) -> Contradiction | None:
         if bounds and not is_possible(bounds, problem.path_limits):
             return _contradiction(stage, bounds, problem.path_limits)
         if stage.attitude is not None:
-            tilt = float(np.arccos(np.clip(stage.attitude.up[2], -1.0, 1.0)))  # without the tolerance
-            tolerance = stage.attitude.tolerance
+            tilt, tolerance = _tilt(stage.attitude.up), stage.attitude.tolerance
             if tilt - tolerance > problem.limits.max_tilt + ROUNDING:
                 sentence = _tilt_sentence(stage.name, tilt, tolerance, problem.limits.max_tilt)
                 return Contradiction(stage.name, ("limits.max_tilt",), sentence)
@@ -69,7 +69,7 @@ def _beyond_vehicle(end: str, state: EndState, problem: Problem, vehicle: Vehicl
     there = FlatState(*state.derivatives(5)[:, None])
     at_end = reference_of([0.0], there, vehicle, problem.environment).setpoint
     thrust, most_tilt = float(at_end.wrench.thrust[0]), problem.limits.max_tilt
-    tilt = float(np.arccos(np.clip(so3.thrust_axis(at_end.q_world_body[0])[2], -1.0, 1.0)))
+    tilt = _tilt(so3.thrust_axis(at_end.q_world_body[0]))
     if tilt > most_tilt + ROUNDING:
         sentence = (
             f"{end}.acceleration asks {math.degrees(tilt):.3g}° of tilt, more than limits.max_tilt "
@@ -85,6 +85,11 @@ def _beyond_vehicle(end: str, state: EndState, problem: Problem, vehicle: Vehicl
         f"{least:.3g} to {most:.3g} N together; ask {'less' if thrust > most else 'more'} there"
     )
     return Contradiction(end, (f"{end}.acceleration",), sentence)
+
+
+def _tilt(thrust_axis: Array) -> float:
+    """Return the tilt [rad] of a thrust axis, a unit vector in the world (3,)."""
+    return float(np.arccos(np.clip(thrust_axis[2], -1.0, 1.0)))
 
 
 def _tilt_sentence(stage: str, tilt: float, tolerance: float, most: float) -> str:

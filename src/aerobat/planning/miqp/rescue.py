@@ -24,7 +24,8 @@ from aerobat.vehicle import Vehicle
 RESCUE_WORK = 4.0  # work limit [s] of all fallbacks, so that refusals take 5 s (benchmarks/audit.py)
 # work limit [s] where a plan most likely exists, as a path with small constraint violations was found
 PROMISING_WORK = 15.0
-# work limit [s] where a plan is known, but poor: with 8, random problem 49-16 takes 3.21 s instead of 2.50
+# work limit [s] where a plan is known, but is poor or keeps no reserve: with 8, random problem 49-16 takes
+# 3.21 s instead of 2.50
 SHORTENING_WORK = 12.0
 FALLBACK_FRACTION = 0.75  # fraction of the remaining work for one fallback, so that the next has some
 # factor on the duration of a nearly feasible path above which a plan is poor: of the plans of 300 random
