@@ -22,7 +22,7 @@ from aerobat.vehicle import Vehicle
 
 STARTS = 8
 FINALISTS = 3  # number of fastest rough paths that get more segments
-LEG_SEGMENTS = 4  # segments of each leg of a course
+MOST_LEG_SEGMENTS = 8  # largest number of segments of a course's leg
 
 
 @planner("time-optimal")
@@ -32,7 +32,7 @@ class TimeOptimal(Planner):
     Starts are the plans of other planners, with and without a vehicle, and their paths at other paces. On a
     course they are the closed forms through its stages, around obstacles the fastest route. All starts are
     refined roughly; `Plan.starts` has the durations. The fastest paths get more segments as long as that
-    gains, up to `segments`, or four a leg on a course. The fastest certified path is returned. A `start`, a
+    gains, up to `segments`, or eight a leg on a course. The fastest certified path is returned. A `start`, a
     plan of any planner, is refined alone; other starts follow only if it fails. All limits are used in full,
     which leaves no margin for a controller, unless a `reserve` is kept: a fraction of the range of rotors and
     body rate, from either end.
@@ -42,7 +42,7 @@ class TimeOptimal(Planner):
 
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(
         4 * SEGMENTS,
-        "How many polynomial segments at most, one a phase between stages at least; a course has four a leg.",
+        "How many polynomial segments at most, one a phase between stages at least, eight a leg of a course.",
     )
     reserve: Reserve = option(
         0.0,
@@ -74,6 +74,6 @@ class TimeOptimal(Planner):
             start=self.start,
             starts=self.starts,
             finalists=FINALISTS,
-            leg_segments=LEG_SEGMENTS,
+            leg_segments=MOST_LEG_SEGMENTS,
             guess=self.guess,
         ).plan(self.time_limit)

@@ -42,7 +42,7 @@ class FreeKnots(Planner):
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(
         2 * SEGMENTS,
         f"How many polynomial segments at most, one a phase between stages at least; paths have {SEGMENTS} "
-        "where more gain little. 4 are quick. A course has two a leg, or more.",
+        "where more gain little. 4 are quick. A course has up to four a leg, or more.",
     )
     start: Annotated[Plan, AS_IT_IS] | None = None
     still_ends: bool = False

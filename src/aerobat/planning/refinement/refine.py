@@ -43,7 +43,7 @@ from aerobat.trajectory import Trajectory, polynomial
 
 SEGMENTS = 8  # segments of a maneuver: within 1 % of the fastest; 16 segments take three times as long
 LEG_SEGMENTS = 2  # segments of each leg of a course
-MAX_SEGMENTS = 80  # largest number of segments of a path, where a solve takes about a second
+MAX_SEGMENTS = 160  # largest number of segments of a path, where a solve takes about a second
 # Interior point settings of the first round, which begins at a path that may violate limits by far
 FIRST = Settings(least_barrier=1e-5, least_slack=0.1, gain=2e-4)
 ROUGH = Settings(barrier=1e-6, least_slack=1e-3)  # of the rough rounds after the first
