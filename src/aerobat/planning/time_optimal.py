@@ -21,7 +21,6 @@ from aerobat.problem.problem import Problem
 from aerobat.vehicle import Vehicle
 
 STARTS = 8
-FINALISTS = 3  # number of fastest rough paths that get more segments
 MOST_LEG_SEGMENTS = 8  # largest number of segments of a course's leg
 
 
@@ -73,7 +72,6 @@ class TimeOptimal(Planner):
             segments=self.segments,
             start=self.start,
             starts=self.starts,
-            finalists=FINALISTS,
             leg_segments=MOST_LEG_SEGMENTS,
             guess=self.guess,
         ).plan(self.time_limit)

@@ -24,13 +24,13 @@ from aerobat.vehicle import Vehicle
 RESCUE_WORK = 4.0  # work limit [s] of all fallbacks, so that refusals take 5 s (benchmarks/audit.py)
 # work limit [s] where a plan most likely exists, as a path with small constraint violations was found
 PROMISING_WORK = 15.0
-# work limit [s] where a plan is known, but is poor or keeps no reserve: with 8, random problem 49-16 takes
-# 3.21 s instead of 2.50
-SHORTENING_WORK = 12.0
+# work limit [s] where a plan is known, but is poor or keeps no reserve: with 12, random problem 49-16 takes
+# 2.69 s instead of 2.49
+SHORTENING_WORK = 16.0
 FALLBACK_FRACTION = 0.75  # fraction of the remaining work for one fallback, so that the next has some
 # factor on the duration of a nearly feasible path above which a plan is poor: of the plans of 300 random
 # problems, it selects those far from the best
-SLOW_FACTOR = 1.1
+SLOW_FACTOR = 1.07
 FREE_KNOTS = "free-knots"  # a quick planner that starts from other paths too
 HALF_RESERVE = "with half of the reserve"
 # factor on the duration of a plan without a reserve up to which one with half of the reserve is taken. Of 100

@@ -40,7 +40,7 @@ class FreeKnots(Planner):
     PLANS_CLOSED_COURSES: ClassVar[bool] = True
 
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = option(
-        2 * SEGMENTS,
+        4 * SEGMENTS,
         f"How many polynomial segments at most, one a phase between stages at least; paths have {SEGMENTS} "
         "where more gain little. 4 are quick. A course has up to four a leg, or more.",
     )

@@ -73,6 +73,7 @@ REDISTRIBUTIONS = 4  # most redistributions of knots: plans of 60 random problem
 ROUGH_TIME_FRACTION = 0.5  # fraction of the remaining time for rough rounds; the rest is for certification
 PLACES = 16  # places of a segment in the first round: with 12, finding the peaks between them does not help
 MORE_PLACES = 1.5  # factor on PLACES where rotors have no lag and their thrusts may jump
+MOST_DOUBLED = 4 * SEGMENTS  # segments from which no more are tried where certification fails or costs LOSS
 LOSS = 0.02  # increase of duration by certification, relative, from which twice as many segments are tried
 ROUND_WORK = 1e-3  # work of a round but for its program, for each segment [s] (benchmarks/work.py)
 LITTLE_GAIN = 0.005  # relative decrease of duration below which rough rounds end
@@ -94,6 +95,7 @@ MAX_ADDED_PLACES = 8
 # least distance of an added place from its neighbours, as a fraction of the gap between them
 MIN_SPACING = 0.25
 REDUCED_BACKOFF = 0.1  # factor on the tightening in rounds that add places
+MISSES = 4  # fine rounds in a row that miss a stage after which its condition is taken to be out of reach
 MIN_PROGRESS = 0.02  # relative change of duration and of violation below which rounds have stalled
 BACKOFF_FACTOR = 1.3  # factor on violations that gives the tightening of fine rounds
 BACKOFF_OFFSET = 2e-4  # constant added to that tightening, relative to the limit's size
@@ -292,20 +294,21 @@ class Refinement:
         return self._with_more_segments(rough, judged) if self.adds_segments else judged
 
     def _with_more_segments(self, rough: RefinedPath, found: Judged[RefinedPath]) -> Judged[RefinedPath]:
-        """Return the certified path, or a shorter certified path with twice as many segments.
+        """Return the certified path, or a shorter certified path with up to four times as many segments.
 
-        More segments are tried where the certified path is much longer than the rough one. Courses have many
-        segments already.
+        More segments are tried where no path was certified, or the certified one is much longer than the
+        rough one. Courses have many segments already.
         """
-        path, duration = rough.path.trajectory, found.solution.duration
-        loses_little = not found.feasible or duration <= (1.0 + LOSS) * path.duration
-        if loses_little or is_course(self.task.stages) or out_of_time():
+        path, known = rough.path.trajectory, found.solution.duration if found.feasible else np.inf
+        loses_little = known <= (1.0 + LOSS) * path.duration
+        most = is_course(self.task.stages) or path.segments >= MOST_DOUBLED
+        if loses_little or most or out_of_time():
             return found
-        finer = self.finer(rough, min(2 * path.segments, MAX_SEGMENTS), duration)
-        if not self.is_promising(finer) or finer.duration >= duration:
+        finer = self.finer(rough, min(2 * path.segments, MAX_SEGMENTS), known)
+        if not self.is_promising(finer) or finer.duration >= known:
             return found
-        judged = replace(self, adds_segments=False).finished(finer)
-        return judged if judged.feasible and judged.solution.duration < duration else found
+        judged = self.finished(finer)
+        return judged if judged.feasible and judged.solution.duration < known else found
 
     def _fine_rounds(self, rough: RefinedPath) -> Judged[RefinedPath]:
         """Run one series of fine rounds; return the certified path, or the last path tried."""
@@ -326,6 +329,10 @@ class Refinement:
     def _gives_up(self, path: RefinedPath) -> bool:
         """Return whether the refinement gives a path up early, before it has the requested segments."""
         return self.gives_up_early and not self._nearly_meets_stages(path)
+
+    def misses_stage(self, path: RefinedPath) -> bool:
+        """Return whether a path misses a stage."""
+        return self._missed_stage(path.path) is not None
 
     def _nearly_meets_stages(self, path: RefinedPath) -> bool:
         """Return whether a path misses no stage by more than further rounds may repair."""
@@ -417,7 +424,7 @@ class Rounds:
         self._segments = tuple(int(np.argmin(each)) for each in away)
         kept = limits.reserve + BACKOFF
         self._backoff = np.tile(kept, (trajectory.segments, 1))
-        self._multipliers = multipliers
+        self._multipliers, self._misses = multipliers, 0
 
     def solve(self) -> Solution[RefinedPath]:
         """Solve the program around the last path."""
@@ -441,17 +448,20 @@ class Rounds:
 
         Return False where further rounds lead nowhere.
         """
-        violation = solution.source.violation
-        if out_of_time() or self.has_stalled(solution) or not self._refinement.is_promising(solution.source):
+        source = solution.source
+        self._misses = self._misses + 1 if self._refinement.misses_stage(source) else 0
+        stalls = self.has_stalled(solution) or self._misses >= MISSES
+        if out_of_time() or stalls or not self._refinement.is_promising(source):
             return False
+        violation = source.violation
         self.back_off(violation, BACKOFF_FACTOR, BACKOFF_OFFSET)
         if certificate is not None:
             refuted, times = _refuted(certificate, self._refinement.task.reserve)
-            self._add_places(_with_times(violation.peaks, solution.source.path.trajectory, times))
+            self._add_places(_with_times(violation.peaks, source.path.trajectory, times))
             kept = self._backoff - self._refinement.limits.reserve
             is_near = violation.nearby + kept > -NEAR_LIMIT
             self._backoff += (BACKOFF_FACTOR * refuted + BACKOFF_OFFSET) * is_near
-        self._guess = solution.source.path
+        self._guess = source.path
         return True
 
     def has_stalled(self, solution: Solution[RefinedPath]) -> bool:
