@@ -53,7 +53,6 @@ def programs(draw: st.DrawFn) -> AssignmentProgram:
     some = tuple(draw(st.lists(stages(m), max_size=3)))
     places = st.integers(0, max(len(some) - 1, 0))
     order = draw(st.lists(st.tuples(places, places), max_size=2)) if some else []
-    root = arrays(draw, n, n)
     return AssignmentProgram(
         equality=arrays(draw, p, n),
         target=arrays(draw, p),
@@ -62,9 +61,6 @@ def programs(draw: st.DrawFn) -> AssignmentProgram:
         upper=5.0 * high + 5.0,
         stages=some,
         precedence=tuple(order),
-        hessian=draw(st.sampled_from([None, root @ root.T + np.eye(n)])),
-        gradient=draw(st.sampled_from([None, arrays(draw, n)])),
-        constant=draw(numbers),
     )
 
 
@@ -162,8 +158,6 @@ def enlarged(program: AssignmentProgram, factor: float) -> AssignmentProgram:
         lower=factor * program.lower,
         upper=factor * program.upper,
         target=factor * program.target,
-        gradient=None if program.gradient is None else factor * program.gradient,
-        constant=factor**2 * program.constant,
         stages=tuple(replace(s, lower=factor * s.lower, upper=factor * s.upper) for s in program.stages),
     )
 

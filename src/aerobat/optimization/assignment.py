@@ -1,6 +1,6 @@
 """An assignment program: a convex QP plus stages, each assigned to one slot.
 
-    minimize    ½ xᵀ H x + fᵀ x + c
+    minimize    xᵀ x
     subject to  E x = target                   (equality rows)
                 lower <= A x <= upper          (range rows; infinite bounds never bind)
                 every stage has one of its slots, no two stages the same slot, some stages in order.
@@ -80,9 +80,6 @@ class AssignmentProgram:
     upper: Array  # (m,)
     stages: tuple[SlottedStage, ...] = ()
     precedence: tuple[tuple[int, int], ...] = ()  # (i, j): stage i has a smaller slot than stage j
-    hessian: Array | None = None  # H (n, n) symmetric positive definite; None is 2 I: xᵀx is minimized
-    gradient: Array | None = None  # f (n,); None is 0
-    constant: float = 0.0  # c
 
     def __post_init__(self) -> None:
         """Copy, write-protect and check."""
@@ -92,11 +89,6 @@ class AssignmentProgram:
         _set(self, target=_shared(self.target, "target", (len(equality),)))
         _set(self, lower=_bounds(self.lower, "lower", "lower", (len(rows),)))
         _set(self, upper=_bounds(self.upper, "upper", "upper", (len(rows),)))
-        if self.hessian is not None:
-            shape = (self.num_variables, self.num_variables)
-            _set(self, hessian=_positive_definite(_shared(self.hessian, "hessian", shape)))
-        if self.gradient is not None:
-            _set(self, gradient=_shared(self.gradient, "gradient", (self.num_variables,)))
         _set(self, stages=tuple(self.stages), precedence=tuple((int(i), int(j)) for i, j in self.precedence))
         self._check_stages()
 
@@ -133,18 +125,8 @@ class AssignmentProgram:
         return all(self.precedes[i, i + 1] for i in range(len(self.stages) - 1))
 
     def cost(self, x: Array) -> float:
-        """Return ½ xᵀ H x + fᵀ x + c."""
-        quadratic = x @ x if self.hessian is None else 0.5 * (x @ self.hessian @ x)
-        linear = 0.0 if self.gradient is None else self.gradient @ x
-        return float(quadratic + linear + self.constant)
-
-    @cached_property
-    def _unconstrained_norm(self) -> float:
-        """|x| at the minimum of the cost without constraints."""
-        if self.gradient is None:
-            return 0.0
-        step = self.gradient / 2.0 if self.hessian is None else np.linalg.solve(self.hessian, self.gradient)
-        return float(np.linalg.norm(step))
+        """Return xᵀ x."""
+        return float(x @ x)
 
     def is_assignment(self, slots: Sequence[int]) -> bool:
         """Tell if `slots`, one for each stage, are allowed slots, distinct and in order."""
@@ -177,8 +159,7 @@ class AssignmentProgram:
     def violation(self, x: Array, slots: Sequence[int]) -> float:
         """Return the largest residual of any row a x <= b, relative to |a| |x| + |b|, for stages in `slots`.
 
-        In this scale |x| is at least its value at the minimum of the cost without constraints. The result is
-        infinite where `slots` are not a valid assignment.
+        The result is infinite where `slots` are not a valid assignment.
         """
         if not self.is_assignment(slots):
             return inf
@@ -186,7 +167,7 @@ class AssignmentProgram:
         values = self.rows @ x
         below = lower - values
         above = values - upper
-        norm = max(float(np.linalg.norm(x)), self._unconstrained_norm)
+        norm = float(np.linalg.norm(x))
         return max(
             _relative(np.maximum(below, above), self.rows, norm, np.where(below > above, lower, upper)),
             _relative(np.abs(self.equality @ x - self.target), self.equality, norm, self.target),
@@ -246,16 +227,6 @@ def _bounds(value: ArrayLike, name: str, side: str, shape: tuple[int] | None = N
     if (bounds == never).any():
         raise SpecError(f"{name} must not be {never}, which nothing satisfies")
     return bounds
-
-
-def _positive_definite(hessian: Array) -> Array:
-    if not np.allclose(hessian, hessian.T, rtol=1e-9, atol=1e-12):
-        raise SpecError("hessian must be symmetric")
-    try:
-        np.linalg.cholesky(hessian)
-    except np.linalg.LinAlgError:
-        raise SpecError("hessian must be positive definite; add a small multiple of the identity") from None
-    return hessian
 
 
 def _indices(value: ArrayLike, name: str) -> Indices:

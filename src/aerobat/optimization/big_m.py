@@ -37,8 +37,8 @@ class Model(Protocol):
         """Add a constraint that holds while a binary is 1."""
         ...
 
-    def minimize(self, quadratic: Any, linear: Any, constant: float) -> None:
-        """Set the cost, the sum of a quadratic and a linear expression and a constant."""
+    def minimize(self, cost: Any) -> None:
+        """Set the cost, a quadratic expression."""
         ...
 
 
@@ -102,8 +102,6 @@ def scaled(program: AssignmentProgram) -> ScaledProgram:
         equality=equality,
         target=target / unit,
         stages=tuple(stages),
-        gradient=None if program.gradient is None else program.gradient / unit,
-        constant=program.constant / unit**2,
     )
     return ScaledProgram(program, scaled_program, float(unit))
 
@@ -129,13 +127,7 @@ def build(model: Model, program: AssignmentProgram) -> Variables:
             model.add(product(row) <= root_bound + (bound - root_bound) * binaries[key])
         else:
             model.add_indicator(binaries[key], product(row) <= bound)
-    if program.hessian is None:
-        quadratic = model.total(each * each for each in x)
-    else:
-        pairs = zip(*np.nonzero(program.hessian), strict=True)
-        quadratic = model.total(0.5 * float(program.hessian[i, j]) * x[i] * x[j] for i, j in pairs)
-    linear = 0.0 if program.gradient is None else product(program.gradient)
-    model.minimize(quadratic, linear, program.constant)
+    model.minimize(model.total(each * each for each in x))
     return Variables(x, binaries)
 
 

@@ -72,8 +72,8 @@ class _GurobiModel:
     def add_indicator(self, binary: Any, constraint: Any) -> None:
         self._model.addGenConstrIndicator(binary, True, constraint)
 
-    def minimize(self, quadratic: Any, linear: Any, constant: float) -> None:
-        self._model.setObjective(quadratic + linear + constant, self._grb.MINIMIZE)
+    def minimize(self, cost: Any) -> None:
+        self._model.setObjective(cost, self._grb.MINIMIZE)
 
 
 def _claim(

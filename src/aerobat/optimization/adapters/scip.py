@@ -58,12 +58,11 @@ class _ScipModel:
     def add_indicator(self, binary: Any, constraint: Any) -> None:
         self._model.addConsIndicator(constraint, binary)
 
-    def minimize(self, quadratic: Any, linear: Any, constant: float) -> None:
+    def minimize(self, cost: Any) -> None:
         """Minimize an extra variable that is at least the quadratic cost: SCIP's objective is linear."""
-        cost = self.variable()
-        self.add(quadratic <= cost)
-        self._model.setObjective(cost + linear)
-        self._model.addObjoffset(constant)
+        bound = self.variable()
+        self.add(cost <= bound)
+        self._model.setObjective(bound)
 
 
 def _claim(pyscipopt: Any, model: Any, program: AssignmentProgram) -> AssignmentResult:

@@ -1,9 +1,9 @@
 """Elimination of the equalities: the QP becomes the shortest vector that satisfies the range rows.
 
-With H = L Lᵀ and w = Lᵀ x + L⁻¹ f the cost is ½|w|² plus a constant. The solutions of the equalities G w = d
-are w = G⁺ d + Z y. Z is an orthonormal basis of the null space of G. In terms of y:
+With w = √2 x the cost is ½|w|². The solutions of the equalities G w = d are w = G⁺ d + Z y. Z is an
+orthonormal basis of the null space of G. In terms of y:
 
-    cost = ½|y|² + ½|G⁺ d|² + constant,      rows:  lower <= M y <= upper,   |M_i| = 1.
+    cost = ½|y|² + ½|G⁺ d|²,      rows:  lower <= M y <= upper,   |M_i| = 1.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ _RANK_TOLERANCE = 1e-11  # singular values below this fraction of the largest co
 _CONSTANT_ROW_TOLERANCE = 1e-9  # rows whose projection is below this fraction of their norm count as constant
 # largest residual of redundant equalities and of constant rows, relative to their scale
 _CONSISTENCY_TOLERANCE = 1e-7
+_SCALE = sqrt(2.0)  # w over x
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +71,12 @@ class NullSpace:
         self.ranges = np.flatnonzero(block.rows)
         self._equalities = np.flatnonzero(block.equalities)
         self._implicit_equalities = np.flatnonzero(block.rows & implicit_equalities)
-        scaling = _CholeskyScaling(program, self.columns)
-        self._eliminate(program, scaling)
-        self._project(program, scaling, implicit_equalities[self.ranges])
+        self._eliminate(program)
+        self._project(program, implicit_equalities[self.ranges])
 
-    def _eliminate(self, program: AssignmentProgram, scaling: _CholeskyScaling) -> None:
+    def _eliminate(self, program: AssignmentProgram) -> None:
         rows = np.concatenate([program.equality[self._equalities], program.rows[self._implicit_equalities]])
-        rows = rows[:, self.columns]
-        equality = scaling.scale_rows(rows)
+        equality = rows[:, self.columns] / _SCALE
         norms = row_norms(equality)
         self._equality_scale = 1.0 / np.where(norms > 0.0, norms, 1.0)
         equality = equality * self._equality_scale[:, None]
@@ -85,17 +84,14 @@ class NullSpace:
         rank = int((singular > _RANK_TOLERANCE * singular.max(initial=0.0)).sum())
         self._pseudo_inverse = right[:rank].T @ (left[:, :rank] / singular[:rank]).T
         self._residual_projector = np.eye(len(equality)) - equality @ self._pseudo_inverse
-        self._w_offset_norm = float(np.linalg.norm(scaling.offset))
-        self._unconstrained_x = -scaling.unscale(scaling.offset)
-        self._unconstrained_equality = rows @ self._unconstrained_x
-        self._x_from_target = scaling.unscale(self._pseudo_inverse)
-        self._x_from_y = scaling.unscale(right[rank:].T)
+        self._x_from_target = self._pseudo_inverse / _SCALE
+        self._x_from_y = right[rank:].T / _SCALE
 
-    def _project(self, program: AssignmentProgram, scaling: _CholeskyScaling, fixed: Mask) -> None:
+    def _project(self, program: AssignmentProgram, fixed: Mask) -> None:
         rows = program.rows[self.ranges][:, self.columns]
         projected = rows @ self._x_from_y
         norm = row_norms(projected)
-        self._row_norms = row_norms(scaling.scale_rows(rows))
+        self._row_norms = row_norms(rows / _SCALE)
         constant = (norm <= _CONSTANT_ROW_TOLERANCE * self._row_norms) | fixed
         norm[constant] = 1.0
         projected[constant] = 0.0
@@ -105,17 +101,15 @@ class NullSpace:
         self.rows = np.zeros((len(rows) + 1, projected.shape[1]))
         np.divide(projected, norm[:, None], out=self.rows[:-1])
         self._rows_from_target = rows @ self._x_from_target
-        self._unconstrained_rows = rows @ self._unconstrained_x
 
     def bounds(self, program: AssignmentProgram, lower: Array, upper: Array) -> ReducedBounds:
         """Return the program's targets and the bounds (m,) of its range rows, reduced to the null space."""
         target = np.concatenate([program.target[self._equalities], lower[self._implicit_equalities]])
-        target = (target - self._unconstrained_equality) * self._equality_scale
+        target = target * self._equality_scale
         residual = np.abs(self._residual_projector @ target)
         norm = float(np.linalg.norm(self._pseudo_inverse @ target))
-        offset = np.append(self._unconstrained_rows + self._rows_from_target @ target, 0.0)
-        scale = self._row_norms * np.hypot(norm, self._w_offset_norm)
-        slack = np.append(_CONSISTENCY_TOLERANCE * scale, 0.0)
+        offset = np.append(self._rows_from_target @ target, 0.0)
+        slack = np.append(_CONSISTENCY_TOLERANCE * self._row_norms * norm, 0.0)
         low = self.normalized(np.append(lower[self.ranges], -inf), offset)
         high = self.normalized(np.append(upper[self.ranges], inf), offset)
         fits = (low <= slack) & (high >= -slack) | ~self.constant
@@ -125,10 +119,10 @@ class NullSpace:
         return ReducedBounds(
             lower=low,
             upper=high,
-            base_cost=0.5 * (norm**2 - self._w_offset_norm**2),
+            base_cost=0.5 * norm**2,
             row_offset=offset,
             slack=slack,
-            x_offset=self._unconstrained_x + self._x_from_target @ target,
+            x_offset=self._x_from_target @ target,
             min_norm=max(norm, low.max(initial=0.0), -high.min(initial=0.0)),
             consistent=bool(fits.all() and (residual <= max_residual).all()),
         )
@@ -152,10 +146,7 @@ def in_units(bound: Array, unit: float) -> Array:
 
 def split_coupled(program: AssignmentProgram, rows: Indices) -> tuple[Block, Block]:
     """Split a program in two independent blocks: everything coupled to range rows `rows`, and the rest."""
-    couplings = [np.abs(program.equality), np.abs(program.rows)]
-    if program.hessian is not None:
-        couplings.append(np.abs(program.hessian))
-    incidence = np.concatenate(couplings)
+    incidence = np.abs(np.concatenate([program.equality, program.rows]))
     p = len(program.equality)
     columns: Mask = np.any(incidence[p + rows], axis=0)
     while True:
@@ -168,23 +159,3 @@ def split_coupled(program: AssignmentProgram, rows: Indices) -> tuple[Block, Blo
     ranges = touched[p : p + len(program.rows)]
     ranges[rows] = True
     return Block(columns, equalities, ranges), Block(~columns, ~equalities, ~ranges)
-
-
-class _CholeskyScaling:
-    """The change of variables x = L⁻ᵀ (w − offset), with L = √2 where the program has no hessian."""
-
-    def __init__(self, program: AssignmentProgram, columns: Indices) -> None:
-        gradient = np.zeros(len(columns)) if program.gradient is None else program.gradient[columns]
-        self._inverse: Array | None = None
-        self.offset = gradient / sqrt(2.0)  # L⁻¹ f
-        if program.hessian is not None:
-            self._inverse = np.linalg.inv(np.linalg.cholesky(program.hessian[np.ix_(columns, columns)]))
-            self.offset = self._inverse @ gradient
-
-    def scale_rows(self, matrix: Array) -> Array:
-        """Return rows over x as rows over w."""
-        return matrix / sqrt(2.0) if self._inverse is None else matrix @ self._inverse.T
-
-    def unscale(self, vectors: Array) -> Array:
-        """Return L⁻ᵀ times the columns of `vectors`."""
-        return vectors / sqrt(2.0) if self._inverse is None else self._inverse.T @ vectors

@@ -20,7 +20,7 @@ from aerobat.optimization.branch_and_bound.search import BestFirstSearch
 from aerobat.optimization.deadline import count_work
 from aerobat.optimization.result import AssignmentResult, Status, verified
 
-_MATRICES = ("rows", "equality", "hessian", "gradient")
+_MATRICES = ("rows", "equality")
 _EQUALITY_TOLERANCE = 1e-12  # bounds closer than this fraction of the larger one make an equality
 # a lower bound contradicts the upper one where it exceeds it by this fraction of the larger one
 _CONTRADICTION_TOLERANCE = 1e-9
@@ -168,7 +168,7 @@ class _Factorization:
             return None
         bounds = self.candidates.bounds(program, self.coupled, root)
         root = root.in_units(max(root.min_norm, self.candidates.min_norm(bounds)) or 1.0)
-        elsewhere = program.constant + independent.cost(solution.value)
+        elsewhere = independent.cost(solution.value)
         return _Blocks(root, bounds.in_units(root.unit), independent, solution.y, elsewhere)
 
 
