@@ -296,13 +296,13 @@ class Refinement:
     def _with_more_segments(self, rough: RefinedPath, found: Judged[RefinedPath]) -> Judged[RefinedPath]:
         """Return the certified path, or a shorter certified path with up to four times as many segments.
 
-        More segments are tried where no path was certified, or the certified one is much longer than the
-        rough one. Courses have many segments already.
+        More segments are tried where limits left no certified path, or one much longer than the rough one.
+        Courses have many segments already.
         """
         path, known = rough.path.trajectory, found.solution.duration if found.feasible else np.inf
         loses_little = known <= (1.0 + LOSS) * path.duration
-        most = is_course(self.task.stages) or path.segments >= MOST_DOUBLED
-        if loses_little or most or out_of_time():
+        has_most = is_course(self.task.stages) or path.segments >= MOST_DOUBLED
+        if loses_little or has_most or out_of_time() or self.misses_stage(found.solution.source):
             return found
         finer = self.finer(rough, min(2 * path.segments, MAX_SEGMENTS), known)
         if not self.is_promising(finer) or finer.duration >= known:
