@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from aerobat.errors import SpecError
-from aerobat.interchange.exports.heading import POWERS, YawFit, fit_yaw
+from aerobat.interchange.exports.heading import POWERS, fit_yaw
 from aerobat.interchange.exports.loss import Content, Loss, peak_difference
 from aerobat.interchange.exports.refit import DEGREE, refit
 from aerobat.interchange.tables import csv_text
@@ -55,9 +55,14 @@ def fitted_pieces(plan: Plan) -> tuple[Pieces, Loss]:
     powers = fitted.durations[:, None, None] ** np.arange(fitted.degree + 1)[:, None]
     pieces["polynomials"][:, :3, : fitted.degree + 1] = np.moveaxis(fitted.coefficients / powers, 1, 2)
     path = as_path(pieces)
-    yaw = fit_yaw(plan, path)
-    pieces["polynomials"][:, 3] = yaw.coefficients
-    loss = _loss(plan, path, yaw)
+    pieces["polynomials"][:, 3], attitude_error, thrust_axis_error = fit_yaw(plan, path)
+    loss = Loss(
+        position=peak_difference(plan.trajectory, 0, path),
+        velocity=peak_difference(plan.trajectory, 1, path, 1),
+        attitude=attitude_error,
+        thrust_axis=thrust_axis_error,
+        reading="pieces of float32 coefficients",
+    )
     if loss.position > MAX_ERROR:
         raise SpecError(
             f"{MAX_PIECES} pieces of degree {DEGREE}, as many as the Crazyflie holds, miss the path by "
@@ -72,13 +77,3 @@ def as_path(pieces: Pieces, heading: float = 0.0) -> Trajectory:
     powers = durations[:, None, None] ** np.arange(POWERS)[:, None]
     coefficients = np.moveaxis(pieces["polynomials"][:, :3].astype(float), 2, 1)
     return Trajectory(durations, coefficients * powers, heading)
-
-
-def _loss(plan: Plan, path: Trajectory, yaw: YawFit) -> Loss:
-    return Loss(
-        position=peak_difference(plan.trajectory, 0, path),
-        velocity=peak_difference(plan.trajectory, 1, path, 1),
-        attitude=yaw.attitude_error,
-        thrust_axis=yaw.thrust_axis_error,
-        reading="pieces of float32 coefficients",
-    )

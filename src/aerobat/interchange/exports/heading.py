@@ -8,8 +8,6 @@ beyond that direction it is turned round.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from aerobat import so3
@@ -29,17 +27,12 @@ REGULARIZATION = 1e-2  # [-] of coefficients, against a fit of rounding where at
 DEFINED = 1e-9  # [m/s²] of thrust, or sine of its angle to the heading, below which no attitude is defined
 
 
-@dataclass(frozen=True, eq=False)
-class YawFit:
-    """Polynomials of yaw, and the errors of the attitudes that follow from them."""
+def fit_yaw(plan: Plan, path: Trajectory) -> tuple[Array, float, float]:
+    """Return polynomials of yaw, one for each segment of the path, with attitudes nearest to the plan's.
 
-    coefficients: Array  # [rad/s^k] rounded to float32, (pieces, POWERS)
-    attitude_error: float  # [rad] the largest, with the heading
-    thrust_axis_error: float  # [rad] the largest, without the heading
-
-
-def fit_yaw(plan: Plan, path: Trajectory) -> YawFit:
-    """Return polynomials of yaw, one for each segment of the path, with attitudes nearest to the plan's."""
+    Their coefficients [rad/s^k], (pieces, POWERS), are rounded to float32. They come with the largest errors
+    of the attitudes that follow from them [rad], with and without the heading.
+    """
     s = np.linspace(0.0, 1.0, SAMPLES)
     instants = path.knots[:-1, None] + s * path.durations[:, None]
     planned = attitudes(plan, instants.ravel()).reshape(*instants.shape, 4)
@@ -52,7 +45,7 @@ def fit_yaw(plan: Plan, path: Trajectory) -> YawFit:
     in_seconds = path.durations[:, None] ** np.arange(POWERS)
     written = (fitted / in_seconds).astype(np.float32).astype(float)
     read = _attitude(z, (written * in_seconds) @ powers.T)
-    return YawFit(written, *peak_angles(planned, read))
+    return (written, *peak_angles(planned, read))
 
 
 def _ends_before(fitted: Array) -> Array:
