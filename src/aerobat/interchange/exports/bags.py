@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -62,8 +62,10 @@ def _bag(container: str, plan: Plan, rate: float) -> Content:
     messages = sorted(made, key=lambda each: each.stamp)
     loss = replace(ExportRows.of(found).loss(plan), obstacles=flattened(plan))
     with tempfile.TemporaryDirectory() as scratch:  # rosbags writes to folders only
-        write = _write_ros1 if container == "ros1" else partial(_write_ros2, container)
-        return Content(write(store, messages, Path(scratch) / NAME), loss)
+        path = Path(scratch) / NAME
+        _write(container, store, messages, path)
+        files = {"ros1": [path], "ros2": [path / name for name in ROS2_BAG], "mcap": [path / f"{NAME}.mcap"]}
+        return Content(tuple(file.read_bytes() for file in files[container]), loss)
 
 
 ros1_bag = partial(_bag, "ros1")
@@ -71,35 +73,27 @@ ros2_bag = partial(_bag, "ros2")
 mcap = partial(_bag, "mcap")
 
 
-def _write_ros1(store: Any, messages: Sequence[Stamped], path: Path) -> tuple[bytes, ...]:
-    from rosbags.rosbag1 import Writer
-
-    with Writer(path) as bag:
-        _fill(bag, store, store.serialize_ros1, messages)
-    return (path.read_bytes(),)
-
-
-def _write_ros2(container: str, store: Any, messages: Sequence[Stamped], path: Path) -> tuple[bytes, ...]:
-    from rosbags.rosbag2 import StoragePlugin, Writer
-
-    plugin = StoragePlugin.MCAP if container == "mcap" else StoragePlugin.SQLITE3
-    with Writer(path, version=Writer.VERSION_LATEST, storage_plugin=plugin) as bag:
-        _fill(bag, store, store.serialize_cdr, messages)
-    names = (f"{NAME}.mcap",) if container == "mcap" else ROS2_BAG
-    return tuple((path / name).read_bytes() for name in names)
-
-
-def _fill(bag: Any, store: Any, serialize: Callable[[Any, str], Any], messages: Sequence[Stamped]) -> None:
-    """Write messages to an open bag; each topic is added before its first message.
+def _write(container: str, store: Any, messages: Sequence[Stamped], path: Path) -> None:
+    """Write messages to a new bag; each topic is added before its first message.
 
     Args:
-        bag: A writer of `rosbags`.
+        container: The kind of the bag: ros1, ros2 or mcap.
         store: The types of the messages.
-        serialize: Returns a message of a kind as bytes.
         messages: The messages, in order of time.
+        path: The bag, which for ROS 2 is a folder.
     """
+    from rosbags import rosbag1, rosbag2
+
+    writer: Any
+    if container == "ros1":
+        writer, serialize = rosbag1.Writer(path), store.serialize_ros1
+    else:
+        plugin = rosbag2.StoragePlugin.MCAP if container == "mcap" else rosbag2.StoragePlugin.SQLITE3
+        version = rosbag2.Writer.VERSION_LATEST
+        writer, serialize = rosbag2.Writer(path, version=version, storage_plugin=plugin), store.serialize_cdr
     connections: dict[str, Any] = {}
-    for each in messages:
-        if each.topic not in connections:
-            connections[each.topic] = bag.add_connection(each.topic, each.kind, typestore=store)
-        bag.write(connections[each.topic], each.stamp, serialize(each.message, each.kind))
+    with writer as bag:
+        for each in messages:
+            if each.topic not in connections:
+                connections[each.topic] = bag.add_connection(each.topic, each.kind, typestore=store)
+            bag.write(connections[each.topic], each.stamp, serialize(each.message, each.kind))
