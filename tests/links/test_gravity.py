@@ -120,7 +120,7 @@ def simulated(monkeypatch: pytest.MonkeyPatch) -> list[ab.Environment]:
     wire = Wire(1, 1)
     wire.other = Wire(2, 1)
     monkeypatch.setattr(SimulatedVehicle, "__init__", noted)
-    monkeypatch.setattr("aerobat.links.mavlink.connection.connect", lambda *_, **__: wire)
+    monkeypatch.setattr("aerobat.cli.commands.mavlink.connect", lambda *_, **__: wire)
     monkeypatch.setattr("aerobat.cli.commands.ros._joined", lambda *_: Ros(Graph(2)))
     monkeypatch.setattr("aerobat.cli.commands.ros.run", lambda *_: None)
     return found

@@ -211,7 +211,7 @@ def test_an_interrupt_while_a_flight_is_prepared_ends_as_any_other(plan: Path, m
     def interrupted(*arguments: object, **settings: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("aerobat.links.mavlink.client.Client", interrupted)
+    monkeypatch.setattr("aerobat.cli.commands.mavlink.Client", interrupted)
     code, out, err = run(capsys, "link", "mavlink", str(plan), "--connect", f"udp:127.0.0.1:{free_port()}")
     assert code == 130, err
     assert not out

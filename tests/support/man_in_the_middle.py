@@ -451,8 +451,8 @@ def flown_with(mischief: list[Mischief], plan: Path, tcp: bool, first: bool = Fa
     out, said = io.StringIO(), io.StringIO()
     told = contextlib.redirect_stdout(out), contextlib.redirect_stderr(said)
     with pytest.MonkeyPatch.context() as patch, told[0], told[1]:
-        patch.setattr("aerobat.links.clock.WallClock", lambda speed: stepped)
-        patch.setattr("aerobat.links.mavlink.client.Client", Seen)
+        patch.setattr("aerobat.cli.commands.mavlink.WallClock", lambda speed: stepped)
+        patch.setattr("aerobat.cli.commands.mavlink.Client", Seen)
         patch.setattr(connection, "time", stepped)
         try:
             flight.code = code("link", "mavlink", plan, "--connect", middle.address, "--json")

@@ -1,14 +1,12 @@
 """The options of live links, each with its help."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter, validators
 
 from aerobat.cli.options import POSITIVE, PluginOptions, RunOptions, planning
-
-if TYPE_CHECKING:
-    from aerobat.links.mission import MissionSettings
+from aerobat.links.mission import MissionSettings
 
 linking = Group("Link", sort_key=1)
 trials = Group("Trials", sort_key=2)
@@ -32,10 +30,8 @@ class MissionOptions(PluginOptions):
     """Seconds by which a set-point may be late, in the plan."""
 
     @property
-    def mission(self) -> "MissionSettings":
+    def mission(self) -> MissionSettings:
         """The options as settings of a mission."""
-        from aerobat.links.mission import MissionSettings
-
         return MissionSettings(
             max_error=self.max_error, max_silence=self.max_silence, max_lateness=self.max_lateness
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import closing
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,12 +14,19 @@ from aerobat.cli.interrupts import REPORTED
 from aerobat.cli.link_options import MavlinkOptions, MavlinkVehicleOptions
 from aerobat.cli.runs.saved_plans import named_environment, named_vehicle, whole_plan
 from aerobat.cli.terminal import print_json, say
+from aerobat.links.autopilot.vehicle import SimulatedVehicle
+from aerobat.links.clock import WallClock, ticks
+from aerobat.links.mavlink.autopilot_link import COMPONENT, SYSTEM
+from aerobat.links.mavlink.client import Client, ClientSettings, run
+from aerobat.links.mavlink.connection import LossyConnection, connect
+from aerobat.links.mavlink.dialects import DIALECTS
+from aerobat.links.mavlink.front_end import SYSTEM as VEHICLE_SYSTEM
+from aerobat.links.mavlink.front_end import FrontEnd
+from aerobat.links.mission import Phase, require_flyable
+from aerobat.links.report import LinkReport
 from aerobat.planning import Plan
 from aerobat.reporting.plain_data import plain, to_json
 from aerobat.simulation.autopilot import recoveries
-
-if TYPE_CHECKING:
-    from aerobat.links.report import LinkReport
 
 _RATE = 250.0  # [1/s] at which a simulated vehicle takes and sends messages
 CLEARANCE = 3.0  # [m] of a plan's lowest point over where the vehicle stands
@@ -41,12 +47,6 @@ def mavlink(plan: Path, options: MavlinkOptions = MavlinkOptions()) -> ExitCode:
         A .plan file, or a run's folder.
     """
     found = whole_plan(plan, "give a .plan file, which is certified for its vehicle")
-    from aerobat.links.clock import WallClock
-    from aerobat.links.mavlink.autopilot_link import COMPONENT, SYSTEM
-    from aerobat.links.mavlink.client import Client, ClientSettings, run
-    from aerobat.links.mavlink.connection import connect
-    from aerobat.links.mission import Phase, require_flyable
-
     offset = _origin(found) if options.origin is None else np.array(options.origin)
     require_flyable(found, offset, options.vehicle)
     connection = connect(options.connect, listen=False, system=SYSTEM, component=COMPONENT, baud=options.baud)
@@ -90,13 +90,7 @@ def mavlink_vehicle(
         A name that `aerobat show` lists, or a vehicle's TOML file.
     """
     found, environment = named_vehicle(vehicle), named_environment(options.environment)
-    from aerobat.links.autopilot.vehicle import SimulatedVehicle
-    from aerobat.links.clock import WallClock, ticks
-    from aerobat.links.mavlink.connection import LossyConnection, connect
-    from aerobat.links.mavlink.dialects import DIALECTS
-    from aerobat.links.mavlink.front_end import SYSTEM, FrontEnd
-
-    connection = connect(options.listen, listen=True, system=SYSTEM)
+    connection = connect(options.listen, listen=True, system=VEHICLE_SYSTEM)
     simulated = SimulatedVehicle(found, environment)
     clock = WallClock(options.speed)
     if options.loss or options.delay:
