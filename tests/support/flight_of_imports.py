@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 import aerobat as ab
-from aerobat.links.rehearsal import rehearse
+from aerobat.links.commander import rehearse
 from aerobat.links.ros.maneuver_node import ManeuverNode
 from ros_sky import AtOnce, Graph, Ros
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.errors import SpecError
+from aerobat.kernels.rigid_body import Body
 from aerobat.links.goals import Observed, PathGoal, PositionGoal, yaw_of
 from aerobat.links.mission import Mission, Phase
 from aerobat.links.routes import DESCENT_SPEED, SPEED, Route, rest_to_rest, straight_down
@@ -250,3 +251,27 @@ class Commander:
 
     def _goal_on_route(self, now: float) -> PositionGoal:
         return self._present_route.goal(now + self._period)
+
+
+def rehearse(vehicle: Vehicle, gravity: float) -> None:
+    """Fly up, to a halt, and down a vehicle that is always at its goal.
+
+    This dry run imports all modules of a real flight before a vehicle waits for them.
+
+    Args:
+        vehicle: of which the maximum thrust is used for braking.
+        gravity: [m/s²].
+    """
+    period, now = 0.1, 0.0  # [s]
+    commander = Commander(vehicle, gravity, period)
+    standing = Body((0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), (0.0,) * 3)
+    commander.observe(Observed(now, standing))
+    commander.take_off(now, height=1.0)
+    for order in (commander.hover, commander.land, None):
+        while commander.doing not in (Doing.HOVERING, Doing.NOTHING):
+            goal, now = commander.step(now), now + period
+            if goal is not None:
+                reached = goal.position, goal.velocity, goal.q_world_body, goal.omega
+                commander.observe(Observed(now, Body(*(tuple(part.tolist()) for part in reached))))
+        if order is not None:
+            order(now)

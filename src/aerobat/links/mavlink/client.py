@@ -12,12 +12,12 @@ import numpy as np
 from aerobat.arrays import Array
 from aerobat.errors import SpecError
 from aerobat.links.clock import Clock, ticks
+from aerobat.links.commander import rehearse
 from aerobat.links.goals import Mode, Observed, PositionGoal, yaw_of
 from aerobat.links.mavlink.autopilot_link import AutopilotLink
 from aerobat.links.mavlink.connection import Connection
 from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.path_follower import PathFollower
-from aerobat.links.rehearsal import rehearse
 from aerobat.links.report import LinkReport, link_report
 from aerobat.links.stream import SetpointStream
 from aerobat.planning import Plan

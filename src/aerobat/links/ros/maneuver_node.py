@@ -13,10 +13,9 @@ import numpy as np
 from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, RosMessage
-from aerobat.links.commander import Commander, Doing
+from aerobat.links.commander import Commander, Doing, rehearse
 from aerobat.links.goals import Observed, PathGoal, PathPiece, yaw_of
 from aerobat.links.mission import Mission, MissionSettings, Phase
-from aerobat.links.rehearsal import rehearse
 from aerobat.links.report import LinkReport, link_report
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Answer, Middleware
