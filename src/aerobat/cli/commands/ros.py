@@ -19,11 +19,13 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.betaflight.board import board_at
-from aerobat.links.ros.crazyswarm import PREFIX, Crazyflie, Ros2
+from aerobat.links.ros.crazyswarm import PREFIX, Crazyflie
 from aerobat.links.ros.crazyswarm_server import CrazyswarmServer
 from aerobat.links.ros.maneuver_node import OWN_SERVICES, ManeuverNode, NodeSettings, Tick
 from aerobat.links.ros.middleware import Middleware, PacedClock
 from aerobat.links.ros.preparation import MANEUVERS, ManeuverRequest, prepare, shared_gravity
+from aerobat.links.ros.rclpy_middleware import RclpyMiddleware
+from aerobat.links.ros.rospy_middleware import RospyMiddleware
 from aerobat.links.ros.run import run
 from aerobat.links.ros.topics import ODOMETRY, RVIZ
 from aerobat.links.ros.vehicle_node import VehicleNode
@@ -79,7 +81,7 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
         closing(_joined("aerobat", options.generation, sim_time=options.sim_time)) as middleware,
     ):
         if crazyflie:
-            take = Crazyflie(cast(Ros2, middleware), crazyflie).take
+            take = Crazyflie(cast(RclpyMiddleware, middleware), crazyflie).take
         elif board is not None:
             take = lambda tick: board.take(tick.piece, tick.observed, tick.now)  # noqa: E731
         # two, so that none of them is this one
@@ -115,7 +117,9 @@ def ros_vehicle(
         simulated = SimulatedVehicle(found, environment)
         settings: dict[str, Any] = {"rate": options.rate, "clock": clock, "say": say}
         if crazyflie:
-            node: VehicleNode = CrazyswarmServer(cast(Ros2, middleware), simulated, crazyflie, **settings)
+            node: VehicleNode = CrazyswarmServer(
+                cast(RclpyMiddleware, middleware), simulated, crazyflie, **settings
+            )
         else:
             node = VehicleNode(middleware, simulated, goal=options.goal, odometry=odometry, **settings)
         say(f"{found.name} stands on the ground, and obeys {options.goal}")
@@ -146,13 +150,9 @@ def _joined(
         sim_time: whether that is the topic /clock's, which ROS 1 says by itself.
     """
     if generation == "2":
-        from aerobat.links.ros.rclpy_middleware import RclpyMiddleware
-
         return RclpyMiddleware(name, clock, sim_time)
     if sim_time:
         raise SpecError("--sim-time is for --ros 2; leave it out")
-    from aerobat.links.ros.rospy_middleware import RospyMiddleware
-
     return RospyMiddleware(name, clock)
 
 

@@ -7,8 +7,7 @@ firmware.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +17,8 @@ from aerobat.interchange.ros import NANOSECONDS, Messages, RosMessage
 from aerobat.links.commander import Doing
 from aerobat.links.goals import PathPiece
 from aerobat.links.ros.maneuver_node import Tick
-from aerobat.links.ros.middleware import Middleware
 from aerobat.links.ros.preparation import Prepared
+from aerobat.links.ros.rclpy_middleware import RclpyMiddleware
 from aerobat.links.routes import Route
 
 PREFIX = "crazyswarm2:"  # prefix of a goal that is a Crazyflie's name
@@ -36,20 +35,10 @@ _MIN_DURATION = 0.5  # [s] shortest duration of a route
 _TRAJECTORY = 1  # number of the uploaded trajectory
 
 
-class Ros2(Middleware, Protocol):
-    """A node's access to ROS 2, with services of other nodes."""
-
-    def client(self, service: str, kind: str) -> Callable[..., None]:
-        """Return a function that calls a service with its request's fields, without waiting for an answer."""
-
-    def serve(self, service: str, kind: str, take: Callable[[RosMessage], None]) -> None:
-        """Offer a service with an empty answer."""
-
-
 class Crazyflie:
     """The orders to the server at each tick; see `take`."""
 
-    def __init__(self, ros: Ros2, name: str) -> None:
+    def __init__(self, ros: RclpyMiddleware, name: str) -> None:
         """Find the services of a Crazyflie by its name, as in /cf231."""
         self._messages = Messages(ros.make)
         self._publish = ros.publisher(f"{name}/cmd_full_state", FULL_STATE)

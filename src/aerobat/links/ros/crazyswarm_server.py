@@ -17,7 +17,8 @@ from aerobat.interchange.ros import NANOSECONDS, RosMessage
 from aerobat.links.autopilot.vehicle import SimulatedVehicle
 from aerobat.links.goals import ZERO, Mode, PathGoal, PathPiece
 from aerobat.links.ros import topics
-from aerobat.links.ros.crazyswarm import FULL_STATE, SERVICES, Ros2
+from aerobat.links.ros.crazyswarm import FULL_STATE, SERVICES
+from aerobat.links.ros.rclpy_middleware import RclpyMiddleware
 from aerobat.links.ros.vehicle_node import VehicleNode
 from aerobat.links.stream import SetpointStream
 
@@ -29,7 +30,7 @@ _AHEAD = 0.01  # [s] length of a trajectory's pieces for the controller
 class CrazyswarmServer(VehicleNode):
     """The services of one Crazyflie; call `tick` often."""
 
-    def __init__(self, ros: Ros2, vehicle: SimulatedVehicle, name: str, **settings: Any) -> None:
+    def __init__(self, ros: RclpyMiddleware, vehicle: SimulatedVehicle, name: str, **settings: Any) -> None:
         """Offer the services of a name, as in /cf231; see `VehicleNode` for the settings."""
         super().__init__(ros, vehicle, goal=f"{name}/goal", odometry=f"{name}/odom", **settings)
         self._trajectories: dict[int, list[RosMessage]] = {}

@@ -88,7 +88,10 @@ class RclpyMiddleware(QueuedNode):
         self._waiting.create_service(trigger, service, respond, callback_group=self._services)
 
     def client(self, service: str, kind: str) -> Callable[..., None]:
-        """See `crazyswarm.Ros2.client`. Raises SpecError where no node offers the service."""
+        """Return a function that calls a service with its request's fields, without waiting for an answer.
+
+        Raises SpecError where no node offers the service.
+        """
         interface = interface_class(kind)
         client = self._waiting.create_client(interface, service, callback_group=self._services)
         if not client.wait_for_service(10.0):  # [s] of the wall
@@ -96,7 +99,7 @@ class RclpyMiddleware(QueuedNode):
         return lambda **given: client.call_async(interface.Request(**given))
 
     def serve(self, service: str, kind: str, take: Callable[[Any], None]) -> None:
-        """See `crazyswarm.Ros2.serve`."""
+        """Offer a service with an empty answer."""
 
         def respond(request: Any, response: Any) -> Any:
             self.request(take, request)
