@@ -10,7 +10,7 @@ from functools import partial
 from importlib import import_module
 from math import inf
 from queue import Empty, Queue
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 from aerobat.errors import SpecError
 from aerobat.interchange.ros import NANOSECONDS
@@ -73,33 +73,8 @@ class PacedClock:
         self._end, self._wait_began = float(instant - self._began), self._last_read
 
 
-class Middleware(Protocol):
-    """A node's access to ROS."""
-
-    def make(self, kind: str, /, **given: Any) -> Any:
-        """Return a message of a kind; see `interchange.ros.Make`."""
-
-    def time(self) -> int:
-        """Return ROS time [ns]."""
-
-    def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
-        """Announce a topic and return its publishing function; latched: late subscribers get the last."""
-
-    def subscribe(self, topic: str, kind: str, take: Callable[[Any], None], every: bool = True) -> None:
-        """Subscribe to a topic; messages are processed in order: `every` message, or only the newest ones."""
-
-    def offer(self, service: str, take: Callable[[Answer], None]) -> None:
-        """Offer a std_srvs/Trigger service; `take` receives a function to answer with, now or later."""
-
-    def work_until(self, instant: int, patience: float = inf) -> None:
-        """Process messages and requests until a time [ns], or for `patience` [s] of wall time."""
-
-    def close(self) -> None:
-        """Shut the node down."""
-
-
-class QueuedNode(ABC):
-    """A node of either generation: its clock, and calls that threads of ROS request.
+class Middleware(ABC):
+    """A node's access to ROS of either generation, its clock, and calls that threads of ROS request.
 
     The thread that runs `work_until` executes the calls.
     """
@@ -111,11 +86,27 @@ class QueuedNode(ABC):
         self._unanswered: set[Future[tuple[bool, str]]] = set()
 
     @abstractmethod
+    def make(self, kind: str, /, **given: Any) -> Any:
+        """Return a message of a kind; see `interchange.ros.Make`."""
+
+    @abstractmethod
     def ros_time(self) -> int:
         """Return the time that ROS tells [ns]."""
 
+    @abstractmethod
+    def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
+        """Announce a topic and return its publishing function; latched: late subscribers get the last."""
+
+    @abstractmethod
+    def subscribe(self, topic: str, kind: str, take: Callable[[Any], None], every: bool = True) -> None:
+        """Subscribe to a topic; messages are processed in order: `every` message, or only the newest ones."""
+
+    @abstractmethod
+    def offer(self, service: str, take: Callable[[Answer], None]) -> None:
+        """Offer a std_srvs/Trigger service; `take` receives a function to answer with, now or later."""
+
     def time(self) -> int:
-        """See `Middleware.time`."""
+        """Return the time of the node's clock, by default ROS time [ns]."""
         return self.ros_time() if self._clock is None else self._clock.time()
 
     def require_time(self) -> None:
@@ -140,7 +131,7 @@ class QueuedNode(ABC):
         return answered.result()
 
     def close(self) -> None:
-        """Answer all waiting requests."""
+        """Answer all waiting requests, and shut the node down."""
         for answered in tuple(self._unanswered):
             self._settle(answered, False, "the node has ended")
 
@@ -150,7 +141,10 @@ class QueuedNode(ABC):
             answered.set_result((success, sentence))
 
     def work_until(self, instant: int, patience: float = inf) -> None:
-        """See `Middleware.work_until`; calls that wait are executed in any case."""
+        """Process messages and requests until a time [ns], or for `patience` [s] of wall time.
+
+        Those that wait already are processed in any case.
+        """
         end = time.monotonic() + patience
         for _ in range(self._calls.qsize()):
             self._calls.get()()

@@ -9,12 +9,12 @@ from threading import Thread
 from typing import Any
 
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.links.ros.middleware import NEWEST, QUEUE, Answer, PacedClock, QueuedNode, interface_class
+from aerobat.links.ros.middleware import NEWEST, QUEUE, Answer, Middleware, PacedClock, interface_class
 
 CLOSING_TIME = 2.0  # [s] of the wall for each thread that ends
 
 
-class RclpyMiddleware(QueuedNode):
+class RclpyMiddleware(Middleware):
     """A node of ROS 2; see `Middleware`."""
 
     def __init__(self, name: str, clock: PacedClock | None = None, sim_time: bool = False) -> None:
@@ -53,7 +53,7 @@ class RclpyMiddleware(QueuedNode):
         return interface_class(kind)(**given)
 
     def ros_time(self) -> int:
-        """See `QueuedNode.ros_time`."""
+        """See `Middleware.ros_time`."""
         return int(self._node.get_clock().now().nanoseconds)
 
     def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:

@@ -8,12 +8,12 @@ from importlib import import_module
 from typing import Any
 
 from aerobat.errors import BackendMissing, SpecError
-from aerobat.links.ros.middleware import NEWEST, QUEUE, Answer, PacedClock, QueuedNode, interface_class
+from aerobat.links.ros.middleware import NEWEST, QUEUE, Answer, Middleware, PacedClock, interface_class
 
 _SIM_TIME = "/use_sim_time"  # the parameter that nodes read when they start
 
 
-class RospyMiddleware(QueuedNode):
+class RospyMiddleware(Middleware):
     """A node of ROS 1; see `Middleware`."""
 
     def __init__(self, name: str, clock: PacedClock | None = None) -> None:
@@ -45,7 +45,7 @@ class RospyMiddleware(QueuedNode):
         return interface_class(kind)(**given)
 
     def ros_time(self) -> int:
-        """See `QueuedNode.ros_time`."""
+        """See `Middleware.ros_time`."""
         return int(self._rospy.get_rostime().to_nsec())
 
     def publisher(self, topic: str, kind: str, latched: bool = False) -> Callable[[Any], None]:
