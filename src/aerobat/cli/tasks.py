@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from math import isfinite, radians
@@ -30,7 +29,6 @@ from aerobat.interchange import column_groups
 from aerobat.interchange.columns import ALL
 from aerobat.optimization.deadline import within_time
 from aerobat.planning import (
-    Attempt,
     Plan,
     Planner,
     command_settings,
@@ -177,27 +175,21 @@ def _plan_made(record: RunRecord, planner: Planner, explain: bool) -> Plan:
             found = plan(record.problem, planner, progress=progress.record, vehicle=None)
             found = found.for_vehicle(record.vehicle)
         else:
+            from aerobat.studies.passing import steadied
+
             found = plan(record.problem, planner, record.vehicle, progress.record)
-            found = _steadied(found, record, planner, progress.record)
+            flight, conditions = record.flight, record.flight.conditions
+            if conditions is None or conditions == load_dispersion("none"):
+                conditions = load_dispersion(USUAL_CONDITIONS)
+            found = steadied(
+                found,
+                planner,
+                conditions,
+                seed=flight.seed,
+                controller=flight.controller,
+                progress=progress.record,
+            )
         return with_explanation(found, progress.record) if explain else found
-
-
-def _steadied(found: Plan, record: RunRecord, planner: Planner, progress: Callable[[Attempt], None]) -> Plan:
-    """The plan, or a better one of which more flights succeed under the run's conditions, or a lab's."""
-    from aerobat.studies.passing import steadied
-
-    flight = record.flight
-    conditions = flight.conditions
-    if conditions is None or conditions == load_dispersion("none"):
-        conditions = load_dispersion(USUAL_CONDITIONS)
-    return steadied(
-        found,
-        planner,
-        conditions,
-        seed=flight.seed,
-        controller=flight.controller,
-        progress=progress,
-    )
 
 
 def _plan_that_passes(record: RunRecord, planner: Planner, workers: str | None) -> Plan:
