@@ -143,9 +143,11 @@ class Mission(Generic[GoalT]):
             self._settle(now, observed)
         if self.phase is Phase.MANEUVER:
             return self._maneuver(now, observed, delay)
+        if self.phase is Phase.SETTLE:
+            return PositionGoal.hover(self._start, self._heading)
         if self.phase is Phase.HOLD and now - self.began > self._after.duration + self.settings.settling:
             self._enter(Phase.LAND, now)
-        return self._hovering(now)
+        return goal_on(self._after, now - self.began, self._final_yaw) if self.phase is Phase.HOLD else None
 
     def abort(self, now: float, reason: str) -> None:
         """Abort the mission: the vehicle is to hover."""
@@ -227,14 +229,6 @@ class Mission(Generic[GoalT]):
             self._enter(Phase.HOLD, now)
             return goal_on(self._after, 0.0, self._final_yaw)
         return self._command(since, self._since_start(observed))
-
-    def _hovering(self, now: float) -> PositionGoal | None:
-        """Return the goal of the hover at the plan's start or end; None in other phases."""
-        if self.phase is Phase.SETTLE:
-            return PositionGoal.hover(self._start, self._heading)
-        if self.phase is Phase.HOLD:
-            return goal_on(self._after, now - self.began, self._final_yaw)
-        return None
 
 
 def require_flyable(plan: Plan, offset: Array, vehicle_name: str | None = None) -> None:
