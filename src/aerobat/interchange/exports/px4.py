@@ -13,7 +13,7 @@ import numpy as np
 
 from aerobat import so3
 from aerobat.arrays import Array
-from aerobat.flatness import Reference, reference
+from aerobat.flatness import reference
 from aerobat.interchange.exports.loss import Content, ExportRows
 from aerobat.interchange.tables import csv_text
 from aerobat.planning import Plan
@@ -34,6 +34,7 @@ def px4_setpoints(plan: Plan, rate: float) -> Content:
     Each row is held until the next. The plan between rows is lost, and digits beyond microseconds and
     float32.
     """
+    assert plan.vehicle is not None, "exports are of plans with a vehicle"
     timestamps = np.unique(np.floor(plan.trajectory.sample(rate) * MICROSECONDS))
     found = reference(plan, times=timestamps / MICROSECONDS)
     flat = found.setpoint.flat
@@ -42,7 +43,8 @@ def px4_setpoints(plan: Plan, rate: float) -> Content:
     )
     q_d = _float32(so3.multiply(so3.multiply(NED_ENU, found.setpoint.q_world_body), FLU_FRD))
     rates = _float32(found.setpoint.omega_body * np.array([1.0, -1.0, -1.0]))
-    thrust = _float32(_thrust_body(found, plan))
+    fraction = found.setpoint.wrench.thrust / plan.vehicle.max_thrusts.sum()  # [-] of the maximum thrust
+    thrust = _float32(fraction[:, None] * np.array([0.0, 0.0, -1.0]))
     zero = _float32(np.zeros(len(timestamps)))
     messages: Mapping[str, Mapping[str, Array]] = {
         ATTITUDE: {"yaw_sp_move_rate": zero, "q_d": q_d, "thrust_body": thrust},
@@ -67,14 +69,6 @@ def px4_setpoints(plan: Plan, rate: float) -> Content:
 def ned(vectors: Array) -> Array:
     """Convert vectors (..., 3) from ENU to NED axes, or back."""
     return np.asarray(vectors[..., [1, 0, 2]] * np.array([1.0, 1.0, -1.0]))
-
-
-def _thrust_body(found: Reference, plan: Plan) -> Array:
-    """Return the thrust along body axes, FRD, (T, 3), as a fraction of the maximum collective thrust."""
-    assert plan.vehicle is not None, "exports are of plans with a vehicle"
-    thrust = np.zeros((len(found.times), 3))
-    thrust[:, 2] = -found.setpoint.wrench.thrust / plan.vehicle.max_thrusts.sum()
-    return thrust
 
 
 def _yaw(q_ned_frd: Array) -> Array:
