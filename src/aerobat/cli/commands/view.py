@@ -173,9 +173,11 @@ def view(
 
 def _read(source: Path) -> tuple[Plan | Flight, Plan | None]:
     """Return the flight or the plan in a folder or file, and the plan of a flight where it is known."""
-    if source.suffix == ".npz" and _holds_flight(source):
-        flight = load_flight(source)
-        return flight, _plan_beside(source, flight)
+    if source.suffix == ".npz":
+        format_name = format_of(read_arrays(source, "flight", MAX_FLIGHT))
+        if format_name.startswith("aerobat-flight"):
+            flight = load_flight(source)
+            return flight, _plan_beside(source, flight)
     found = whole_plan(source, "give it to `aerobat fly`, and view what that writes")
     if os.path.isdir(source) and (source / FLIGHT).exists():
         return load_flight(source / FLIGHT), found
@@ -197,10 +199,6 @@ def _first_flights(plan: Plan, record: RunRecord) -> Flight:
         seed=settings.seed,
         flights=min(settings.runs, SWEPT),
     )
-
-
-def _holds_flight(file: Path) -> bool:
-    return format_of(read_arrays(file, "flight", MAX_FLIGHT)).startswith("aerobat-flight")
 
 
 def _plan_beside(file: Path, flight: Flight) -> Plan | None:

@@ -9,7 +9,7 @@ from dataclasses import field
 from hashlib import sha256
 from pathlib import Path
 from platform import python_version
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import PlainValidator
 
@@ -109,7 +109,8 @@ class RunRecord:
             value = getattr(self.planner, option.name)
             if value != usual.get(option.name, option.default):
                 flag = option.flag.removeprefix("--")
-                yield flag if option.type is bool else f"{flag}-{_in_a_name(value)}"
+                shown = f"{value:g}" if isinstance(value, float) else value
+                yield flag if option.type is bool else f"{flag}-{shown}"
 
     @property
     def _study_settings(self) -> Iterator[str]:
@@ -152,11 +153,6 @@ def _short(name: str) -> str:
     if len(encoded) <= MAX_NAME:
         return name
     return f"{encoded[:MAX_NAME].decode(errors='ignore')}-{sha256(encoded).hexdigest()[:8]}"
-
-
-def _in_a_name(value: Any) -> str:
-    """Return a number with six digits at most, or text as it is."""
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def beside(folder: Path, suffix: str) -> Path:
