@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees
 
 import numpy as np
@@ -83,8 +83,9 @@ def link_report(
         late: largest delay of a set-point beyond its time [s].
     """
     inside = [observed for observed in log if 0.0 <= observed.time <= stream.duration]
+    report = LinkReport(aborted, ended, delay, late, len(inside))
     if len(inside) < 2:
-        return LinkReport(aborted, ended, delay, late, len(inside))
+        return report
     times = np.array([observed.time for observed in inside])
     position, velocity, q = (
         np.array([getattr(observed.body, name) for observed in inside])
@@ -98,12 +99,8 @@ def link_report(
     body = None if plan.vehicle is None else plan.vehicle.bounding_ellipsoid
     stop = np.array([times[-1] if aborted else np.nan])
     flown = passages_in_log(rows, planned_passages(plan.stages, plan.problem), body, stop)
-    return LinkReport(
-        aborted=aborted,
-        ended=ended,
-        delay_s=delay,
-        max_lateness_s=late,
-        observations=len(inside),
+    return replace(
+        report,
         max_position_error_m=float(off.max()),
         max_attitude_error_deg=degrees(float(turned.max())),
         longest_silence_s=float(np.diff(times).max()),
