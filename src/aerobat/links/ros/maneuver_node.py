@@ -104,8 +104,8 @@ class ManeuverNode:
         for name in maneuvers:
             ros.offer(f"/aerobat/{name}", partial(self._take_request, partial(self._plan, name)))
         ros.offer("/aerobat/takeoff", partial(self._take_request, self._take_off))
-        ros.offer("/aerobat/hold", partial(self._take_request, self._hold))
-        ros.offer("/aerobat/land", partial(self._take_request, self._land))
+        for name, order in (("hold", self.commander.hover), ("land", self.commander.land)):
+            ros.offer(f"/aerobat/{name}", partial(self._take_request, partial(self._obey, name, order)))
 
     def tick(self, now: float) -> None:
         """Advance to this time [s]: begin a maneuver that has been planned, and send the due goal."""
@@ -191,15 +191,11 @@ class ManeuverNode:
         self._give_up_planning("takeoff was called")
         answer(True, f"climbing by {self.settings.takeoff_height:g} m")
 
-    def _hold(self, answer: Answer) -> None:
-        self._give_up_planning("hold was called")
-        self.commander.hover(self._now)
-        answer(True, str(Doing.BRAKING))
-
-    def _land(self, answer: Answer) -> None:
-        self._give_up_planning("land was called")
-        self.commander.land(self._now)
-        answer(True, str(Doing.LANDING))
+    def _obey(self, service: str, order: Callable[[float], None], answer: Answer) -> None:
+        """Execute an order that ends the planning of a maneuver."""
+        self._give_up_planning(f"{service} was called")
+        order(self._now)
+        answer(True, str(self.commander.doing))
 
     def _give_up_planning(self, reason: str) -> None:
         """Answer the request of a maneuver that is being planned, if there is one: it will not begin."""
