@@ -75,7 +75,7 @@ class Bench:
         maneuvers: dict[str, Any] = {"maneuver": (ab.load_problem(maneuver), ab.Miqp(reserve=0.15))}
         self.node = ManeuverNode(
             Ros(self.graph), vehicle, maneuvers, AtOnce(), NodeSettings(rate=1.0 / (TICKS * STEP)),
-            self.said.append, lambda tick: board.take(*tick[:3]),
+            self.said.append, lambda tick: board.take(tick.piece, tick.commander.observed, tick.now),
         )  # fmt: skip
         ros = Ros(self.graph)
         self._messages = Messages(ros.make)

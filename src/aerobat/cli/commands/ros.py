@@ -83,7 +83,7 @@ def ros(*problems: str, options: RosOptions = RosOptions()) -> None:
         if crazyflie:
             take = Crazyflie(cast(RclpyMiddleware, middleware), crazyflie).take
         elif board is not None:
-            take = lambda tick: board.take(tick.piece, tick.observed, tick.now)  # noqa: E731
+            take = lambda tick: board.take(tick.piece, tick.commander.observed, tick.now)  # noqa: E731
         # two, so that none of them is this one
         with processes(2, forked=False) as executor:
             _rehearse(executor, vehicle, maneuvers, settings)

@@ -48,14 +48,15 @@ class Crazyflie:
 
     def take(self, tick: Tick) -> None:
         """Send due orders: a service call when a route begins, the goal's full state in a maneuver."""
-        enters, self._doing = tick.doing is not self._doing, tick.doing
+        doing, route = tick.commander.doing, tick.commander.route
+        enters, self._doing = doing is not self._doing, doing
         uploaded = None if tick.flown is None or tick.flown.pieces is None else tick.flown
-        if tick.doing is Doing.NOTHING:
+        if doing is Doing.NOTHING:
             if enters and self._streams:  # in the air: the firmware stops rotors when full states end
                 self._order("go_to", relative=True, duration=self._duration(_MIN_DURATION))
-        elif tick.route is not None and tick.doing is not Doing.BRAKING:
+        elif route is not None and doing is not Doing.BRAKING:
             if enters:
-                self._go(tick, tick.route)
+                self._go(tick, route)
         elif uploaded is not None and tick.is_flown:
             if not self._flies:
                 start = {"trajectory_id": _TRAJECTORY, "timescale": 1.0}
@@ -71,10 +72,10 @@ class Crazyflie:
         """Order the route that begins."""
         end, remaining = route.end, route.began + route.path.duration - tick.now
         duration = self._duration(max(remaining, _MIN_DURATION))
-        if tick.doing is Doing.CLIMBING:
+        if self._doing is Doing.CLIMBING:
             self._order("takeoff", height=float(end[2]), duration=duration)
-        elif tick.doing is Doing.LANDING:
-            self._order("land", height=tick.ground, duration=duration)
+        elif self._doing is Doing.LANDING:
+            self._order("land", height=tick.commander.ground, duration=duration)
         else:
             goal = self._messages.vector("Point", end)
             self._order("go_to", relative=False, goal=goal, yaw=route.yaw, duration=duration)

@@ -14,13 +14,12 @@ from aerobat.errors import SpecError
 from aerobat.flatness import reference
 from aerobat.interchange.ros import NANOSECONDS, Messages, PlanMessages, RosMessage
 from aerobat.links.commander import Commander, Doing, rehearse
-from aerobat.links.goals import Observed, PathGoal, PathPiece, yaw_of
+from aerobat.links.goals import PathGoal, PathPiece, yaw_of
 from aerobat.links.mission import Mission, MissionSettings, Phase
 from aerobat.links.report import LinkReport, link_report
 from aerobat.links.ros import topics
 from aerobat.links.ros.middleware import Answer, Middleware
 from aerobat.links.ros.preparation import ManeuverRequest, Prepared, prepare, shared_gravity
-from aerobat.links.routes import Route
 from aerobat.planning import Planner
 from aerobat.problem import Problem
 from aerobat.vehicle import Vehicle
@@ -46,13 +45,10 @@ class NodeSettings:
 class Tick(NamedTuple):
     """The orders that are due at one tick, for the component that flies the vehicle."""
 
+    commander: Commander  # what the vehicle does, on which route, and its last state
     piece: PathPiece | None  # the piece of the path that begins; None where there is no goal
-    observed: Observed | None  # the last state, None before the first
     now: float  # [s]
     stamp: int  # [ns] start of the piece, in ROS time
-    doing: Doing
-    route: Route | None
-    ground: float  # [m] height of take-off
     flown: Prepared | None  # the maneuver that is being flown
     is_flown: bool  # true during the plan itself, not on the way to its start or in the hover at its end
 
@@ -126,13 +122,10 @@ class ManeuverNode:
         commander, mission = self.commander, self.commander.mission
         maneuvers = commander.doing is Doing.MANEUVERING
         return Tick(
+            commander,
             piece,
-            commander.observed,
             now,
             stamp=self.origin + round((now if piece is None else piece.stamp) * NANOSECONDS),
-            doing=commander.doing,
-            route=commander.route,
-            ground=commander.ground,
             flown=self._flown if maneuvers else None,
             is_flown=maneuvers and mission is not None and mission.phase is Phase.MANEUVER,
         )
