@@ -189,7 +189,7 @@ def sweep_task() -> FlightTask:
 
 def sweep_chunk(path: Path) -> None:
     """One kept flight of it."""
-    kept_parts(path).write("flights-0-1", fly_chunk(sweep_task(), range(1)).arrays)
+    kept_parts(path).write(range(1), fly_chunk(sweep_task(), range(1)).arrays)
 
 
 def kept_parts(path: Path) -> KeptParts:
@@ -210,10 +210,10 @@ def both(name: str, reader: Reader) -> dict[str, Reader]:
 
 def kept_chunk(path: Path) -> str:
     """A digest of what a kept chunk holds."""
-    chunk = Chunk.of(KeptParts(path.parent).read("flights-0-1"), 1)
+    chunk = KeptParts(path.parent).known([range(1)], Chunk.of).get(range(1))
     if chunk is None:
         raise SpecError("it is flown again")
-    return digest_of(dict(chunk.columns))
+    return digest_of(dict(chunk.table))
 
 
 TABLE = {"flight": np.arange(20), "error": np.linspace(0.0, 1.0, 20), "outcome": np.array(["complete"] * 20)}

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,20 @@ from aerobat.studies.workers import LIBRARIES
 
 _FINGERPRINT = "fingerprint.json"  # the file that tells which study a folder belongs to
 _PART = re.compile(r"(flights|cell)-.*\.npz")
+
+Arrays = dict[str, NDArray[Any]]
+
+
+class StoredPart(Protocol):
+    """The result of a part that can be kept."""
+
+    @property
+    def arrays(self) -> Arrays:
+        """The arrays that files keep of the result."""
+
+
+Part = TypeVar("Part", bound=range | tuple[float, ...])  # flights of a sweep, or the values of a map's cell
+Found = TypeVar("Found", bound=StoredPart)
 
 
 @dataclass(frozen=True)
@@ -69,48 +83,48 @@ class KeptParts:
             raise SpecError(f"{folder}/ keeps {parts} of another {study} ({others}); remove it to begin anew")
         return cls(folder)
 
-    def read(self, name: str) -> dict[str, NDArray[Any]] | None:
-        """Return a finished part; None where there is none, or the file is damaged."""
+    def known(
+        self, parts: Iterable[Part], restored: Callable[[Part, Arrays], Found | None]
+    ) -> dict[Part, Found]:
+        """Return the results of finished parts. `restored` makes one of its arrays, or None of others."""
+        arrays = {part: self.read(part) for part in parts}
+        found = {part: restored(part, own) for part, own in arrays.items() if own is not None}
+        return {part: result for part, result in found.items() if result is not None}
+
+    def keeping(self, results: Iterable[tuple[Part, Found]]) -> Iterator[tuple[Part, Found]]:
+        """Yield parts with their results, each after it is kept, if there is a folder."""
+        for part, result in results:
+            self.write(part, result.arrays)
+            yield part, result
+
+    def read(self, part: range | Sequence[float]) -> Arrays | None:
+        """Return the arrays of a finished part; None where there is none, or the file is damaged."""
         if self.folder is None:
             return None
         try:
-            arrays = read_arrays(self.folder / f"{name}.npz", "part")
+            arrays = read_arrays(self.folder / _file_name(part), "part")
             return arrays if str(arrays.pop("digest")) == digest_of(arrays) else None
         except (SpecError, KeyError):
             return None
 
-    def write(self, name: str, arrays: Mapping[str, Any]) -> None:
+    def write(self, part: range | Sequence[float], arrays: Mapping[str, Any]) -> None:
         """Keep a finished part, if there is a folder."""
         if self.folder is None:
             return
-        with whole_file(self.folder / f"{name}.npz") as temporary, temporary.open("wb") as file:
+        with whole_file(self.folder / _file_name(part)) as temporary, temporary.open("wb") as file:
             np.savez(file, **arrays, digest=digest_of(arrays))
 
 
-def flights_name(flights: range) -> str:
-    """Return the name of the part that holds these flights of a sweep."""
-    return f"flights-{flights.start}-{flights.stop}"
+def _file_name(part: range | Sequence[float]) -> str:
+    """Return the name of the file that holds these flights of a sweep, or a map's cell at these values."""
+    words = ["flights", part.start, part.stop] if isinstance(part, range) else ["cell", *part]
+    return f"{'-'.join(map(str, words))}.npz"
 
 
-def cell_name(values: Sequence[float]) -> str:
-    """Return the name of the part that holds the cell of a map at these values."""
-    return "-".join(["cell", *map(str, values)])
-
-
-def kept_flights(folder: Path, chunks: Iterable[range]) -> int:
-    """Return the number of flights in a sweep's chunks that a folder keeps; other chunks do not count."""
-    names = _names(folder)
-    return sum(len(chunk) for chunk in chunks if flights_name(chunk) in names) if names else 0
-
-
-def kept_cells(folder: Path, places: Iterable[Sequence[float]]) -> int:
-    """Return the number of cells of a map that a folder keeps; cells at other values do not count."""
-    names = _names(folder)
-    return sum(cell_name(values) in names for values in places) if names else 0
-
-
-def _names(folder: Path) -> set[str]:
-    return {path.stem for path in folder.glob("*.npz")}
+def kept_parts(folder: Path, parts: Iterable[Part]) -> list[Part]:
+    """Return the parts that a folder keeps."""
+    names = {path.name for path in folder.glob("*.npz")}
+    return [part for part in parts if _file_name(part) in names] if names else []
 
 
 def is_kept_file(name: str) -> bool:

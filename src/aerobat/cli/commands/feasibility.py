@@ -21,7 +21,7 @@ from aerobat.interchange.tables import require_writable, write_table
 from aerobat.reporting.feasibility.facts import requirements
 from aerobat.studies.feasibility import Axis, feasibility_map, min_requirements
 from aerobat.studies.feasibility.probe import TIME_LIMIT
-from aerobat.studies.kept import kept_cells
+from aerobat.studies.kept import kept_parts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +115,7 @@ def run_map(record: RunRecord, options: OutputOptions, workers: str | None = Non
     unfinished = Unfinished.beside(options.out or record.folder)
 
     def finished(folder: Path) -> int:
-        return kept_cells(folder, product(*(axis.values for axis in axes)))
+        return len(kept_parts(folder, product(*(axis.values for axis in axes))))
 
     with unfinished.kept("cells", count, finished) as kept:
         with showing(Progress("cells", count, kept=kept)) as progress:

@@ -21,7 +21,7 @@ from aerobat.errors import SpecError
 from aerobat.interchange.tables import require_writable, write_table
 from aerobat.planning import Plan, load_plan
 from aerobat.studies.flights import cut
-from aerobat.studies.kept import kept_flights
+from aerobat.studies.kept import kept_parts
 from aerobat.studies.sweep.sweep import sweep as sweep_plan
 
 
@@ -112,7 +112,7 @@ def run_sweep(plan: Plan, record: RunRecord, options: OutputOptions, workers: st
     unfinished = Unfinished.beside(options.out or record.folder)
 
     def finished(folder: Path) -> int:
-        return kept_flights(folder, cut(range(flight.runs)))
+        return sum(map(len, kept_parts(folder, cut(range(flight.runs)))))
 
     with unfinished.kept("flights", flight.runs, finished) as kept:
         with showing(Progress("flown", flight.runs, kept=kept)) as progress:

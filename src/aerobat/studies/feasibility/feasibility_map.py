@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
-from itertools import product
+from itertools import chain, product
 from math import isnan, nan, prod
 from types import MappingProxyType
 from typing import Any
@@ -22,7 +22,7 @@ from aerobat.problem import Problem, as_problem
 from aerobat.studies.feasibility.axis import MAX_CELLS, Axis
 from aerobat.studies.feasibility.probe import TIME_LIMIT, Feasibility, ProbedTask, least_reserve, probe
 from aerobat.studies.flights import Flights, FlightTask, fly_scores, passed
-from aerobat.studies.kept import KeptParts, cell_name, fingerprint
+from aerobat.studies.kept import KeptParts, fingerprint
 from aerobat.studies.lens import Lens, Scenario, lens
 from aerobat.studies.share import Share
 from aerobat.studies.workers import Pool, Workers, pool
@@ -55,9 +55,9 @@ class Cell:
         return {"numbers": np.array(numbers), "passed": np.array(passed, dtype=int), "words": np.array(words)}
 
     @classmethod
-    def of(cls, values: tuple[float, ...], arrays: Mapping[str, NDArray[Any]] | None) -> Cell | None:
+    def of(cls, values: tuple[float, ...], arrays: Mapping[str, NDArray[Any]]) -> Cell | None:
         """Return the cell of these values from the arrays of a file; None where the arrays are no cell."""
-        if arrays is None or set(arrays) != {"numbers", "passed", "words"}:
+        if set(arrays) != {"numbers", "passed", "words"}:
             return None
         duration, reserve = (None if isnan(number) else number for number in arrays["numbers"].tolist())
         feasibility, sentence, *limits = arrays["words"].tolist()
@@ -154,25 +154,16 @@ def feasibility_map(
     task = ProbedTask(scenario, fields, time_limit, range(flights), seed)
     places = list(product(*(axis.values for axis in axes)))
     kept = KeptParts.of(keep, "cells", "map", lambda: _inputs_summary(axes, task))
+    known = kept.known(places, Cell.of)
+    missing = [values for values in places if values not in known]
     cells: dict[tuple[float, ...], Cell] = {}
     planned = 0
-
-    def take(values: tuple[float, ...], cell: Cell) -> None:
-        nonlocal planned
-        cells[values] = cell
-        planned += cell.is_planned
-        if progress is not None:
-            progress(len(cells), planned)
-
-    for values in places:
-        known = Cell.of(values, kept.read(cell_name(values)))
-        if known is not None:
-            take(values, known)
-    missing = [values for values in places if values not in cells]
     with pool(workers, executor, len(missing)) as planning:
-        for values, cell in planning.results(_cell, task, missing):
-            kept.write(cell_name(values), cell.arrays)
-            take(values, cell)
+        for values, cell in chain(known.items(), kept.keeping(planning.results(_cell, task, missing))):
+            cells[values] = cell
+            planned += cell.is_planned
+            if progress is not None:
+                progress(len(cells), planned)
     axes = tuple(replace(axis, unit=field.unit) for axis, field in zip(axes, fields, strict=True))
     found = tuple(cells[values] for values in places)
     return FeasibilityMap(scenario.problem, scenario.vehicle, axes, found)

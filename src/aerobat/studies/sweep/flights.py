@@ -42,7 +42,7 @@ _PASSAGE = (  # fields of a passage, each with the suffix of its column
 class Chunk:
     """Flights of a sweep: columns of the table, and errors over time of sampled flights."""
 
-    columns: Columns  # (flights,)
+    table: Columns  # (flights,)
     times: Array  # [s], (T,); empty where no flight is sampled
     position_error: Array  # [m], (sampled flights, T)
     attitude_error: Array  # [rad], (sampled flights, T)
@@ -50,28 +50,26 @@ class Chunk:
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
         """The arrays that files keep of the chunk."""
-        columns = {f"column_{k}": column for k, column in enumerate(self.columns.values())}
+        columns = {f"column_{k}": column for k, column in enumerate(self.table.values())}
         over_time = {name: getattr(self, name) for name in _OVER_TIME}
-        return {"names": np.array(list(self.columns))} | over_time | columns
+        return {"names": np.array(list(self.table))} | over_time | columns
 
     @classmethod
-    def of(cls, arrays: Mapping[str, NDArray[Any]] | None, count: int) -> Chunk | None:
-        """Return a chunk of `count` flights from the arrays of a file; None if they are no such chunk."""
-        if arrays is None:
-            return None
+    def of(cls, flights: range, arrays: Mapping[str, NDArray[Any]]) -> Chunk | None:
+        """Return the chunk of these flights from the arrays of a file; None if they are no such chunk."""
         try:
             columns = {str(name): arrays[f"column_{k}"] for k, name in enumerate(arrays["names"])}
             found = cls(columns, *(arrays[name] for name in _OVER_TIME))
         except (KeyError, TypeError):
             return None
-        return found if all(column.shape == (count,) for column in columns.values()) else None
+        return found if all(column.shape == (len(flights),) for column in columns.values()) else None
 
     @classmethod
     def joined(cls, chunks: Sequence[Chunk]) -> Chunk:
         """Return chunks of consecutive flights as one."""
         sampled = [chunk for chunk in chunks if len(chunk.times)] or chunks[:1]
         return cls(
-            {name: np.concatenate([chunk.columns[name] for chunk in chunks]) for name in chunks[0].columns},
+            {name: np.concatenate([chunk.table[name] for chunk in chunks]) for name in chunks[0].table},
             sampled[0].times,
             np.concatenate([chunk.position_error for chunk in sampled]),
             np.concatenate([chunk.attitude_error for chunk in sampled]),

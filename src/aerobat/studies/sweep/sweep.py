@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import asdict
+from itertools import chain
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from aerobat.flatness import vehicle_of
 from aerobat.planning import Plan
 from aerobat.simulation import Outcome
 from aerobat.studies.flights import CHUNK, CHUNKS_PER_GROUP, FlightTask, cut
-from aerobat.studies.kept import KeptParts, fingerprint, flights_name
+from aerobat.studies.kept import KeptParts, fingerprint
 from aerobat.studies.sweep.flights import SAMPLED, STRIDE, Chunk, fly_chunk
 from aerobat.studies.sweep.result import Sweep
 from aerobat.studies.workers import Workers, pool
@@ -75,38 +76,20 @@ def sweep(
     task = FlightTask(plan, vehicle, conditions, seed, controller or vehicle.controller, engine, batch)
     kept = KeptParts.of(keep, "flights", "sweep", lambda: _inputs_summary(task))
     spans = cut(range(runs))
+    known = kept.known(spans, Chunk.of)
+    missing = [flights for flights in spans if flights not in known]
     chunks: dict[range, Chunk] = {}
     done = well = 0
-
-    def take(flights: range, chunk: Chunk) -> None:
-        nonlocal done, well
-        chunks[flights] = chunk
-        done += len(flights)
-        well += int(np.isin(chunk.columns["outcome"], _SUCCESSES).sum())
-        if progress is not None:
-            progress(done, well)
-
-    for flights in spans:
-        found = Chunk.of(kept.read(flights_name(flights)), len(flights))
-        if found is not None:
-            take(flights, found)
-    missing = [flights for flights in spans if flights not in chunks]
     with pool(workers, executor, len(missing)) as flying:
         flown = flying.results(fly_chunk, task, missing, together=CHUNKS_PER_GROUP, compiles=True)
-        for flights, chunk in flown:
-            kept.write(flights_name(flights), chunk.arrays)
-            take(flights, chunk)
+        for flights, chunk in chain(known.items(), kept.keeping(flown)):
+            chunks[flights] = chunk
+            done += len(flights)
+            well += int(np.isin(chunk.table["outcome"], _SUCCESSES).sum())
+            if progress is not None:
+                progress(done, well)
     whole = Chunk.joined([chunks[flights] for flights in spans])
-    return Sweep(
-        plan=plan,
-        vehicle=vehicle,
-        conditions=conditions,
-        seed=seed,
-        table=whole.columns,
-        times=whole.times,
-        position_error=whole.position_error,
-        attitude_error=whole.attitude_error,
-    )
+    return Sweep(plan, vehicle, conditions, seed, **vars(whole))
 
 
 def _inputs_summary(task: FlightTask) -> dict[str, Any]:
