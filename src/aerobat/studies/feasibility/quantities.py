@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
@@ -17,21 +16,22 @@ from aerobat.problem import Problem
 from aerobat.studies.lens import Scenario, lens
 
 
-class NeededQuantity(ABC):
+class NeededQuantity:
     """A quantity whose reduction makes a scenario harder."""
 
     name: ClassVar[str]
+    field: ClassVar[str] = ""  # of a scenario, which has the quantity; empty where no single field has it
     unit: ClassVar[str] = ""
     least_size: ClassVar[float] = 0.0  # above the floor; steps and tolerances treat smaller sizes as this
     by_default: ClassVar[bool] = True  # whether it is searched by default
 
-    @abstractmethod
     def own(self, scenario: Scenario) -> float:
         """Return the scenario's value, infinite where it has no bound."""
+        return float(lens(self.field, scenario).get(scenario))
 
-    @abstractmethod
     def set(self, whole: Scenario, value: float) -> Scenario:
         """Return the scenario with this value. Raises SpecError where the value contradicts the rest."""
+        return lens(self.field, whole).set(whole, value)
 
     def floor(self, scenario: Scenario) -> float:
         """Return the lowest value worth trying, from which growth and tolerance are measured."""
@@ -46,26 +46,16 @@ class ThrustToWeight(NeededQuantity):
     """Full thrust of all rotors over the weight on Earth; rotors keep their relative strengths."""
 
     name = "thrust-to-weight"
-
-    def own(self, scenario: Scenario) -> float:
-        """Return the vehicle's thrust-to-weight ratio."""
-        return scenario.vehicle.thrust_to_weight
-
-    def set(self, whole: Scenario, value: float) -> Scenario:
-        """Return the scenario with rotors scaled to this ratio."""
-        return lens("vehicle.thrust_to_weight", whole).set(whole, value)
+    field = "vehicle.thrust_to_weight"
 
 
 class Ceiling(NeededQuantity):
     """The height that the path stays below."""
 
     name = "ceiling"
+    field = "limits.upper.z"
     unit = "m"
     least_size = 1.0
-
-    def own(self, scenario: Scenario) -> float:
-        """Return the problem's limit."""
-        return float(scenario.problem.limits.upper[2])
 
     def floor(self, scenario: Scenario) -> float:
         """Return the height of the highest of start, goal and gates."""
@@ -76,10 +66,6 @@ class Ceiling(NeededQuantity):
     def used(self, plan: Plan) -> float:
         """Return the height of the plan's highest point."""
         return float(plan.trajectory.component_range(0)[1][2])
-
-    def set(self, whole: Scenario, value: float) -> Scenario:
-        """Return the scenario with this ceiling."""
-        return lens("limits.upper.z", whole).set(whole, value)
 
 
 class GateSize(NeededQuantity):
