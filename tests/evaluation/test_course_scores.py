@@ -11,7 +11,7 @@ import pytest
 import aerobat as ab
 from aerobat.reporting.plain_data import plain
 from aerobat.reporting.report import Report
-from aerobat.simulation.passages.waypoint import MISS_TOLERANCE
+from aerobat.simulation.passages.stages import MISS_TOLERANCE
 
 RED = ab.tilted_gate((3.0, 0.0, 1.0), 0.0, width=2.0, height=2.0, name="red")
 BACK = ab.tilted_gate((3.0, 4.0, 2.0), np.pi, width=2.0, height=2.0, name="back")

@@ -31,7 +31,7 @@ from aerobat.simulation.passages import (
     waypoint_passages,
 )
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW, bounding_ellipsoid, gate_places
-from aerobat.simulation.passages.waypoint import MISS_TOLERANCE
+from aerobat.simulation.passages.stages import MISS_TOLERANCE
 from gate_motions import CRUISE, SPEED
 from polyline_judge import gate_progress
 from score_cases import QUAD

@@ -27,8 +27,7 @@ from aerobat.simulation.metrics import Criteria
 from aerobat.simulation.outcome import length
 from aerobat.simulation.passages.log import log_rows, scan_log
 from aerobat.simulation.passages.passage import PASSAGE_WINDOW
-from aerobat.simulation.passages.stage_attitude import PlannedAttitude
-from aerobat.simulation.passages.waypoint import waypoint_target
+from aerobat.simulation.passages.stages import PlannedAttitude, waypoint_target
 from aerobat.so3 import thrust_axis
 
 GOAL = "the goal"  # the name of a path's end among the places to reach

@@ -27,8 +27,7 @@ from aerobat.simulation.loop import Component, LoopPart, Signals
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, LANDING_DEPTH, LANDING_SPEED, TOUCHDOWN, Outcome
 from aerobat.simulation.passages.log import log_rows, scan_log
 from aerobat.simulation.passages.passage import bounding_ellipsoid, gate_places
-from aerobat.simulation.passages.stage_attitude import PlannedAttitude, attitude_direction
-from aerobat.simulation.passages.waypoint import waypoint_target
+from aerobat.simulation.passages.stages import PlannedAttitude, attitude_direction, waypoint_target
 from aerobat.simulation.setup import FlightSetup
 from aerobat.vehicle import Ellipsoid
 

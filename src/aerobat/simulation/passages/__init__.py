@@ -9,7 +9,7 @@ from aerobat.simulation.passages.obstacles import nearest_obstacles as nearest_o
 from aerobat.simulation.passages.passage import Passage as Passage
 from aerobat.simulation.passages.passage import passage_names as passage_names
 from aerobat.simulation.passages.passage import passages as passages
-from aerobat.simulation.passages.stage_attitude import StageAttitude as StageAttitude
-from aerobat.simulation.passages.stage_attitude import stage_attitudes as stage_attitudes
-from aerobat.simulation.passages.waypoint import WaypointPassage as WaypointPassage
-from aerobat.simulation.passages.waypoint import waypoint_passages as waypoint_passages
+from aerobat.simulation.passages.stages import StageAttitude as StageAttitude
+from aerobat.simulation.passages.stages import WaypointPassage as WaypointPassage
+from aerobat.simulation.passages.stages import stage_attitudes as stage_attitudes
+from aerobat.simulation.passages.stages import waypoint_passages as waypoint_passages
