@@ -17,6 +17,12 @@ AXES = "xyz"  # the names of a vector's components
 ORDERS = (AXES, "wxyz")  # the order of components that have these labels
 
 
+def round_step(length: float) -> float:
+    """Return the largest of 1, 2 or 5 times a power of ten that is at most `length`."""
+    steps = 10.0 ** np.floor(np.log10(length)) * np.array([1.0, 2.0, 5.0])
+    return float(steps[steps <= length * (1 + 1e-9)].max())
+
+
 def xyz(vectors: Any) -> tuple[Any, Any, Any]:
     """Return the components of vectors (..., 3), as kernels take them."""
     return vectors[..., 0], vectors[..., 1], vectors[..., 2]

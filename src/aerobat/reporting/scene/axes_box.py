@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aerobat.arrays import Array
+from aerobat.arrays import Array, round_step
 from aerobat.problem.gate import Gate
 from aerobat.reporting.page import set_scale, size_of
 from aerobat.reporting.scene.camera import Camera, best_view
@@ -78,12 +78,6 @@ def box_around(points: Array, pad: float) -> AxesBox:
     short = np.maximum(least - (upper - lower), 0.0)
     fraction = np.array([0.5, 0.5, 0.0])  # the floor stays right below
     return AxesBox(lower - fraction * short, upper + (1.0 - fraction) * short)
-
-
-def round_step(length: float) -> float:
-    """Return the largest of 1, 2 or 5 times a power of ten that is at most `length`."""
-    steps = 10.0 ** np.floor(np.log10(length)) * np.array([1.0, 2.0, 5.0])
-    return float(steps[steps <= length * (1 + 1e-9)].max())
 
 
 def draw_axes_box(axes: Axes, box: AxesBox, camera: Camera) -> None:

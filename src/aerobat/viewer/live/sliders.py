@@ -6,12 +6,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import chain
-from math import degrees, floor, log10, radians
+from math import degrees, radians
 from typing import Any, get_type_hints
 
 import numpy as np
 
 from aerobat import so3
+from aerobat.arrays import round_step
 from aerobat.environment import Dispersion
 from aerobat.errors import SpecError
 from aerobat.planning import Plan, Planner
@@ -69,10 +70,7 @@ def sliders_of(setting: Setting, plan: Plan) -> tuple[Slider, ...]:
     return (
         *chain.from_iterable(_gate_sliders(setting.problem, k) for k in gates),
         *chain.from_iterable(_obstacle_sliders(setting.problem, k) for k in obstacles),
-        *_thrust_sliders(setting),
-        *_order_slider(setting, plan),
-        _vehicle_slider(setting),
-        _dispersion_slider(setting),
+        *_placeless_sliders(setting, plan),
     )
 
 
@@ -153,18 +151,16 @@ def _range(problem: Problem) -> tuple[float, float]:
     places = [end.position for end in problem.ends.values()] + [gate.position for gate in problem.gates]
     size = float(np.ptp(places, axis=0).max()) if places else 0.0  # [m] of what is flown through
     reach = max(0.5 * size, LEAST_REACH)
-    step = _round_step(2 * reach / STEPS)
+    step = round_step(2 * reach / STEPS)
     return step * round(reach / step), step
 
 
-def _round_step(length: float) -> float:
-    """Return the largest of 1, 2 or 5 times a power of ten that is at most `length`."""
-    decade = 10.0 ** floor(log10(length))
-    return max(factor * decade for factor in (1.0, 2.0, 5.0) if factor * decade <= length * (1 + 1e-9))
+def _placeless_sliders(setting: Setting, plan: Plan) -> Iterator[Slider]:
+    """Yield the sliders of the maneuver's minimum specific thrusts, the paper's ε, and of other numbers.
 
-
-def _thrust_sliders(setting: Setting) -> Iterator[Slider]:
-    """Yield the sliders of the maneuver's minimum specific thrusts, the paper's ε."""
+    These are the order, the derivative that is the input, of planners that have one, the thrust-to-weight
+    ratio, and the dispersion.
+    """
     maneuver, top = setting.problem.maneuver, setting.vehicle.max_specific_thrust
     for name in get_type_hints(type(maneuver)):
         if name.startswith("min_") and name.endswith("_thrust"):
@@ -174,23 +170,13 @@ def _thrust_sliders(setting: Setting) -> Iterator[Slider]:
             shown = f"ε {words}".strip()
             high = float(np.ceil(1.2 * max(top, value)))
             yield Slider(f"maneuver.{name}", "maneuver", shown, "m/s²", 0.5, high, 0.5, value)
-
-
-def _order_slider(setting: Setting, plan: Plan) -> Iterator[Slider]:
-    """Yield the slider of the order, the derivative that is the input, for planners that have one."""
     if plan.order is not None and hasattr(setting.planner, "order"):
         low, high = min(3, plan.order), max(5, plan.order)  # jerk to crackle
         yield Slider("planner.order", "maneuver", "order", "", low, high, 1, plan.order)
-
-
-def _vehicle_slider(setting: Setting) -> Slider:
-    value = round(setting.vehicle.thrust_to_weight, 2)
+    ratio = round(setting.vehicle.thrust_to_weight, 2)
     # from vehicles that hardly climb to racing quadrotors
-    low, high = min(1.2, value), max(8.0, float(np.ceil(1.5 * value)))
-    return Slider("vehicle.thrust_to_weight", "vehicle", "thrust-to-weight", "", low, high, 0.05, value)
-
-
-def _dispersion_slider(setting: Setting) -> Slider:
+    least, most = min(1.2, ratio), max(8.0, float(np.ceil(1.5 * ratio)))
+    yield Slider("vehicle.thrust_to_weight", "vehicle", "thrust-to-weight", "", least, most, 0.05, ratio)
     unit = f"× {setting.conditions.name}"
     # at three times the conditions, most maneuvers fail
-    return Slider("dispersion", "flight", "dispersion", unit, 0.0, 3.0, 0.1, 0.0)
+    yield Slider("dispersion", "flight", "dispersion", unit, 0.0, 3.0, 0.1, 0.0)
