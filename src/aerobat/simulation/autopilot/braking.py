@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import ArrayLike
 
 from aerobat import so3
@@ -53,14 +54,11 @@ class Braking(NamedTuple):
         """Return position to jerk [m/s^k] at times [s] (T,), (T, ..., 3) each; at rest after the end."""
         each = since.reshape(-1, *(1,) * self.durations.ndim)
         s = np.minimum(each / self.durations, 1.0)[..., None]
-        parts, rates = [], self.coefficients
+        parts: list[Array] = []
+        rates = np.moveaxis(self.coefficients, -2, 0)
         for _ in range(4):
-            value = np.zeros_like(s * rates[..., 0, :])
-            for k in range(rates.shape[-2] - 1, -1, -1):
-                value = value * s + rates[..., k, :]
-            parts.append(value)
-            powers = np.arange(1, rates.shape[-2])[:, None]
-            rates = powers * rates[..., 1:, :] / self.durations[..., None, None]
+            parts.append(np.asarray(polyval(s, rates, tensor=False), dtype=np.float64))
+            rates = polyder(rates) / self.durations[..., None]
         parts[3] = np.where(s < 1.0, parts[3], 0.0)  # jerk is discontinuous at the end
         return parts[0], parts[1], parts[2], parts[3]
 
