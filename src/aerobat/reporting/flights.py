@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import isinf, isnan
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,26 +13,16 @@ from aerobat.estimation import Estimates
 from aerobat.evaluation.criteria import GOAL
 from aerobat.evaluation.score import METRICS, ObserverScore, Score
 from aerobat.flatness import Reference
-from aerobat.reporting.facts import NONE, REPORT, Columns, Fact, facts, fields_of, line, picture, record
+from aerobat.reporting.facts import NONE, REPORT, Columns, Fact, facts, fields_of, line, record
 from aerobat.reporting.plans import rough_length
 from aerobat.simulation import Flight
 from aerobat.simulation.flight import setpoint_series
 from aerobat.simulation.outcome import digits, length
 from aerobat.simulation.passages import NearestObstacle, Passage, WaypointPassage, passage_names
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 COMPONENTS = {3: AXES, 4: "wxyz"}  # of vectors and quaternions
 # fields of a score that only its sentence needs
 EVENTS = ("stop", "is_finite", "ground_time", "off_path_time", "contact", "contact_time", "path_radius_m")
-
-
-@picture.register(Flight)
-def _(flight: Flight) -> Figure:
-    from aerobat.reporting.figures import draw
-
-    return draw(flight)
 
 
 @facts.register

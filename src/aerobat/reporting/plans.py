@@ -26,6 +26,7 @@ from aerobat.reporting.facts import (
     picture,
     record,
 )
+from aerobat.simulation import Flight
 from aerobat.simulation.autopilot import Recoveries
 from aerobat.simulation.outcome import length
 
@@ -38,11 +39,12 @@ MORE_MARGIN = "--pass 0.95, which keeps as much as flights need"
 SEVERAL_TIMES = 2.0  # ratio to the lower bound above which no percentage is given
 
 
+@picture.register(Flight)
 @picture.register(Plan)
-def _(plan: Plan) -> Figure:
+def _(shown: Plan | Flight) -> Figure:
     from aerobat.reporting.figures import draw
 
-    return draw(plan)
+    return draw(shown)
 
 
 @facts.register
