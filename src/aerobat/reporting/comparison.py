@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import cycle
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -36,6 +34,7 @@ from aerobat.reporting.panels.path import mark_ends
 from aerobat.reporting.panels.poses import is_flat, plan_reference
 from aerobat.reporting.panels.timelines import draw_limits, fit_to_limits
 from aerobat.reporting.scene.axes_box import draw_box_around
+from aerobat.reporting.scene.camera import Camera
 from aerobat.reporting.scene.glyphs import gate_corners, gate_shapes
 from aerobat.reporting.scene.obstacles import obstacle_shapes, surfaces_beside
 from aerobat.reporting.scene.shapes import draw_depth_sorted
@@ -92,18 +91,23 @@ def comparison_figure(comparison: Comparison) -> Figure:
     Thrusts are those of the plan by flatness, and limits are dashed. A planner without a plan has its reason.
     """
     entries = comparison.entries
-    colours = [colour for colour, _ in zip(cycle(COLOURS), entries, strict=False)]
-    paths = [_path(e, e.plan, colour) for e, colour in zip(entries, colours, strict=True) if e.plan]
+    colours = [COLOURS[k % len(COLOURS)] for k in range(len(entries))]
+    plans = [entry.plan for entry in entries if entry.plan]
+    paths = [plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 200)) for plan in plans]
     rows = AXIS + sum(map(_pitch, entries))
-    height = 3.2 if is_flat(np.concatenate([path.position for path in paths])) else 4.8  # [in] of the paths
+    height = 3.2 if is_flat(np.concatenate(paths)) else 4.8  # [in] of the paths
     with house_style():
         title = f"{comparison.problem.name} · planners for {comparison.vehicle.name}"
-        fact = f"{len(paths)} of {len(entries)} planners found a plan"
+        fact = f"{len(plans)} of {len(entries)} planners found a plan"
         figure = blank_page(rows + AXIS + MARGIN + height + TITLES, title, [fact])
         axes = panel(figure, COLUMNS[0], rows + AXIS + MARGIN, PAGE_WIDTH - COLUMNS[0] - MARGIN, height)
-        problem, plans = comparison.problem, [entry.plan for entry in entries if entry.plan]
+        problem = comparison.problem
         gates = dict.fromkeys(gate for plan in plans for gate in as_passed(problem.gates, plan.stages))
-        draw_overlay(axes, paths, tuple(gates), problem.surroundings.pieces.pieces)
+        camera = _draw_scene(axes, paths, tuple(gates), problem.surroundings.pieces.pieces)
+        drawn = [(_name(entry), colour) for entry, colour in zip(entries, colours, strict=True) if entry.plan]
+        for path, (name, colour) in zip(paths, drawn, strict=True):
+            axes.plot(*camera.project(path).T, color=colour, linewidth=1.7, label=name)
+        mark_ends(axes, camera.project(paths[0][[0, -1]]))
         heading(axes, "Paths")
         _draw_rows(figure, comparison, colours, rows)
     return figure
@@ -133,11 +137,6 @@ def _drawn(comparison: Comparison, entry: Entry) -> list[Fact]:
     return [fact for fact in _row(comparison, entry) if fact.key in DRAWN]
 
 
-def _path(entry: Entry, plan: Plan, colour: str) -> NamedPath:
-    times = np.linspace(0.0, plan.duration, 200)
-    return NamedPath(_name(entry), colour, plan.trajectory.evaluate(times))
-
-
 def _pitch(entry: Entry) -> float:
     """Return the height of a planner's row with its name [in]; less where there is no plan."""
     return 0.75 if entry.plan is None else 1.3
@@ -151,7 +150,8 @@ def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], t
     for entry, colour in zip(comparison.entries, colours, strict=True):
         top -= _pitch(entry)
         if entry.plan is None:
-            _write_reason(figure, entry, top)
+            write(figure, COLUMNS[0], top + 0.4, _name(entry), size=SMALL, color=MUTED)
+            write(figure, COLUMNS[0], top + 0.3, fill(entry.outcome, 150), size=NORMAL, va="top")
             continue
         axes = panel(figure, COLUMNS[0], top, 5.5, 0.85)
         _draw_thrusts(axes, entry.plan, comparison.vehicle, colour)
@@ -191,32 +191,18 @@ def _write_facts(figure: Figure, comparison: Comparison, entry: Entry, bottom: f
     write(figure, PLACES[0], bottom + 0.42, note, size=SMALL, color=MUTED, va="top")
 
 
-def _write_reason(figure: Figure, entry: Entry, bottom: float) -> None:
-    write(figure, COLUMNS[0], bottom + 0.4, _name(entry), size=SMALL, color=MUTED)
-    write(figure, COLUMNS[0], bottom + 0.3, fill(entry.outcome, 150), size=NORMAL, va="top")
-
-
-@dataclass(frozen=True, eq=False)
-class NamedPath:
-    """A path with its name and colour."""
-
-    name: str
-    colour: str
-    position: Array  # [m], (T, 3), as many as of the others
-
-
-def draw_overlay(
-    axes: Axes, paths: Sequence[NamedPath], gates: Sequence[Gate], pieces: Sequence[ConvexPiece]
-) -> None:
-    """Draw paths from one start to one goal: in the vertical plane that holds them, or in space.
+def _draw_scene(
+    axes: Axes, paths: Sequence[Array], gates: Sequence[Gate], pieces: Sequence[ConvexPiece]
+) -> Camera:
+    """Draw what is around paths, in the vertical plane that holds them or in space; return the camera.
 
     Args:
         axes: The axes.
-        paths: The paths.
+        paths: The paths [m], (T, 3) each.
         gates: The gates of the problem; a moving gate is drawn where each path passes it.
         pieces: The convex pieces of obstacles, which are drawn where they are near.
     """
-    surfaces, points = surfaces_beside(pieces, [*(path.position for path in paths), gate_corners(gates)])
+    surfaces, points = surfaces_beside(pieces, [*paths, gate_corners(gates)])
     plane = plane_of(points)
     if plane is None:
         pad = 0.02 * float(np.ptp(points, axis=0).max())
@@ -231,7 +217,4 @@ def draw_overlay(
     shapes = obstacle_shapes(surfaces, camera) + [shape for gate in gates for shape in gate_shapes(gate)]
     if shapes:
         draw_depth_sorted(axes, shapes, camera, zorder=1.5)
-    pictures = [camera.project(path.position) for path in paths]
-    for path, drawn in zip(paths, pictures, strict=True):
-        axes.plot(*drawn.T, color=path.colour, linewidth=1.7, label=path.name)
-    mark_ends(axes, pictures[0][[0, -1]])
+    return camera
