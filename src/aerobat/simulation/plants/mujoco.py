@@ -115,13 +115,9 @@ class MujocoRun:
             self._data.xfrc_applied[1, :3] = -so3.rotate(q, drag * so3.unrotate(q, airspeed))
             self._last_velocity = now
             self._mujoco.mj_step(self._model, self._data)
-            self._move_obstacles()
+            for place, motion in zip(self._data.mocap_pos, self._motions, strict=True):
+                place[:] = motion.moved(np.array(self._data.time))
             self._detect_contact()
-
-    def _move_obstacles(self) -> None:
-        """Move the mocap bodies, which are moving obstacles and gates, to their present places."""
-        for place, motion in zip(self._data.mocap_pos, self._motions, strict=True):
-            place[:] = motion.moved(np.array(self._data.time))
 
     def _detect_contact(self) -> None:
         touched = self._data.contact.geom[: self._data.ncon].ravel().tolist()
