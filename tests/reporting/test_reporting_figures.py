@@ -252,7 +252,7 @@ def test_vehicles_along_the_path_stand_as_the_flight_stood(monkeypatch):
 def test_vehicles_in_gates_do_not_cover_each_other(monkeypatch):
     plan, quad, scales = shared_plan("line"), ab.load_vehicle("agile-quad"), []
     monkeypatch.setattr(
-        path_panel, "vehicle_shapes", lambda vehicle, position, q, scale, face: scales.append(scale) or []
+        path_panel, "pose_shapes", lambda vehicle, position, q, scale, camera: scales.append(scale) or []
     )
     gates = tuple(ab.tilted_gate((x, 0.0, 0.0), name=f"{x:g}") for x in np.arange(1.0, 9.0, 0.8))
     course = replace(plan, problem=replace(plan.problem, gates=gates), stages=())

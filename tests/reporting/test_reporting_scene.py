@@ -16,9 +16,9 @@ from aerobat.reporting.scene.glyphs import (
     direction_marks,
     enlargement,
     gate_bars,
+    pose_shapes,
     side_face,
     span,
-    thrust_axis_shape,
     vehicle_shapes,
 )
 from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted
@@ -112,7 +112,7 @@ def test_drawn_rotors_are_the_vehicle_s_in_its_attitude(name, position, q, scale
 
 @given(st.sampled_from(vehicle_names()), points, quaternions.map(so3.normalize))
 def test_a_drawn_thrust_axis_is_the_attitude_s(name, position, q):
-    foot, tip = thrust_axis_shape(load_vehicle(name), position, q, 1.0).points
+    foot, tip = pose_shapes(load_vehicle(name), position, q, 1.0, Camera(0.0))[0].points
     np.testing.assert_allclose(foot, position)
     np.testing.assert_allclose((tip - foot) / np.linalg.norm(tip - foot), so3.thrust_axis(q), atol=1e-9)
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from itertools import chain
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aerobat.arrays import Array
 from aerobat.evaluation.subject import Subject
 from aerobat.planning import Plan
 from aerobat.reporting.page import AXIS, Place, house_style, panel, write
@@ -23,10 +21,10 @@ from aerobat.reporting.scene.glyphs import (
     enlargement,
     gate_corners,
     gate_shapes,
+    pose_shapes,
     shadow,
     side_face,
     span,
-    thrust_axis_shape,
     vehicle_shapes,
 )
 from aerobat.reporting.scene.obstacles import obstacle_shapes, surfaces_beside
@@ -38,6 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SIZE = (7.2, 4.8)  # [in] of a picture
+PASSED_OPACITY = 0.35  # [-] of the vehicle at stages that are passed
 SCENE: Place = (0.0, 0.0, 4.0, 4.5)
 LINES: tuple[Place, ...] = tuple((4.78, AXIS + 1.38 * k, 2.28, 1.0) for k in (2, 1, 0))
 
@@ -154,8 +153,7 @@ class MovingPicture:
             flown = poses.position[: k + 1 : max(1, k // 80)]
             if len(flown) > 1:
                 shapes += polyline(np.concatenate([flown, position[None]]), line, 1.0 if many else 1.8)
-            shapes.append(thrust_axis_shape(self._subject.vehicle, position, q, self._scale))
-            shapes += self._vehicle(position, q)
+            shapes += pose_shapes(self._subject.vehicle, position, q, self._scale, self._camera)
             foot = shadow(position, self._floor)
             shapes.append(Shape(np.array([position, foot]), edge=FAINT, width=0.6, depth_bias=-1e3))
         return shapes
@@ -164,14 +162,9 @@ class MovingPicture:
         """Return the first vehicle at the stages until an instant, nearly transparent."""
         poses = self._moved[0]
         rows = poses.rows([stage.time for stage in self._subject.stages if stage.time <= time])
-        each = (self._vehicle(poses.position[k], poses.q_world_body[k], opacity=0.35) for k in rows)
-        return list(chain.from_iterable(each))
-
-    def _vehicle(self, position: Array, q_world_body: Array, opacity: float = 1.0) -> list[Shape]:
-        """Return the vehicle's glyph."""
-        colour, own = side_face(q_world_body, self._camera)
-        face = colour, opacity * own
-        shapes = vehicle_shapes(self._subject.vehicle, position, q_world_body, self._scale, face)
-        if opacity == 1.0:
-            return shapes
-        return [replace(shape, edge=(INK, opacity), width=0.7 * shape.width) for shape in shapes]
+        shapes: list[Shape] = []
+        for position, q in zip(poses.position[rows], poses.q_world_body[rows], strict=True):
+            colour, opacity = side_face(q, self._camera)
+            face = colour, PASSED_OPACITY * opacity
+            shapes += vehicle_shapes(self._subject.vehicle, position, q, self._scale, face)
+        return [replace(each, edge=(INK, PASSED_OPACITY), width=0.7 * each.width) for each in shapes]

@@ -23,11 +23,9 @@ from aerobat.reporting.scene.glyphs import (
     enlargement,
     gate_corners,
     gate_shapes,
+    pose_shapes,
     shadow,
-    side_face,
     span,
-    thrust_axis_shape,
-    vehicle_shapes,
 )
 from aerobat.reporting.scene.obstacles import obstacle_shapes, surfaces_beside
 from aerobat.reporting.scene.shapes import Shape, draw_depth_sorted, polyline
@@ -82,9 +80,7 @@ def draw_path(
         foot = gate.position + np.array([0.0, 0.0, lowest - gate.position[2]])
         shapes += [*gate_shapes(gate), drop_line(foot, floor)]
     for k in rows:
-        position, q = poses.position[k], poses.q_world_body[k]
-        shapes.append(thrust_axis_shape(vehicle, position, q, scale))
-        shapes += vehicle_shapes(vehicle, position, q, scale, side_face(q, camera))
+        shapes += pose_shapes(vehicle, poses.position[k], poses.q_world_body[k], scale, camera)
     between = [(a + b) // 2 for a, b in pairwise(rows)]
     shapes += direction_marks(poses.position, between[1::3], camera, 0.03 * reference.extent)
     draw_depth_sorted(axes, shapes, camera)

@@ -64,10 +64,16 @@ def vehicle_shapes(
     return shapes + discs
 
 
-def thrust_axis_shape(vehicle: Vehicle, position: Array, q_world_body: Array, scale: float) -> Shape:
-    """Return a line from a vehicle along its thrust axis, somewhat shorter than half of its span."""
+def pose_shapes(
+    vehicle: Vehicle, position: Array, q_world_body: Array, scale: float, camera: Camera
+) -> list[Shape]:
+    """Return a vehicle as `vehicle_shapes` whose discs tell their sides, with a line along its thrust axis.
+
+    The line is somewhat shorter than half of the vehicle's span.
+    """
     tip = position + 0.45 * scale * span(vehicle) * so3.thrust_axis(q_world_body)
-    return Shape(np.array([position, tip]), edge=INK, width=0.9)
+    axis = Shape(np.array([position, tip]), edge=INK, width=0.9)
+    return [axis, *vehicle_shapes(vehicle, position, q_world_body, scale, side_face(q_world_body, camera))]
 
 
 def side_face(q_world_body: Array, camera: Camera) -> tuple[str, float]:
