@@ -111,7 +111,10 @@ def _walls(box: AxesBox, camera: Camera) -> list[Shape]:
     shapes, lines = [], []
     for normal in range(3):
         first, second = (axis for axis in range(3) if axis != normal)
-        shapes.append(Shape(_rectangle(box, normal, back[normal]), face=PAPER if normal == 2 else "#fbfcfd"))
+        corners = np.full((4, 3), back[normal])
+        corners[:, first] = np.array([box.lower, box.upper, box.upper, box.lower])[:, first]
+        corners[:, second] = np.array([box.lower, box.lower, box.upper, box.upper])[:, second]
+        shapes.append(Shape(corners, face=PAPER if normal == 2 else "#fbfcfd"))
         for along, across in ((first, second), (second, first)):
             for tick in box.ticks(across):
                 ends = np.tile(back, (2, 1))
@@ -119,14 +122,6 @@ def _walls(box: AxesBox, camera: Camera) -> list[Shape]:
                 ends[:, across] = tick
                 lines.append(Shape(ends, edge=HAIR, width=0.7, depth_bias=1e3))
     return shapes + lines
-
-
-def _rectangle(box: AxesBox, normal: int, level: float) -> Array:
-    first, second = (axis for axis in range(3) if axis != normal)
-    points = np.full((4, 3), level)
-    points[:, first] = np.array([box.lower, box.upper, box.upper, box.lower])[:, first]
-    points[:, second] = np.array([box.lower, box.lower, box.upper, box.upper])[:, second]
-    return points
 
 
 def _scale(axes: Axes, box: AxesBox, camera: Camera, axis: int, per_metre: float) -> None:
