@@ -18,7 +18,6 @@ from aerobat.studies.feasibility.probe import Feasibility
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
 FILLS = {  # of cells without a plan that flies
@@ -65,8 +64,18 @@ def _height(found: FeasibilityMap) -> float:
 
 def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap, kinds: Kinds, durations: Array) -> None:
     """Draw the cells of a map over two fields, and the scale of durations beside them."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgba
+
     rows, columns = (len(axis.values) for axis in found.axes)
-    scale, colours = _colours(found, durations)
+    known = durations[np.isfinite(durations)]
+    shortest, longest = (known.min(), known.max()) if len(known) else (0.0, 0.0)
+    shades = LinearSegmentedColormap.from_list("durations", [BAND, BLUE])
+    scale = ScalarMappable(Normalize(shortest, longest), shades)
+    colours = scale.to_rgba(durations)
+    for number, cell in enumerate(found.cells):
+        if not cell.is_planned:
+            colours[number] = to_rgba(FILLS[cell.feasibility])
     axes.imshow(colours.reshape(rows, columns, 4), origin="lower", aspect="auto", interpolation="nearest")
     for axis, set_ticks, set_label, size in (
         (found.axes[0], axes.set_yticks, axes.set_ylabel, _height(found) / ROW),
@@ -77,39 +86,21 @@ def _draw_grid(figure: Figure, axes: Axes, found: FeasibilityMap, kinds: Kinds, 
         set_ticks(places, [f"{axis.values[i]:g}" for i in places])
         set_label(axis.label)
     axes.grid(visible=False)
-    _write_cells(axes, found, kinds, durations)
-    if np.isfinite(durations).any() and np.nanmax(durations) > np.nanmin(durations):
-        _draw_scale(figure, axes, scale, durations)
+    _write_cells(axes, found, kinds, np.asarray(scale.norm(durations)))
+    if longest > shortest:
+        bar = figure.colorbar(scale, ax=axes, label="duration [s]", aspect=20, pad=0.02)
+        bar.ax.grid(visible=False)
 
 
-def _write_cells(axes: Axes, found: FeasibilityMap, kinds: Kinds, durations: Array) -> None:
-    """Write into each cell of a grid what it has room for."""
+def _write_cells(axes: Axes, found: FeasibilityMap, kinds: Kinds, parts: Array) -> None:
+    """Write into each cell of a grid what it has room for; `parts` are durations on their scale, 0 to 1."""
     columns = len(found.axes[1].values)
     width, height = WIDTH / columns, _height(found) / len(found.axes[0].values)
-    for number, (cell, part) in enumerate(zip(found.cells, _parts(durations), strict=True)):
+    for number, (cell, part) in enumerate(zip(found.cells, parts, strict=True)):
         row, column = divmod(number, columns)
         is_dark = cell.is_planned and part > 0.55  # of the scale: from there letters are white
         text = _cell_text(cell, letter_of(cell, kinds), width, height)
         axes.text(column, row, text, size=SMALL, ha="center", va="center", color=PAPER if is_dark else INK)
-
-
-def _colours(found: FeasibilityMap, durations: Array) -> tuple[Colormap, Array]:
-    """Return the scale of durations, and the colour of each cell, (cells, 4)."""
-    from matplotlib.colors import LinearSegmentedColormap, to_rgba
-
-    scale = LinearSegmentedColormap.from_list("durations", [BAND, BLUE])
-    colours = scale(_parts(durations))
-    for number, cell in enumerate(found.cells):
-        if not cell.is_planned:
-            colours[number] = to_rgba(FILLS[cell.feasibility])
-    return scale, np.asarray(colours)
-
-
-def _parts(durations: Array) -> Array:
-    """Return durations as fractions of their range, 0 for a cell without one."""
-    known = durations[np.isfinite(durations)]
-    low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
-    return np.asarray(np.nan_to_num((durations - low) / ((high - low) or 1.0)))
 
 
 def _cell_text(cell: Cell, letter: str, width: float, height: float) -> str:
@@ -117,16 +108,6 @@ def _cell_text(cell: Cell, letter: str, width: float, height: float) -> str:
     if width >= 0.42 and height >= 0.2 and cell.duration is not None:
         return f"{cell.duration:.2f} {letter}"
     return letter if width >= 0.12 and height >= 0.14 else ""
-
-
-def _draw_scale(figure: Figure, axes: Axes, scale: Colormap, durations: Array) -> None:
-    """Draw the scale of durations at the right of a grid."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    values = Normalize(float(np.nanmin(durations)), float(np.nanmax(durations)))
-    bar = figure.colorbar(ScalarMappable(values, scale), ax=axes, label="duration [s]", aspect=20, pad=0.02)
-    bar.ax.grid(visible=False)
 
 
 def _draw_line(axes: Axes, found: FeasibilityMap, kinds: Kinds, durations: Array) -> None:
