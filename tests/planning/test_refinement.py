@@ -21,7 +21,7 @@ from aerobat.planning.refinement.spline import Spline, basis
 from aerobat.planning.refinement.stage_values import StageValues
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
-from aerobat.problem import Condition, Limits, Problem, Quantity, load_problem
+from aerobat.problem import Limits, Problem, load_problem
 from aerobat.problem.ball import Ball
 from aerobat.problem.stage import Stage
 from aerobat.vehicle import Vehicle, load_vehicle
@@ -71,18 +71,6 @@ WALLED = replace(
         )
     ),
 )
-
-
-@given(width=st.floats(1e-9, 1e-3))
-def test_the_margin_of_a_stages_condition_leaves_most_of_its_width(width: float) -> None:
-    problem = load_problem("flip-roll")
-    task = Task.of(problem, load_vehicle("agile-quad"))
-    condition = Condition(Quantity.POSITION, np.eye(3)[0], 0.5, 0.5 + width)
-    stage = StageValues((Stage("here", (condition,)),), task)
-    derivatives = np.zeros((1, 6, 3))
-    for part, holds in ((0.0, False), (0.3, True), (0.7, True), (1.0, False)):
-        derivatives[0, 0, 0] = 0.5 + part * width
-        assert bool((stage.inequalities(derivatives) <= 0.0).all()) is holds
 
 
 @pytest.mark.parametrize("problem", [COURSE, MOVING, WALLED], ids=["rest", "moving", "walled"])

@@ -48,7 +48,9 @@ SLOWER = 1.5  # factor on the duration of plans without a vehicle, which are tri
 PACE_SPREAD = 0.4  # standard deviation of the logarithm of a random pace of a phase
 SEED = 0
 ASIDE = 0.1  # bend of planar paths out of their plane, relative to their extent: planar ones are local optima
-FINISHED = 3  # certified paths of which the best is kept; later ones only while rough paths are faster
+# certified paths of which the best is kept if it is clear of frames; later ones only while rough paths are
+# faster
+FINISHED = 3
 # work limit [s] of one program with more intervals (with nine stages, such a program takes 4 s), or of
 # the other starts beside routes around obstacles
 MORE_WORK = 10.0
@@ -260,7 +262,8 @@ class MultiStart:
         with within_share(ROUGH_TIME):
             paths = self._with_more_segments(refinement, rough)
         for path in paths:
-            if len(certified) >= FINISHED or (best is not None and (best.is_ahead_of(path) or out_of_time())):
+            has_most = len(certified) >= FINISHED and best is not None and best.path.is_clear
+            if has_most or (best is not None and (best.is_ahead_of(path) or out_of_time())):
                 break
             judged = refinement.finished(path)
             if judged.feasible:

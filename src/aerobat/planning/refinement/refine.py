@@ -95,7 +95,6 @@ MAX_ADDED_PLACES = 8
 # least distance of an added place from its neighbours, as a fraction of the gap between them
 MIN_SPACING = 0.25
 REDUCED_BACKOFF = 0.1  # factor on the tightening in rounds that add places
-MISSES = 4  # fine rounds in a row that miss a stage after which its condition is taken to be out of reach
 MIN_PROGRESS = 0.02  # relative change of duration and of violation below which rounds have stalled
 BACKOFF_FACTOR = 1.3  # factor on violations that gives the tightening of fine rounds
 BACKOFF_OFFSET = 2e-4  # constant added to that tightening, relative to the limit's size
@@ -302,7 +301,7 @@ class Refinement:
         path, known = rough.path.trajectory, found.solution.duration if found.feasible else np.inf
         loses_little = known <= (1.0 + LOSS) * path.duration
         has_most = is_course(self.task.stages) or path.segments >= MOST_DOUBLED
-        if loses_little or has_most or out_of_time() or self.misses_stage(found.solution.source):
+        if loses_little or has_most or out_of_time() or self._missed_stage(found.solution.source.path):
             return found
         finer = self.finer(rough, min(2 * path.segments, MAX_SEGMENTS), known)
         if not self.is_promising(finer) or finer.duration >= known:
@@ -329,10 +328,6 @@ class Refinement:
     def _gives_up(self, path: RefinedPath) -> bool:
         """Return whether the refinement gives a path up early, before it has the requested segments."""
         return self.gives_up_early and not self._nearly_meets_stages(path)
-
-    def misses_stage(self, path: RefinedPath) -> bool:
-        """Return whether a path misses a stage."""
-        return self._missed_stage(path.path) is not None
 
     def _nearly_meets_stages(self, path: RefinedPath) -> bool:
         """Return whether a path misses no stage by more than further rounds may repair."""
@@ -424,7 +419,7 @@ class Rounds:
         self._segments = tuple(int(np.argmin(each)) for each in away)
         kept = limits.reserve + BACKOFF
         self._backoff = np.tile(kept, (trajectory.segments, 1))
-        self._multipliers, self._misses = multipliers, 0
+        self._multipliers = multipliers
 
     def solve(self) -> Solution[RefinedPath]:
         """Solve the program around the last path."""
@@ -448,20 +443,17 @@ class Rounds:
 
         Return False where further rounds lead nowhere.
         """
-        source = solution.source
-        self._misses = self._misses + 1 if self._refinement.misses_stage(source) else 0
-        stalls = self.has_stalled(solution) or self._misses >= MISSES
-        if out_of_time() or stalls or not self._refinement.is_promising(source):
+        violation = solution.source.violation
+        if out_of_time() or self.has_stalled(solution) or not self._refinement.is_promising(solution.source):
             return False
-        violation = source.violation
         self.back_off(violation, BACKOFF_FACTOR, BACKOFF_OFFSET)
         if certificate is not None:
             refuted, times = _refuted(certificate, self._refinement.task.reserve)
-            self._add_places(_with_times(violation.peaks, source.path.trajectory, times))
+            self._add_places(_with_times(violation.peaks, solution.source.path.trajectory, times))
             kept = self._backoff - self._refinement.limits.reserve
             is_near = violation.nearby + kept > -NEAR_LIMIT
             self._backoff += (BACKOFF_FACTOR * refuted + BACKOFF_OFFSET) * is_near
-        self._guess = source.path
+        self._guess = solution.source.path
         return True
 
     def has_stalled(self, solution: Solution[RefinedPath]) -> bool:

@@ -24,9 +24,7 @@ from aerobat.problem.stage import Stage
 STAGE_DERIVATIVES = 3  # number of derivatives that stages constrain: position, velocity, acceleration
 STATE = 3 * STAGE_DERIVATIVES  # number of their components
 DIRECTIONS = np.eye(STATE)
-# margin of stages' inequalities, as a fraction of their sizes: a converged solve exceeds it by half at most
-STAGE_MARGIN = 1e-4
-MARGIN_OF_WIDTH = 0.25  # largest fraction of the width of a two-sided condition that its margin takes
+BALL_FRACTION = 1.0 - 1e-5  # fraction of a ball's squared radius that is used; the rest allows for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +42,7 @@ class StageValues:
     def inequalities(self, derivatives: Array) -> Array:
         """Return the values of the inequalities, (q,)."""
         linear = self._unequal.values(derivatives)
-        balls = [float(offset @ offset) - 1.0 + STAGE_MARGIN for _, offset, _ in self._in_balls(derivatives)]
+        balls = [float(offset @ offset) - BALL_FRACTION for _, offset, _ in self._in_balls(derivatives)]
         rooms = [
             room.scale * room.functions.values(*room.inputs(derivatives), NO_DIRECTION)[0, :, 0]
             for room in self._rooms
@@ -183,11 +181,9 @@ def room_functions(sides: int) -> SmoothFunctions:
 
 def _sides(limit: Limit, is_equality: bool) -> Iterator[tuple[Array, float]]:
     """Yield a limit's finite ends as weights (6, 3) and upper bound; of an equality only one."""
-    lower, upper = limit.ends
-    margin = min(STAGE_MARGIN, MARGIN_OF_WIDTH * (upper - lower))
-    for sign, end in ((-1.0, lower), (1.0, upper)):
+    for sign, end in zip((-1.0, 1.0), limit.ends, strict=True):
         if isfinite(end):
-            yield sign / limit.size * limit.quantity.path, sign * end - margin
+            yield sign / limit.size * limit.quantity.path, sign * end
             if is_equality:
                 return
 
