@@ -125,7 +125,7 @@ def test_what_is_needed_is_what_any_planner_needs() -> None:
 
 def test_the_limit_that_a_path_exceeds_is_named() -> None:
     """It was "a limit or condition on the path"."""
-    found = Miqp().plan(replace(LINE, limits=Limits(jerk=2.0)), QUAD)
+    found = Miqp(rescue=False).plan(replace(LINE, limits=Limits(jerk=2.0)), QUAD)
     assert any(attempt.outcome.startswith("the jerk x is beyond its limit") for attempt in found.attempts)
 
 
