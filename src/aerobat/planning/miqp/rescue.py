@@ -24,15 +24,14 @@ from aerobat.vehicle import Vehicle
 RESCUE_WORK = 4.0  # work limit [s] of all fallbacks, so that refusals take 5 s (benchmarks/audit.py)
 # work limit [s] where a plan most likely exists, as a path with small constraint violations was found
 PROMISING_WORK = 15.0
-# work limit [s] where a plan is known, but is poor or keeps no reserve: with 12, random problem 49-16 takes
-# 2.69 s instead of 2.49
+# work limit [s] where a plan is known, but is poor or keeps no reserve (benchmarks/audit.py)
 SHORTENING_WORK = 16.0
 FALLBACK_FRACTION = 0.75  # fraction of the remaining work for one fallback, so that the next has some
 # factor on the duration of a nearly feasible path above which a plan is poor: of the plans of 300 random
 # problems, it selects those far from the best
 SLOW_FACTOR = 1.07
 # ratio to the lower bound above which a plan is poor where no stage is in a window of time: of 200 random
-# problems, 2 % have such plans. A power loop of x500 takes 4.49 s so, not 7.02.
+# problems, 2 % have such plans. A knife-edge pass of x500 takes 2.84 s so, not 2.97.
 LONG = 2.5
 FREE_KNOTS = "free-knots"  # a quick planner that starts from other paths too
 HALF_RESERVE = "with half of the reserve"
