@@ -303,7 +303,7 @@ class Refinement:
         has_most = is_course(self.task.stages) or path.segments >= MOST_DOUBLED
         if loses_little or has_most or out_of_time() or self._missed_stage(found.solution.source.path):
             return found
-        finer = self.finer(rough, min(2 * path.segments, MAX_SEGMENTS), known)
+        finer = self.finer(rough, 2 * path.segments, known)
         if not self.is_promising(finer) or finer.duration >= known:
             return found
         judged = self.finished(finer)
