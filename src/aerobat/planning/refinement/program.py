@@ -193,6 +193,21 @@ class RefinedPoint:
             found.append(self.program.closure.values(around, self._data.durations))
         return np.concatenate(found)
 
+    def missed(self, most: float) -> tuple[Array, Array]:
+        """Return what misses stages: values (m,) that should be zero, and their Jacobian (m, n).
+
+        These are the equalities, and the inequalities of stages and windows that are violated. Those of room
+        in gates do not count.
+
+        Args:
+            most: The largest violation of an inequality that counts.
+        """
+        others = self.inequalities[self.program.enforced.size :]
+        asked = np.arange(len(others)) < len(self.program.windows[1]) + self.program.stages.without_rooms
+        missed = asked & (others > 0.0) & (others <= most)
+        rows = np.concatenate([self.equality_rows, self.rows.others[missed]])
+        return np.concatenate([self.equalities, others[missed]]), rows
+
     @cached_property
     def rows(self) -> RefinedRows:
         """The Jacobian of the inequalities."""

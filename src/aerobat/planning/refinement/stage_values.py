@@ -43,11 +43,16 @@ class StageValues:
         """Return the values of the inequalities, (q,)."""
         linear = self._unequal.values(derivatives)
         balls = [float(offset @ offset) - BALL_FRACTION for _, offset, _ in self._in_balls(derivatives)]
-        rooms = [
-            room.scale * room.functions.values(*room.inputs(derivatives), NO_DIRECTION)[0, :, 0]
-            for room in self._rooms
-        ]
-        return np.concatenate([linear, balls, *rooms])
+        return np.concatenate([linear, balls, *self._in_rooms(derivatives)])
+
+    @property
+    def without_rooms(self) -> int:
+        """The number of inequalities before those of room in gates."""
+        return len(self._unequal.bounds) + len(self._balls)
+
+    def missing_room(self, derivatives: Array) -> float:
+        """Return the largest value of the inequalities of room in gates; zero without gates."""
+        return max((float(values.max()) for values in self._in_rooms(derivatives)), default=0.0)
 
     def equalities(self, derivatives: Array) -> Array:
         """Return the values of the equalities, (p,)."""
@@ -95,6 +100,11 @@ class StageValues:
         """Yield each stage with a ball, its offset from the centre over the radius, and the radius [m]."""
         for stage, ball in self._balls:
             yield stage, (derivatives[stage, 0] - ball.centre) / ball.radius, ball.radius
+
+    def _in_rooms(self, derivatives: Array) -> Iterator[Array]:
+        """Yield the values of each room's inequalities, (2 K + 1,)."""
+        for room in self._rooms:
+            yield room.scale * room.functions.values(*room.inputs(derivatives), NO_DIRECTION)[0, :, 0]
 
     @cached_property
     def _balls(self) -> tuple[tuple[int, Ball], ...]:
