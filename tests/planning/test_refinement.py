@@ -16,7 +16,12 @@ from aerobat.planning.polynomial.closed_forms import flying_lap, start_along_nor
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.limit_values import LimitValues
 from aerobat.planning.refinement.program import Multipliers, RefinementProgram
-from aerobat.planning.refinement.refine import Refinement, knots_at_stages
+from aerobat.planning.refinement.refine import (
+    REPAIRABLE_MISS,
+    Refinement,
+    knots_at_stages,
+    with_exact_stages,
+)
 from aerobat.planning.refinement.spline import Spline, basis
 from aerobat.planning.refinement.stage_values import StageValues
 from aerobat.planning.task import Task
@@ -95,6 +100,19 @@ def test_slopes_and_second_derivatives_are_differences(problem: Problem, lag: fl
     squared = dense(here.curvature(0.0 * weights, 0.0 * others, weights)) @ step
     expected = here.rows.transposed(weights * here.rows.times(step))
     np.testing.assert_allclose(squared, expected, rtol=1e-8, atol=1e-10 * np.abs(expected).max())
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_after_a_solve_stages_are_met_exactly_and_the_path_hardly_moves(seed: int) -> None:
+    """Solves end with conditions of stages missed by rounding of their size, which refused good paths."""
+    near, rng = program(COURSE, QUAD, 6), np.random.default_rng(seed)
+    solved = with_exact_stages(near, near.spline.start)
+    missing = solved + 1e-3 * rng.normal(size=near.spline.size)
+    before, _ = near.at(missing).missed(REPAIRABLE_MISS)
+    met = with_exact_stages(near, missing)
+    after, _ = near.at(met).missed(REPAIRABLE_MISS)
+    assert np.abs(after).max() < 1e-9 < np.abs(before).max()
+    assert np.linalg.norm(met - missing) <= 1.01 * np.linalg.norm(solved - missing)
 
 
 @pytest.mark.parametrize("closed", [False, True], ids=["open", "closed"])

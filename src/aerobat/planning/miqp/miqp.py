@@ -82,7 +82,7 @@ class Miqp(Planner):
     )
     segments: Annotated[int, Field(ge=2, le=MAX_SEGMENTS)] = SEGMENTS  # of a refined path; courses have more
     # whether paths are flown in simulation and repaired by it, and refined with more segments where that is
-    # faster; False where other planners only start from the path
+    # faster; False where other planners only start from the path, which then gets more rounds
     flies: bool = True
 
     def plan(
@@ -154,7 +154,7 @@ class Miqp(Planner):
             least: A lower bound on the duration of any motion [s].
         """
         task, recorder = attempts.task, attempts.recorder
-        whole = replace(Refinement.of(task, recorder), adds_segments=self.flies)
+        whole = replace(Refinement.of(task, recorder), adds_segments=self.flies, gives_up_early=self.flies)
         segments = segments_for(task.stages, self.segments)
         found: Judged[RefinedPath] | Judged[Placement] | None = None
         for refinement in whole.with_and_without_rooms:

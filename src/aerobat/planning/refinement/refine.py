@@ -23,7 +23,7 @@ from aerobat.errors import Reason
 from aerobat.limits.body_in_gate import BodyInGate
 from aerobat.limits.path_condition import limit_of
 from aerobat.optimization.deadline import count_work, out_of_time, within_share
-from aerobat.optimization.interior_point import InteriorPointResult, Settings, interior_point
+from aerobat.optimization.interior_point import Settings, interior_point
 from aerobat.planning.certified_solve import Judged, Solution, certified_solve, judge
 from aerobat.planning.courses import is_course
 from aerobat.planning.gate_clearance import bodies_in_gates
@@ -151,8 +151,8 @@ class Refinement:
     high_accuracy: bool = False  # whether solves are more accurate: within 0.1 % of the local optimum
     # whether paths get twice as many segments where certification costs more than LOSS
     adds_segments: bool = False
-    # whether a path that misses a stage with few segments is given up: more segments take several times as
-    # long, mostly in vain. For planners that have other starts.
+    # whether a path that misses a stage after its first round, or with few segments, is given up: more rounds
+    # and segments take several times as long, mostly in vain. For planners that have other starts.
     gives_up_early: bool = False
     _known: dict[tuple[Stage, ...], StageValues] = field(default_factory=dict, init=False, repr=False)
 
@@ -272,7 +272,7 @@ class Refinement:
             gains_little = has_converged and duration > (1.0 - LITTLE_GAIN) * before
             is_slow = duration > (1.0 + DURATION_CUTOFF) * known
             is_over = gains_little or is_slow or rounds.has_stalled(solution)
-            if is_over or out_of_time() or not self.is_promising(solution.source, BETWEEN_PLACES):
+            if is_over or out_of_time() or self._is_hopeless(solution.source, is_first=not number):
                 break
             before = duration
             rounds.recenter(solution.source)
@@ -342,6 +342,15 @@ class Refinement:
         at_stages = [[path.trajectory.evaluate(time, k) for k in range(DERIVATIVES)] for time in path.times]
         derivatives = np.reshape(at_stages, (-1, DERIVATIVES, 3))
         return self.stage_values(path.stages).missing_room(derivatives) <= MISSED_ROOM
+
+    def _is_hopeless(self, path: RefinedPath, is_first: bool) -> bool:
+        """Return whether rough rounds end, as further ones would not repair a path.
+
+        The second round of a maneuver may meet stages that the first round, from far away, misses. No round
+        makes room in gates. Courses have many starts.
+        """
+        goes_on = is_first and not (self.gives_up_early or is_course(self.task.stages))
+        return not self._has_room(path.path) if goes_on else not self.is_promising(path, BETWEEN_PLACES)
 
     def path(self, guess: WarmStart) -> RefinedPath:
         """Return a path with its constraint violations on dense samples."""
@@ -439,7 +448,7 @@ class Rounds:
         known = None if self._multipliers is None else program.at_its_places(self._multipliers)
         answer = interior_point(program, program.spline.start, self._settings, known)
         self._multipliers = Multipliers(answer.z, program.fractions)
-        x = _with_exact_stages(program, answer)
+        x = with_exact_stages(program, answer.x)
         trajectory = program.spline.trajectory(x)
         times = tuple(float(trajectory.knots[segment + 1]) for segment in self._segments)
         found = refinement.path(replace(self._guess, trajectory=trajectory, times=times))
@@ -579,9 +588,8 @@ def segments_for(sequence: StageSequence, requested: int = SEGMENTS) -> int:
     return min(max(wanted, legs), MAX_SEGMENTS)
 
 
-def _with_exact_stages(program: RefinementProgram, answer: InteriorPointResult) -> Array:
-    """Return an answer after Newton steps (least norm) that satisfy equalities and stages exactly."""
-    x = answer.x
+def with_exact_stages(program: RefinementProgram, x: Array) -> Array:
+    """Return variables (n,) after Newton steps (least norm) that satisfy equalities and stages exactly."""
     for _ in range(NEWTON_STEPS):
         with np.errstate(over="ignore", invalid="ignore"):
             values, rows = program.at(x).missed(REPAIRABLE_MISS)
