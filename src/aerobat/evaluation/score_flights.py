@@ -20,9 +20,9 @@ from aerobat.kernels.running_metrics import RunningMetrics
 from aerobat.planning import Plan
 from aerobat.problem import Problem, as_problem
 from aerobat.simulation.config import FlightChanges, FlightConfig
+from aerobat.simulation.fly import prepare
 from aerobat.simulation.metrics import PoseRow, metrics_row, pose_row, with_metrics
 from aerobat.simulation.passages import FlownBodies, NearestObstacle, nearest_obstacles
-from aerobat.simulation.prepare import prepare
 from aerobat.simulation.setup import FlightSetup
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle

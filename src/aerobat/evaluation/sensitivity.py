@@ -28,9 +28,9 @@ from aerobat.kernels.rigid_body import Body
 from aerobat.kernels.vectors import dot, subtract
 from aerobat.simulation.bodies import body_states
 from aerobat.simulation.config import FlightChanges, FlightConfig
+from aerobat.simulation.fly import prepare
 from aerobat.simulation.loop import LoopInput, LoopParameters, compose
 from aerobat.simulation.metrics import metrics_row, with_metrics
-from aerobat.simulation.prepare import prepare
 from aerobat.simulation.setup import FlightSetup
 from aerobat.trajectory import Trajectory
 from aerobat.vehicle import Vehicle

@@ -4,5 +4,5 @@ from aerobat.simulation.config import FlightConfig as FlightConfig
 from aerobat.simulation.flight import Flight as Flight
 from aerobat.simulation.flight import load_flight as load_flight
 from aerobat.simulation.fly import fly as fly
+from aerobat.simulation.fly import prepare as prepare
 from aerobat.simulation.outcome import Outcome as Outcome
-from aerobat.simulation.prepare import prepare as prepare
