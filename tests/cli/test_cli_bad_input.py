@@ -71,6 +71,10 @@ VEHICLE_FAULTS = {
 }
 
 PROBLEM_FAULTS = {
+    "from a place to the same": (
+        lambda d: d.pop("gate") and d.update(maneuver={"kind": "line"}),
+        "goal.position is the start's",
+    ),
     "no start": (dropping("start"), "start"),
     "no goal position": (dropping("goal.position"), "goal.position"),
     "start not a number": (setting("start.position", [NAN, 0.0, 0.0]), "start.position"),
@@ -151,7 +155,7 @@ ARGUMENT_FAULTS = {
     "angle not a number": (["plan", "half-flip", "--angle", "nan"], "--angle"),
     "unknown option": (["plan", "line", "--fast"], "--fast"),
     "unknown command": (["loop", "line"], "loop"),
-    "no problem": (["fly"], "problem"),
+    "no problem": (["fly"], "`aerobat fly` needs a PROBLEM; see `aerobat fly --help`"),
     "unknown conditions": (["fly", "line", "--conditions", "lap"], "conditions"),
     "conditions without a name": (["fly", "line", "--conditions", ""], "conditions"),
     "unknown controller": (["fly", "line", "--controller", "papr"], "did you mean 'paper'?"),
@@ -205,6 +209,11 @@ ARGUMENT_FAULTS = {
         ["plan", "line", "--pass", "0.9", "--conditions", "lab", "--planner", "min-snap"],
         "miqp",
     ),
+    "two problems": (
+        ["plan", "line", "flip-roll"],
+        "`aerobat plan` has no use for 'flip-roll'; leave it out",
+    ),
+    "an option without its value": (["plan", "line", "--seed"], "`aerobat plan` needs a value after --seed"),
     "a comparison of nothing": (["compare", "flip-rol"], "flip-roll"),
 }
 

@@ -233,7 +233,7 @@ def test_what_cannot_be_reached_names_the_cause_in_the_way(monkeypatch: pytest.M
         ({"planner": "min-snap"}, "planner keeps no reserve"),
         ({"probability": 0.99, "flights": 300}, "flights: 300 flights cannot prove 99 %; take 368"),
         ({"probability": 0.99, "fresh": 300}, "fresh: 300 flights cannot prove 99 %; take 368"),
-        ({"probability": 0.9999999}, "flights: 1000 flights cannot prove 99.99999 %; take 36888793"),
+        ({"probability": 0.9999999}, "flights: 100000 flights cannot prove 99.99999 %; take 36888793"),
     ],
 )
 def test_what_can_prove_nothing_is_refused(settings, named):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from cyclopts import App, CycloptsError, Group, Parameter
+from cyclopts import App, CycloptsError, Group, MissingArgumentError, Parameter, UnusedCliTokensError
 
 from aerobat.cli.failures import IMPORT_FLAG, ExitCode
 from aerobat.errors import SpecError
@@ -93,8 +93,21 @@ def run(arguments: Sequence[str]) -> ExitCode:
         _import_plugins(arguments)
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
-        raise SpecError(" ".join(str(error).split())) from None
+        raise SpecError(_sentence(error)) from None
     return code if isinstance(code, ExitCode) else ExitCode.WELL  # help and some commands return none
+
+
+def _sentence(error: CycloptsError) -> str:
+    """Return what is wrong with arguments, and what to type instead."""
+    command = " ".join(("aerobat", *(error.command_chain or ())))
+    if isinstance(error, UnusedCliTokensError):
+        unused = " ".join(error.unused_tokens or ())
+        return f"`{command}` has no use for '{unused}'; leave it out, or see `{command} --help`"
+    if isinstance(error, MissingArgumentError) and error.argument is not None:
+        missing = error.keyword or error.argument.name.strip("-").upper()
+        value = "a value after " if error.keyword else "a "
+        return f"`{command}` needs {value}{missing}; see `{command} --help`"
+    return " ".join(str(error).split())
 
 
 def _import_plugins(tokens: Sequence[str]) -> None:

@@ -179,9 +179,7 @@ class RefinedPoint:
         values = program.limits.values(self._derivatives.reshape(-1, 6, 3), program.near)
         values = values.reshape(program.enforced.shape) * program.weights + program.backoff[:, None]
         values[~program.enforced] = LIMITED
-        rows, bounds = program.windows
-        windows = rows @ self._data.ratios - bounds
-        return np.concatenate([values.ravel(), windows, program.stages.inequalities(self._at_stages)])
+        return np.concatenate([values.ravel(), self._others])
 
     @cached_property
     def equalities(self) -> Array:
@@ -202,21 +200,18 @@ class RefinedPoint:
         Args:
             most: The largest violation of an inequality that counts.
         """
-        others = self.inequalities[self.program.enforced.size :]
-        asked = np.arange(len(others)) < len(self.program.windows[1]) + self.program.stages.without_rooms
-        missed = asked & (others > 0.0) & (others <= most)
-        rows = np.concatenate([self.equality_rows, self.rows.others[missed]])
-        return np.concatenate([self.equalities, others[missed]]), rows
+        values, program = self._others, self.program
+        asked = np.arange(len(values)) < len(program.windows[1]) + program.stages.without_rooms
+        missed = asked & (values > 0.0) & (values <= most)
+        rows = np.concatenate([self.equality_rows, self._other_rows[missed]])
+        return np.concatenate([self.equalities, values[missed]]), rows
 
     @cached_property
     def rows(self) -> RefinedRows:
         """The Jacobian of the inequalities."""
         program = self.program
         limits = program.limits.slopes(self._motion.derivatives.reshape(-1, 6, 3), program.near)
-        windows = np.zeros((len(program.windows[1]), len(self.x)))
-        windows[:, program.spline.ratio_columns] = program.windows[0] * self._data.ratios
-        others = np.concatenate([windows, self._stage_rows(*self._stage_slopes)])
-        return RefinedRows(program, self._motion.jacobian, limits, others)
+        return RefinedRows(program, self._motion.jacobian, limits, self._other_rows)
 
     @cached_property
     def equality_rows(self) -> Array:
@@ -281,6 +276,20 @@ class RefinedPoint:
         by_local = (weights.reshape(len(at), 1, 18) @ jacobian)[:, 0]
         rows[np.arange(len(at))[:, None], spline.columns[segments]] = by_local
         return rows[:, :-1]
+
+    @cached_property
+    def _others(self) -> Array:
+        """The values of the inequalities of windows, then of stages."""
+        rows, bounds = self.program.windows
+        windows = rows @ self._data.ratios - bounds
+        return np.concatenate([windows, self.program.stages.inequalities(self._at_stages)])
+
+    @cached_property
+    def _other_rows(self) -> Array:
+        """Their Jacobian, (q, n)."""
+        windows = np.zeros((len(self.program.windows[1]), len(self.x)))
+        windows[:, self.program.spline.ratio_columns] = self.program.windows[0] * self._data.ratios
+        return np.concatenate([windows, self._stage_rows(*self._stage_slopes)])
 
     @cached_property
     def _data(self) -> KnotData:

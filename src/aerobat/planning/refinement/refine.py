@@ -339,6 +339,8 @@ class Refinement:
 
     def _has_room(self, path: WarmStart) -> bool:
         """Return whether a path leaves nearly all of the body's room in gates."""
+        if not self.in_gates:
+            return True
         at_stages = [[path.trajectory.evaluate(time, k) for k in range(DERIVATIVES)] for time in path.times]
         derivatives = np.reshape(at_stages, (-1, DERIVATIVES, 3))
         return self.stage_values(path.stages).missing_room(derivatives) <= MISSED_ROOM

@@ -7,6 +7,8 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from math import ceil, log
 
+import numpy as np
+
 from aerobat.control import named_controller
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
@@ -28,6 +30,8 @@ from aerobat.vehicle import Vehicle, as_vehicle
 
 # expected failures among the fresh flights at the required probability: two thirds as many are a proof
 PROVING_FAILURES = 50
+LEAST_TRAINING = 1000  # least number of flights on which plans are tried by default
+MOST_TRAINING = 100_000  # most of them, which take a minute and a half on two cores
 # work limit [s] of a further plan: with 4, section-v's flip in pitch is refused
 PLANNING_WORK = 20.0
 # proofs are attempted on separate flights: each errs with probability 2.5 % at most, both together 5 %
@@ -46,7 +50,7 @@ def plan_to_pass(
     conditions: Dispersion | str = "lab",
     seed: Seed = 0,
     controller: str = "full",
-    flights: Flights = 1000,
+    flights: Flights | None = None,
     fresh: Flights | None = None,
     workers: Workers | None = None,
     executor: Executor | None = None,
@@ -70,7 +74,7 @@ def plan_to_pass(
         conditions: The distributions that flights draw from, or the name of a preset or a file.
         seed: Of the flights.
         controller: The name of the controller: full, or a control law.
-        flights: Number of training flights, numbered from 0.
+        flights: Number of training flights, numbered from 0; by default 1000, or as many as a proof needs.
         fresh: Number of flights of the proof, with the next numbers; by default 50 / (1 − probability).
         workers: Processes, by default one a core; 1 flies in this process; dask://HOST:PORT on a cluster.
         executor: Any of `concurrent.futures` that flies instead, as a `dask.distributed` client's.
@@ -86,7 +90,9 @@ def plan_to_pass(
         raise SpecError(
             "planner keeps no reserve, by which plans are tightened; take miqp, free-knots or time-optimal"
         )
-    proving = fresh or max(round(PROVING_FAILURES / (1.0 - probability)), _least_flights(probability))
+    least = _least_flights(probability)
+    proving = fresh or max(round(PROVING_FAILURES / (1.0 - probability)), least)
+    flights = flights or int(np.clip(least, LEAST_TRAINING, MOST_TRAINING))
     _require_enough("flights", flights, probability)
     _require_enough("fresh", proving, probability)
     named_controller(controller)
