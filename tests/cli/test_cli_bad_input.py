@@ -71,10 +71,6 @@ VEHICLE_FAULTS = {
 }
 
 PROBLEM_FAULTS = {
-    "from a place to the same": (
-        lambda d: d.pop("gate") and d.update(maneuver={"kind": "line"}),
-        "goal.position is the start's",
-    ),
     "no start": (dropping("start"), "start"),
     "no goal position": (dropping("goal.position"), "goal.position"),
     "start not a number": (setting("start.position", [NAN, 0.0, 0.0]), "start.position"),

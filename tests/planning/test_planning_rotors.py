@@ -192,6 +192,14 @@ def test_two_intervals_suffice_for_nothing_to_do() -> None:
     assert found.cost == pytest.approx(0.0, abs=1e-12)
 
 
+def test_a_hover_is_no_reason_to_look_for_a_shorter_one(quad: Vehicle) -> None:
+    """Its millisecond was called suspiciously long beside a lower bound of zero, for half a minute."""
+    found = plan(Problem("still", at_rest((1.0, 2.0, 3.0)), at_rest((1.0, 2.0, 3.0))), Miqp(), quad)
+    assert found.duration < 0.02
+    assert not found.rescue
+    assert not found.wants_second_opinion
+
+
 @pytest.mark.slow
 def test_a_gate_at_the_start_is_planned_like_any_other(quad: Vehicle) -> None:
     problem = load_problem("flip-roll")

@@ -104,9 +104,11 @@ def _sentence(error: CycloptsError) -> str:
         unused = " ".join(error.unused_tokens or ())
         return f"`{command}` has no use for '{unused}'; leave it out, or see `{command} --help`"
     if isinstance(error, MissingArgumentError) and error.argument is not None:
-        missing = error.keyword or error.argument.name.strip("-").upper()
-        value = "a value after " if error.keyword else "a "
-        return f"`{command}` needs {value}{missing}; see `{command} --help`"
+        name = error.argument.name
+        missing = f"a value after {error.keyword}" if error.keyword else name
+        if not error.keyword and error.argument.field_info.is_positional:
+            missing = f"a {name.strip('-').upper()}"
+        return f"`{command}` needs {missing}; see `{command} --help`"
     return " ".join(str(error).split())
 
 

@@ -136,7 +136,6 @@ class Problem:
             if sequence.closed and state != EndState():
                 raise FieldError(end, "stands beside maneuver.closed, which has none; drop either")
         if not sequence.closed:
-            self._check_moves(sequence)
             return
         if sum(stage.is_placed for stage in sequence.stages) < MIN_PLACES:
             raise FieldError("maneuver.closed", f"needs {MIN_PLACES} elements that say where; add some")
@@ -152,16 +151,6 @@ class Problem:
         if moving:
             raise FieldError(
                 "maneuver.closed", f": '{moving[0]}' moves, so that no two laps are alike; drop either"
-            )
-
-    def _check_moves(self, sequence: StageSequence) -> None:
-        """Raise FieldError for a path from rest to rest at one place with nothing between."""
-        moves = any(end.velocity.any() or end.acceleration.any() for end in self.ends.values())
-        apart = (self.start.position != self.goal.position).any()
-        if not (sequence.stages or moves or apart):
-            raise FieldError(
-                "goal.position",
-                "is the start's, with nothing to do between; move it, or add a gate, waypoints or stages",
             )
 
     def _check_within_limits(self) -> None:

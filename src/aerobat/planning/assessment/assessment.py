@@ -16,6 +16,7 @@ from aerobat.trajectory import Trajectory
 
 POOR = 1.4  # ratio to another plan's duration above which a plan is poor
 SUSPICIOUS = 2.0  # ratio to the lower bound above which a plan is suspicious: optima reach up to this ratio
+INSTANT = 0.02  # duration [s] up to which no plan is suspicious: a hover has nothing to do, its bound is zero
 DIVE = 1.0  # depth [m] below start, goal, gates and stages that is warned of: a common start height indoors
 # distance [m] beyond the box of start, goal, gates and stages, plus the box's own size, above which a path
 # goes astray: no flip needs so much room
@@ -118,7 +119,7 @@ class Assessment:
     @property
     def suspicious(self) -> bool:
         """True if the duration is so far above the lower bound that only another plan can judge it."""
-        return self.ratio > SUSPICIOUS and not self.obstructed
+        return self.ratio > SUSPICIOUS and self.duration > INSTANT and not self.obstructed
 
     @property
     def poor(self) -> bool:

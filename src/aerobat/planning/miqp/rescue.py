@@ -13,6 +13,7 @@ from typing import Any, cast
 
 from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, within_share, within_time, work
+from aerobat.planning.assessment.assessment import INSTANT
 from aerobat.planning.planners import Planner, planner_class, planner_with_reserve
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.result import FLYING_RESERVE, KEPT_PART, Plan
@@ -131,6 +132,8 @@ class Rescue:
         fastest = min((path.duration for path in paths), default=inf)
         if not plan.certified:
             return "was not certified"
+        if plan.duration <= INSTANT:
+            return ""
         if plan.bound is not None:
             return "was the program's own, not refined"
         if plan.duration > SLOW_FACTOR * fastest:
