@@ -104,10 +104,11 @@ def _sentence(error: CycloptsError) -> str:
         unused = " ".join(error.unused_tokens or ())
         return f"`{command}` has no use for '{unused}'; leave it out, or see `{command} --help`"
     if isinstance(error, MissingArgumentError) and error.argument is not None:
-        name = error.argument.name
-        missing = f"a value after {error.keyword}" if error.keyword else name
-        if not error.keyword and error.argument.field_info.is_positional:
-            missing = f"a {name.strip('-').upper()}"
+        missing = error.argument.name
+        if error.keyword:
+            missing = f"a value after {error.keyword}"
+        elif error.argument.field_info.is_positional:
+            missing = f"a {missing.strip('-').upper()}"
         return f"`{command}` needs {missing}; see `{command} --help`"
     return " ".join(str(error).split())
 

@@ -45,6 +45,12 @@ class WarmStart:
         """The durations of the phases: start to first stage, between stages, last stage to end [s], (P,)."""
         return np.diff([0.0, *self.times, self.trajectory.duration])
 
+    @property
+    def at_stages(self) -> Array:
+        """Position, velocity and acceleration at the stages, (stages, 3, 3)."""
+        found = [[self.trajectory.evaluate(time, k) for k in range(3)] for time in self.times]
+        return np.reshape(found, (-1, 3, 3))
+
     def leg_at(self, time: float) -> str:
         """Return words on the stages between which a time [s] lies; empty with fewer than two stages."""
         if len(self.stages) < 2:

@@ -31,7 +31,7 @@ from aerobat.planning.passages import PlacedStage, place_stages
 from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.limit_values import LimitValues
 from aerobat.planning.refinement.program import Multipliers, RefinementProgram
-from aerobat.planning.refinement.spline import DERIVATIVES, END_ORDER, Spline, chebyshev
+from aerobat.planning.refinement.spline import END_ORDER, Spline, chebyshev
 from aerobat.planning.refinement.stage_values import StageValues
 from aerobat.planning.refinement.violation import INWARD, JUST_INSIDE, ConstraintViolation
 from aerobat.planning.rotor_margin import reserve_shortfalls
@@ -339,11 +339,7 @@ class Refinement:
 
     def _has_room(self, path: WarmStart) -> bool:
         """Return whether a path leaves nearly all of the body's room in gates."""
-        if not self.in_gates:
-            return True
-        at_stages = [[path.trajectory.evaluate(time, k) for k in range(DERIVATIVES)] for time in path.times]
-        derivatives = np.reshape(at_stages, (-1, DERIVATIVES, 3))
-        return self.stage_values(path.stages).missing_room(derivatives) <= MISSED_ROOM
+        return self.stage_values(path.stages).missing_room(path.at_stages) <= MISSED_ROOM
 
     def _is_hopeless(self, path: RefinedPath, is_first: bool) -> bool:
         """Return whether rough rounds end, as further ones would not repair a path.
@@ -392,9 +388,8 @@ class Refinement:
             path: The path, with its stages' times.
             tolerance: By how much a condition may be missed, as a fraction of the condition's size.
         """
-        for stage, time in zip(path.stages, path.times, strict=True):
+        for stage, time, flat in zip(path.stages, path.times, path.at_stages, strict=True):
             where = (f"stage '{stage.name}'",)
-            flat = np.array([path.trajectory.evaluate(time, k) for k in range(3)])
             for condition in stage.conditions:
                 excess = float(condition.bound(self.task.balance).excess(flat))
                 if excess > tolerance * limit_of(condition, self.task.balance).size:

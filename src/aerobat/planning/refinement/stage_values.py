@@ -51,7 +51,11 @@ class StageValues:
         return len(self._unequal.bounds) + len(self._balls)
 
     def missing_room(self, derivatives: Array) -> float:
-        """Return the largest value of the inequalities of room in gates; zero without gates."""
+        """Return the largest value of the inequalities of room in gates; zero without gates.
+
+        Args:
+            derivatives: Position, velocity and acceleration at the stages, or more, (stages, 3 or more, 3).
+        """
         return max((float(values.max()) for values in self._in_rooms(derivatives)), default=0.0)
 
     def equalities(self, derivatives: Array) -> Array:

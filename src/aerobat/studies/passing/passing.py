@@ -7,8 +7,6 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from math import ceil, log
 
-import numpy as np
-
 from aerobat.control import named_controller
 from aerobat.declaration import Seed, validated
 from aerobat.environment import Dispersion, as_dispersion
@@ -92,7 +90,7 @@ def plan_to_pass(
         )
     least = _least_flights(probability)
     proving = fresh or max(round(PROVING_FAILURES / (1.0 - probability)), least)
-    flights = flights or int(np.clip(least, LEAST_TRAINING, MOST_TRAINING))
+    flights = flights or min(max(least, LEAST_TRAINING), MOST_TRAINING)
     _require_enough("flights", flights, probability)
     _require_enough("fresh", proving, probability)
     named_controller(controller)
