@@ -19,15 +19,13 @@ from aerobat.flatness import Planned, environment_of, vehicle_of
 from aerobat.kernels.rigid_body import Body
 from aerobat.problem.gate import Gate
 from aerobat.simulation.bodies import bodies, body_states
-from aerobat.simulation.components import ControllerParameters, LogRow, StateObserver, log_row
+from aerobat.simulation.components import LogRow, log_row
 from aerobat.simulation.config import FlightChanges, FlightConfig
 from aerobat.simulation.flight import SERIES, Flight, setpoint_series
-from aerobat.simulation.law_controller import controller_component, inner_loop
-from aerobat.simulation.loop import LoopPart
 from aerobat.simulation.outcome import DIVERGENCE_RADIUS, Outcome, length
 from aerobat.simulation.plants.outside import fly_outside
 from aerobat.simulation.reference_source import ReferenceSource
-from aerobat.simulation.setup import FlightSetup, controller_model, plant_part
+from aerobat.simulation.setup import FlightSetup, Realization, controller_model
 from aerobat.states import BodyState
 from aerobat.trajectory import Trajectory, as_trajectory
 from aerobat.vehicle import Vehicle, as_vehicle, vehicle_names
@@ -63,8 +61,7 @@ def fly(
     setup = _setup_of(plan, vehicle, environment, config.changed(changes))
     outside = [each.kind for each in (setup.config.autopilot, setup.config.plant) if each is not None]
     if outside:
-        gates = () if isinstance(plan, Trajectory) else plan.problem.gates
-        return _flown_outside(setup, gates, " on ".join(outside))
+        return _flown_outside(setup, _gates(plan), " on ".join(outside))
     log, _ = setup.scan(log_row, setup.log_stride)
     return _flight(setup, log, setup.engine().name)
 
@@ -212,33 +209,35 @@ def _setup_of(
         raise SpecError(
             "vehicle must be one where there are conditions, which draw what really flies from it"
         )
-    if config.conditions is not None:
-        from aerobat.simulation.conditions.setup import dispersed_setup  # sensors, wind, a filter
-
-        return dispersed_setup(plan, vehicles[0], environment, config, config.conditions)
     flying, nominal = _broadcast_vehicles(vehicles, config)
-    is_batch = is_fleet or _batch_of(config.start) != ()
-    reference = ReferenceSource(as_trajectory(plan), nominal[0], environment, config.rate)
     fleet = Fleet.of(flying)
-    nominal_fleet = fleet if nominal is flying else Fleet.of(nominal)
+    known = fleet if nominal is flying else Fleet.of(nominal)
     controller = config.controller_of(nominal)
-    model = controller_model(controller, nominal, nominal_fleet, environment)
+    model = controller_model(controller, nominal, known, environment)
+    reference = ReferenceSource(as_trajectory(plan), nominal[0], environment, config.rate)
+    if config.conditions is None:
+        real = Realization(reference, fleet, _start(config.start, reference, len(fleet)))
+        is_batch = is_fleet or _batch_of(config.start) != ()
+    else:
+        from aerobat.simulation.conditions.realization import realization  # sensors, wind, a filter
+
+        real = realization(config.conditions, reference, _gates(plan), config, model)
+        is_batch = config.flights is not None
     return FlightSetup(
-        start=_start(config.start, reference, len(fleet)),
-        parts=(
-            LoopPart(StateObserver()),
-            LoopPart(controller_component(config.law, controller), ControllerParameters(model, ())),
-            *inner_loop(config.law, model),
-            plant_part(fleet, environment, config.rate),
-        ),
-        reference=reference,
-        fleet=fleet,
-        nominal=nominal_fleet,
+        start=real.start,
+        parts=real.parts(config.law, controller, model),
+        reference=real.reference,
+        fleet=real.fleet,
+        nominal=known,
         environment=environment,
         config=config,
         controller=controller,
         is_batch=is_batch,
     )
+
+
+def _gates(plan: Planned | Trajectory) -> tuple[Gate, ...]:
+    return () if isinstance(plan, Trajectory) else plan.problem.gates
 
 
 def _batch_of(start: BodyState | None) -> tuple[int, ...]:

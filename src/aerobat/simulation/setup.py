@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
 
 from aerobat.arrays import Array
+from aerobat.control import ControlLaw
 from aerobat.control.parameters import airframe_parameters, controller_parameters, environment_parameters
 from aerobat.engines import CompiledLoop, Engine, choose, logged_ticks
 from aerobat.engines.engine import first_row
@@ -18,9 +19,26 @@ from aerobat.environment import Environment
 from aerobat.errors import SpecError
 from aerobat.kernels.control import ControllerModel
 from aerobat.kernels.rigid_body import Body
-from aerobat.simulation.components import PlantParameters, RigidBodyPlant, log_row, rigid_body_steps
+from aerobat.simulation.components import (
+    ComputationDelay,
+    ControllerParameters,
+    PlantParameters,
+    RigidBodyPlant,
+    StateObserver,
+    log_row,
+    rigid_body_steps,
+)
 from aerobat.simulation.config import FlightConfig
-from aerobat.simulation.loop import Component, Log, LoopInput, LoopParameters, LoopPart, compose
+from aerobat.simulation.law_controller import controller_component, inner_loop
+from aerobat.simulation.loop import (
+    Component,
+    Log,
+    LoopInput,
+    LoopParameters,
+    LoopPart,
+    compose,
+    due_ticks,
+)
 from aerobat.simulation.reference_source import BLOCK, ReferenceSource
 from aerobat.vehicle import Vehicle
 from aerobat.vehicle.controller import Controller
@@ -89,6 +107,48 @@ def controller_model(
     for grounded in np.flatnonzero(~np.isfinite(model.gains.stiffness)).tolist():
         nominal[grounded].require_hover(environment.gravity)
     return model
+
+
+@dataclass(frozen=True, eq=False)
+class Realization:
+    """What really flies, of which the controller knows a model: as given, or as drawn from conditions."""
+
+    reference: ReferenceSource
+    fleet: Fleet  # the vehicles that really fly
+    start: Body
+    effectiveness: Array | None = None  # of the rotors [-], (vehicles, n); None for 1
+    disturbances: tuple[LoopPart, ...] = ()  # parts before the observer: wind, battery, sensors
+    observers: tuple[LoopPart, ...] = (LoopPart(StateObserver()),)
+    period: int = 1  # of the controller, in ticks
+    delay: int = 0  # ticks from a controller's step until its commands take effect
+
+    def parts(
+        self, law: ControlLaw | None, settings: Controller, model: ControllerModel
+    ) -> tuple[LoopPart, ...]:
+        """Return the parts of the loop, in the order of their steps.
+
+        The controller's reference is that of the time when its commands take effect.
+
+        Args:
+            law: the control law; None for the tracking controller.
+            settings: of the controller.
+            model: of the nominal vehicles, that the controller has.
+        """
+        late = self.delay / self.reference.rate
+        source = None
+        if self.period > 1 or self.delay > 0:
+            source = replace(self.reference, every=self.period, delay=late).chunk
+        parameters = ControllerParameters(model, late if self.delay else ())
+        takes_effect = partial(due_ticks, self.period, delay=self.delay)
+        waiting = (LoopPart(ComputationDelay(), (), takes_effect),) if self.delay else ()
+        return (
+            *self.disturbances,
+            *self.observers,
+            LoopPart(controller_component(law, settings), parameters, source, self.period),
+            *waiting,
+            *inner_loop(law, model),
+            plant_part(self.fleet, self.reference.environment, self.reference.rate, self.effectiveness),
+        )
 
 
 @dataclass(frozen=True, eq=False)
