@@ -17,6 +17,7 @@ from aerobat.planning.result import FLYING_RESERVE
 from aerobat.problem import GatePassage, Limits, Line, load_problem, tilted_gate
 from aerobat.studies.feasibility import min_requirements
 from aerobat.vehicle import Vehicle, load_vehicle
+from places import CASES
 
 QUAD = load_vehicle("agile-quad")
 LINE = replace(load_problem("line"), gates=(tilted_gate((5.0, 0.0, 0.0)),))
@@ -113,6 +114,17 @@ def test_what_rotors_just_can_is_planned_by_whichever_planner_finds_it(ratio: fl
     assert found.certified
     assert found.flies
     assert "; planned " in found.rescue
+
+
+@pytest.mark.slow
+def test_a_flip_through_a_low_gate_is_planned_with_the_reserve() -> None:
+    """It was refused, though it is planned at once where the gate is passed at 2 m/s."""
+    hexa = load_vehicle(str(CASES / "slow-hexa.toml"))
+    found = plan(load_problem(str(CASES / "slow-flip.toml")), None, hexa)
+    assert found.keeps(FLYING_RESERVE)
+    assert found.flies
+    assert found.duration < 1.8  # the best known without a reserve takes 1.65 s
+    assert found.rescue.endswith("planned faster through its gates")
 
 
 @pytest.mark.slow

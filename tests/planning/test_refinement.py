@@ -17,12 +17,15 @@ from aerobat.planning.recorder import Recorder
 from aerobat.planning.refinement.limit_values import LimitValues
 from aerobat.planning.refinement.program import Multipliers, RefinementProgram
 from aerobat.planning.refinement.refine import (
+    MIN_GAP,
+    MIN_SPACING,
     REPAIRABLE_MISS,
     Refinement,
+    _between,
     knots_at_stages,
     with_exact_stages,
 )
-from aerobat.planning.refinement.spline import Spline, basis
+from aerobat.planning.refinement.spline import Spline, basis, chebyshev
 from aerobat.planning.refinement.stage_values import StageValues
 from aerobat.planning.task import Task
 from aerobat.planning.warm_start import WarmStart
@@ -100,6 +103,16 @@ def test_slopes_and_second_derivatives_are_differences(problem: Problem, lag: fl
     squared = dense(here.curvature(0.0 * weights, 0.0 * others, weights)) @ step
     expected = here.rows.transposed(weights * here.rows.times(step))
     np.testing.assert_allclose(squared, expected, rtol=1e-8, atol=1e-10 * np.abs(expected).max())
+
+
+@given(st.floats(0.0, 1.0), st.integers(1, 60))
+def test_places_added_at_one_peak_stay_apart(peak: float, count: int) -> None:
+    """Twenty places in one gap, each in a quarter of what the last one left, were 1e-14 s apart."""
+    places = chebyshev(16)
+    for _ in range(count):
+        added = _between(places, peak)
+        assert np.abs(places - added).min() >= MIN_SPACING * MIN_GAP
+        places = np.sort(np.append(places, added))
 
 
 @given(seed=st.integers(0, 2**32 - 1))

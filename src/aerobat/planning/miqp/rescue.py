@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from math import inf
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from aerobat.errors import Infeasible, SpecError
 from aerobat.optimization.deadline import out_of_time, within_share, within_time, work
@@ -48,6 +48,14 @@ TIME_OPTIMAL = "time-optimal"  # the planner that starts from the most paths
 FEW_STARTS = 2  # starts of time-optimal: more starts give faster plans, but seldom the first plan
 
 
+class Fallback(NamedTuple):
+    """A planner in place of the requested one, and words on how it plans."""
+
+    planner: Planner
+    how: str
+    stricter: Problem | None = None  # planned in place of the problem, by which the plan is judged
+
+
 @dataclass
 class Rescue:
     """The search for a plan by fallbacks, after a requested planner found none or a poor one."""
@@ -58,23 +66,24 @@ class Rescue:
     recorder: Recorder  # of the requested planner; attempts of fallbacks are passed on to its `progress`
     failed: list[str] = field(default_factory=list)  # fallbacks that found no plan
     unanswered: list[str] = field(default_factory=list)  # fallbacks that the work limit ended
-    # a fallback that failed, but found a path that is nearly feasible, and words on how it plans
-    promising: tuple[Planner, str] | None = None
+    # a fallback that failed, but found a path that is nearly feasible
+    promising: Fallback | None = None
 
     def plan(self) -> Plan | None:
         """Return the first certified plan of the fallbacks, or None; its `rescue` names the fallback."""
         with within_time(RESCUE_WORK, work):
             found = self._first(self._fallbacks(), self._none_found)
         if found is None and self.promising is not None:
+            promising = chain(self._faster_through_gates(), [self.promising])
             with within_time(PROMISING_WORK, work):
-                return self._first(iter([self.promising]), self._none_found)
+                return self._first(promising, self._none_found)
         if found is None or found.keeps(self.requested.reserve):
             return found
         with within_time(SHORTENING_WORK, work):
             reserve = KEPT_PART * self.requested.reserve
             half = [
-                (replace(self.requested, reserve=reserve, rescue=False), HALF_RESERVE),
-                (planner_with_reserve(FREE_KNOTS, reserve), f"by {FREE_KNOTS} {HALF_RESERVE}"),
+                Fallback(replace(self.requested, reserve=reserve, rescue=False), HALF_RESERVE),
+                Fallback(planner_with_reserve(FREE_KNOTS, reserve), f"by {FREE_KNOTS} {HALF_RESERVE}"),
             ]
             longest = LONGER_FOR_RESERVE * _priced(found)
             return self._first(iter(half), self._none_found, longest) or found
@@ -102,18 +111,16 @@ class Rescue:
         more = self._with_more_intervals()
         said = f"the path of miqp with {self._intervals} intervals {fault}"
         longest = _priced(plan) if plan.certified else inf
-        fallbacks = chain([(others, f"by {FREE_KNOTS}")], more)
+        fallbacks = chain([Fallback(others, f"by {FREE_KNOTS}")], more)
         with within_time(SHORTENING_WORK, work):
-            faster = None if plan.certified else self._faster_through_gates(said)
+            faster = None if plan.certified else self._first(self._faster_through_gates(), said)
             return faster or self._much_shorter(fallbacks, said, longest) or plan
 
-    def _much_shorter(
-        self, fallbacks: Iterator[tuple[Planner, str]], failed: str, known: float
-    ) -> Plan | None:
+    def _much_shorter(self, fallbacks: Iterator[Fallback], failed: str, known: float) -> Plan | None:
         """Return the first plan much shorter than a known one, or the shortest if none is; None if none is.
 
         Args:
-            fallbacks: Planners, each with words on how it plans.
+            fallbacks: The planners to try.
             failed: Why fallbacks are tried.
             known: The priced duration of the known plan [s]; infinite for a plan that is not certified.
         """
@@ -160,32 +167,26 @@ class Rescue:
             said.append(f"{allowed:g} s of work were too few to plan {', '.join(unanswered)}")
         return ", ".join(said)
 
-    def _first(
-        self,
-        fallbacks: Iterator[tuple[Planner, str]],
-        failed: str,
-        shorter_than: float = inf,
-        stricter: Problem | None = None,
-    ) -> Plan | None:
+    def _first(self, fallbacks: Iterator[Fallback], failed: str, shorter_than: float = inf) -> Plan | None:
         """Return the first certified plan of several planners that is short enough, or None.
 
         Args:
-            fallbacks: Planners, each with words on how it plans.
+            fallbacks: The planners to try.
             failed: Why fallbacks are tried, which the plan's `rescue` repeats.
             shorter_than: Upper bound of the plan's priced duration (`priced_duration`) [s].
-            stricter: A problem that is planned in place of the own one, by which the plan is judged.
         """
-        for planner, how in fallbacks:
+        for each in fallbacks:
             with within_share(FALLBACK_FRACTION):
-                plan = self._planned(planner, how, stricter)
-            kept = min(self.requested.reserve, getattr(planner, "reserve", self.requested.reserve))
+                plan = self._planned(each)
+            kept = min(self.requested.reserve, getattr(each.planner, "reserve", self.requested.reserve))
             if plan is not None and plan.keeps(kept) and _priced(plan) < shorter_than:
                 attempts = (*self.recorder.attempts, *plan.attempts)
-                return replace(plan, attempts=attempts, rescue=f"{failed}; planned {how}")
+                return replace(plan, attempts=attempts, rescue=f"{failed}; planned {each.how}")
         return None
 
-    def _planned(self, planner: Planner, how: str, stricter: Problem | None = None) -> Plan | None:
+    def _planned(self, fallback: Fallback) -> Plan | None:
         """Return the plan of one fallback; None where there is none, which is noted in this object."""
+        planner, how, stricter = fallback
         if out_of_time():
             self.unanswered.append(how)
             return None
@@ -198,38 +199,38 @@ class Rescue:
                 if isinstance(planner, planner_class(TIME_OPTIMAL)):
                     self.promising = self._time_optimal_from_all()
                 elif out_of_time() and self.promising is None:
-                    self.promising = planner, how
+                    self.promising = fallback
         except SpecError:
             pass  # the planner does not take such problems
         return None
 
-    def _fallbacks(self) -> Iterator[tuple[Planner, str]]:
-        """Yield planners, each with words on how it plans, the most promising first.
+    def _fallbacks(self) -> Iterator[Fallback]:
+        """Yield fallbacks, the most promising first.
 
         Where programs have solutions that the vehicle cannot fly, time-optimal comes first. Where programs
         have no solution, more intervals come first.
         """
         if self.requested.reserve == FLYING_RESERVE:  # the default, which is given up where no plan keeps it
-            yield replace(self.requested, reserve=0.0, rescue=False), "without a reserve"
+            yield Fallback(replace(self.requested, reserve=0.0, rescue=False), "without a reserve")
         more = self._with_more_intervals()
         if any(attempt.cost is not None for attempt in self.recorder.attempts):
             yield self._time_optimal_from_all(starts=FEW_STARTS)
             yield from more
         else:
             yield from more
-            yield self._time_optimal(None, starts=FEW_STARTS), f"by {TIME_OPTIMAL}"
+            yield Fallback(self._time_optimal(None, starts=FEW_STARTS), f"by {TIME_OPTIMAL}")
         if self.problem.maneuver.through_points:
-            yield planner_with_reserve("min-snap", self.requested.reserve), "by min-snap"
-        yield planner_with_reserve(FREE_KNOTS, self.requested.reserve), f"by {FREE_KNOTS}"
+            yield Fallback(planner_with_reserve("min-snap", self.requested.reserve), "by min-snap")
+        yield Fallback(planner_with_reserve(FREE_KNOTS, self.requested.reserve), f"by {FREE_KNOTS}")
 
-    def _with_more_intervals(self) -> Iterator[tuple[Planner, str]]:
-        """Yield the requested planner with more intervals, and words on how it plans."""
+    def _with_more_intervals(self) -> Iterator[Fallback]:
+        """Yield the requested planner with more intervals."""
         for planner in self.requested.with_more_intervals(self.problem, self.vehicle):
-            yield planner, f"with {planner.intervals} intervals"
+            yield Fallback(planner, f"with {planner.intervals} intervals")
 
-    def _time_optimal_from_all(self, **settings: int) -> tuple[Planner, str]:
-        """Return time-optimal, started from the path without a vehicle too, and words on how it plans."""
-        return self._time_optimal(self._path_without_rotors(), **settings), f"by {TIME_OPTIMAL}"
+    def _time_optimal_from_all(self, **settings: int) -> Fallback:
+        """Return time-optimal, started from the path without a vehicle too."""
+        return Fallback(self._time_optimal(self._path_without_rotors(), **settings), f"by {TIME_OPTIMAL}")
 
     def _time_optimal(self, start: Plan | None, **settings: int) -> Planner:
         """Return time-optimal with the requested reserve, zero included: a refusal comes soonest so."""
@@ -244,18 +245,17 @@ class Rescue:
         except Infeasible:
             return None
 
-    def _faster_through_gates(self, failed: str) -> Plan | None:
-        """Return the certified plan that passes gates FASTER times as fast as asked at least, or None.
+    def _faster_through_gates(self) -> Iterator[Fallback]:
+        """Yield the requested planner, asked to pass gates FASTER times as fast as the problem asks.
 
         A body that turns leaves a low gate's frame sooner so.
         """
         maneuver: Any = self.problem.maneuver
-        if not (self.problem.gates and hasattr(maneuver, "passage")):
-            return None
-        speed = FASTER * max(maneuver.passage.speed, MIN_CROSSING_SPEED)
-        stricter = replace(maneuver, passage=replace(maneuver.passage, speed=speed))
-        fallbacks = iter([(replace(self.requested, rescue=False), "faster through its gates")])
-        return self._first(fallbacks, failed, stricter=replace(self.problem, maneuver=stricter))
+        if self.problem.gates and hasattr(maneuver, "passage"):
+            speed = FASTER * max(maneuver.passage.speed, MIN_CROSSING_SPEED)
+            stricter = replace(maneuver, passage=replace(maneuver.passage, speed=speed))
+            planner = replace(self.requested, rescue=False)
+            yield Fallback(planner, "faster through its gates", replace(self.problem, maneuver=stricter))
 
 
 def _priced(plan: Plan) -> float:

@@ -94,6 +94,8 @@ PEAK_VIOLATION = 1e-3
 MAX_ADDED_PLACES = 8
 # least distance of an added place from its neighbours, as a fraction of the gap between them
 MIN_SPACING = 0.25
+# smallest gap between places that is divided, as a fraction of a segment: what fits closer ones overflows
+MIN_GAP = 1e-6
 REDUCED_BACKOFF = 0.1  # factor on the tightening in rounds that add places
 MIN_PROGRESS = 0.02  # relative change of duration and of violation below which rounds have stalled
 BACKOFF_FACTOR = 1.3  # factor on violations that gives the tightening of fine rounds
@@ -542,10 +544,12 @@ def _refuted(certificate: Certificate, reserve: float) -> tuple[float, list[floa
 
 
 def _between(places: Array, peak: float) -> float:
-    """Return the fraction nearest to a peak that keeps its distance from sorted places."""
-    after = int(np.searchsorted(places[1:-1], peak, side="right")) + 1
-    before, gap = places[after - 1], places[after] - places[after - 1]
-    return float(np.clip(peak, before + MIN_SPACING * gap, before + (1.0 - MIN_SPACING) * gap))
+    """Return a fraction near a peak, within the nearest gap of sorted places that is not too narrow."""
+    gaps = np.diff(places)
+    away = np.maximum(places[:-1] - peak, peak - places[1:]).clip(0.0) + np.where(gaps < MIN_GAP, 1.0, 0.0)
+    gap = int(np.flatnonzero(away == away.min())[-1])
+    kept = MIN_SPACING * gaps[gap]
+    return float(np.clip(peak, places[gap] + kept, places[gap + 1] - kept))
 
 
 def _with_times(peaks: Array, trajectory: Trajectory, times: Sequence[float]) -> Array:
