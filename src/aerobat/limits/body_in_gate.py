@@ -1,17 +1,19 @@
 """Clearance of the body from a gate's frame, from before the gate's plane until behind it.
 
-A stage constrains the centre of mass at one instant. The body needs some time to pass the plane, and clears
-the opening if its motion changes little meanwhile. Let v_n be the velocity along the normal, and v_a the
-velocity outward across a side of the opening. The length d is the body's reach plus a margin, before and
-behind the plane. s is the body's extent in the outward direction in its attitude, and r the distance to that
-side from the crossing point. With an acceleration of at most a across a straight line, |path − straight line|
-≤ ½ a (d/v_n)². The body is clear where
+A stage constrains the motion at one instant. The body needs some time to pass the plane, and clears the
+opening if its motion changes little meanwhile. Let v_n be the velocity along the normal, and v_a the velocity
+outward across a side of the opening. The length d is the body's reach plus a margin, before and behind the
+plane. s is the body's extent in the outward direction, and r the distance to that side from the crossing
+point. With an acceleration of at most a across a straight line, |path − straight line| ≤ ½ a (d/v_n)². The
+body is clear where
 
     (r − s) v_n ± d v_a ≥ ½ a d²/v_n    on all sides    and    v_n ≥ √(2 a d).
 
 The second condition keeps the body from turning back. The body is an ellipsoid with its semi-axes on the
 diagonal of D and the attitude R, so s = |D Rᵀ e| along e. Where only the thrust axis is known, the body is
-the ellipsoid of revolution about that axis that contains the vehicle at every angle about it.
+the ellipsoid of revolution about that axis that contains the vehicle at every angle about it. A body that
+turns reaches farther before and behind the plane than in it: s is its extent a fraction of d away from the
+plane, with the thrust f ± f' t, where f' follows from the path's jerk and t is the time from the plane.
 
 The values are written in components once, for all kinds of numbers: floats, complex steps, symbols.
 """
@@ -19,7 +21,7 @@ The values are written in components once, for all kinds of numbers: floats, com
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 from typing import NamedTuple, TypeAlias
 
@@ -35,6 +37,11 @@ from aerobat.vehicle import Ellipsoid
 MIN_NORMAL_SPEED = 0.5
 FRAME_CLEARANCE = 0.01  # [m] smallest distance of the body from the frame
 
+# Fraction of the reach, away from the plane, at which a turning body must be clear. With 0, x500's half-flip
+# through a gate tilted by 20° needs a detour, 4.9 s in place of 3.44. Plans of 300 random problems last
+# 1.0146 times the best known on average, with 0 1.0148; with extents in the plane too, one lasts 12 % longer.
+TURNING = 0.5
+
 # [m] extent of a body from its centre of mass in an outward direction
 Extent: TypeAlias = Callable[[Vector], Scalar]
 
@@ -48,38 +55,44 @@ class OpeningAhead(NamedTuple):
     distances: tuple[Scalar, ...]  # [m] of the sides from the place
     reach: Scalar  # [m] distance before and behind the plane over which the body must be clear
     lateral_acceleration: Scalar  # [m/s²] largest acceleration across a straight line
+    turning: Scalar  # fraction of the reach at which a turning body must be clear
 
     @classmethod
     def of_parameters(cls, parameters: Sequence[Scalar]) -> OpeningAhead:
-        """Return the opening given by 8 + 4 K numbers in the order of the fields."""
+        """Return the opening given by 9 + 4 K numbers in the order of the fields."""
         vectors = [(parameters[k], parameters[k + 1], parameters[k + 2]) for k in range(0, 6, 3)]
-        sides = (len(parameters) - 8) // 4
+        sides = (len(parameters) - 9) // 4
         outward = tuple(
             (parameters[k], parameters[k + 1], parameters[k + 2]) for k in range(6, 6 + 3 * sides, 3)
         )
         distances = tuple(parameters[6 + 3 * sides + k] for k in range(sides))
-        return cls(vectors[0], vectors[1], outward, distances, parameters[-2], parameters[-1])
+        return cls(vectors[0], vectors[1], outward, distances, *parameters[-3:])
 
-    def clearances(self, ops: Ops, position: Vector, velocity: Vector, extent: Extent) -> Iterator[Scalar]:
+    def time_of_turning(self, ops: Ops, velocity: Vector) -> Scalar:
+        """Return the time [s] from the plane to where the extents of a turning body are those that count."""
+        return self.turning * self.reach / ops.maximum(dot(self.normal, velocity), MIN_NORMAL_SPEED)
+
+    def clearances(
+        self, ops: Ops, position: Vector, velocity: Vector, extents: tuple[Extent, Extent]
+    ) -> Iterator[Scalar]:
         """Yield 2 K + 1 values that are nonnegative where the body is clear of the frame.
 
-        The values are the clearance [m²/s] on each side, before and behind the plane, and the excess speed
+        The values are the clearance [m²/s] on each side, behind the plane and before it, and the excess speed
         [m/s].
 
         Args:
             ops: The arithmetic of the arguments.
             position: Position of the centre of mass as it crosses the plane [m].
             velocity: Velocity of the centre of mass there [m/s].
-            extent: Extent of the body in its attitude there.
+            extents: Extents of the body in its attitudes behind the plane and before it.
         """
         through, offset = dot(self.normal, velocity), subtract(position, self.place)
         deviation = self.lateral_acceleration * self.reach * self.reach / 2.0
         deviation = deviation / ops.maximum(through, MIN_NORMAL_SPEED)
         for outward, distance in zip(self.outward, self.distances, strict=True):
-            clearance = (distance - extent(outward) - dot(outward, offset)) * through - deviation
-            across = self.reach * dot(outward, velocity)
-            yield clearance - across
-            yield clearance + across
+            left, across = distance - dot(outward, offset), self.reach * dot(outward, velocity)
+            for moved, extent in zip((across, -across), extents, strict=True):
+                yield (left - extent(outward)) * through - deviation - moved
         yield through - ops.sqrt(2.0 * self.lateral_acceleration * self.reach)
 
 
@@ -91,19 +104,26 @@ class BodyInGate:
     stage: int
     reach: float  # [m] distance before and behind the plane over which the body must be clear
     lateral_acceleration: float  # [m/s²] largest acceleration across a straight line
+    turning: float = TURNING  # fraction of the reach at which a turning body must be clear
 
     @property
     def min_speed(self) -> float:
         """The smallest speed through the gate [m/s] at which the path cannot turn back."""
         return sqrt(2.0 * self.lateral_acceleration * self.reach)
 
+    def halfway_from(self, other: BodyInGate) -> BodyInGate:
+        """Return the clearance halfway between that of another body in the gate and this one."""
+        acceleration = 0.5 * (self.lateral_acceleration + other.lateral_acceleration)
+        turning = 0.5 * (self.turning + other.turning)
+        return replace(self, lateral_acceleration=acceleration, turning=turning)
+
     @property
     def parameters(self) -> Array:
-        """The numbers of its `OpeningAhead`, (8 + 4 K,)."""
+        """The numbers of its `OpeningAhead`, (9 + 4 K,)."""
         normals, distances = self.gate.opening.sides
         outward = normals @ self.gate.plane_axes
         place = np.concatenate([self.gate.position, self.gate.normal])
-        ahead = [self.reach, self.lateral_acceleration]
+        ahead = [self.reach, self.lateral_acceleration, self.turning]
         return np.concatenate([place, outward.ravel(), distances - FRAME_CLEARANCE, ahead])
 
 

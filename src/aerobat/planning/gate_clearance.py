@@ -34,6 +34,7 @@ BENDING = 0.4
 BENDING_IN_MANEUVER = 0.25  # the same beside a stage without position, such as a flip's
 MORE_BENDING = 1.6  # factor on that acceleration where the body is not clear of the frame
 A_LITTLE_MORE = 1.2  # the same where the body overlaps the frame by FRAME_CLEARANCE at most
+MORE_TURNING = 1.5  # factor on the fraction of the reach at which a turning body must be clear
 
 
 def bodies_in_gates(task: Task) -> tuple[BodyInGate, ...]:
@@ -65,10 +66,11 @@ def more_direct(
             continue
         if last is None:
             found[k] = _body_in_gate(k, stages, task, BENDING_IN_MANEUVER)
-        else:
-            touches = frame.value >= -FRAME_CLEARANCE
-            factor = A_LITTLE_MORE if touches else MORE_BENDING
-            found[k] = replace(last, lateral_acceleration=factor * last.lateral_acceleration)
+            continue
+        touches = frame.value >= -FRAME_CLEARANCE
+        acceleration = (A_LITTLE_MORE if touches else MORE_BENDING) * last.lateral_acceleration
+        turning = min(MORE_TURNING * last.turning, 1.0)
+        found[k] = replace(last, lateral_acceleration=acceleration, turning=turning)
     return tuple(body for body in found.values() if body is not None)
 
 

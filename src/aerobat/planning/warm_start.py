@@ -47,9 +47,9 @@ class WarmStart:
 
     @property
     def at_stages(self) -> Array:
-        """Position, velocity and acceleration at the stages, (stages, 3, 3)."""
-        found = [[self.trajectory.evaluate(time, k) for k in range(3)] for time in self.times]
-        return np.reshape(found, (-1, 3, 3))
+        """Position, velocity, acceleration and jerk at the stages, (stages, 4, 3)."""
+        found = [[self.trajectory.evaluate(time, k) for k in range(4)] for time in self.times]
+        return np.reshape(found, (-1, 4, 3))
 
     def leg_at(self, time: float) -> str:
         """Return words on the stages between which a time [s] lies; empty with fewer than two stages."""

@@ -111,7 +111,7 @@ def controller_model(
 
 @dataclass(frozen=True, eq=False)
 class Realization:
-    """What really flies, of which the controller knows a model: as given, or as drawn from conditions."""
+    """Vehicles that really fly, of which the controller knows a model: as given, or drawn from conditions."""
 
     reference: ReferenceSource
     fleet: Fleet  # the vehicles that really fly

@@ -93,9 +93,8 @@ class FlownPath:
 
 
 def _halfway(before: Sequence[BodyInGate], in_gates: Sequence[BodyInGate]) -> tuple[BodyInGate, ...]:
-    """Return the gates with the mean of both lateral accelerations; a gate unknown before counts as zero."""
-    known = {body.stage: body.lateral_acceleration for body in before}
+    """Return the gates with the mean of both rooms; in a gate unknown before, no acceleration had room."""
+    known = {body.stage: body for body in before}
     return tuple(
-        replace(body, lateral_acceleration=0.5 * (body.lateral_acceleration + known.get(body.stage, 0.0)))
-        for body in in_gates
+        body.halfway_from(known.get(body.stage, replace(body, lateral_acceleration=0.0))) for body in in_gates
     )

@@ -17,7 +17,7 @@ from aerobat.optimization.bordered_band import BorderedBand
 from aerobat.planning.refinement.closure import FRACTIONS, Closure
 from aerobat.planning.refinement.limit_values import Frames, LimitSlopes, LimitValues
 from aerobat.planning.refinement.spline import KnotData, Motion, Spline, basis
-from aerobat.planning.refinement.stage_values import STAGE_DERIVATIVES, STATE, StageValues
+from aerobat.planning.refinement.stage_values import MOTION, STATE, StageValues
 
 AT_END = basis(np.array([1.0]))  # the basis at a segment's end, (1, 6, 10)
 CLOSURE_PLACES = basis(FRACTIONS)  # (p, 6, 10)
@@ -263,7 +263,7 @@ class RefinedPoint:
         blocks = self._ends.curvature(weights)
         second = stages.second_derivatives(self._at_stages, inequality_weights)
         for segment, each in zip(segments, second, strict=True):
-            jacobian = self._ends.jacobian[segment, 0, :STAGE_DERIVATIVES].reshape(STATE, -1)
+            jacobian = self._ends.jacobian[segment, 0, :MOTION].reshape(STATE, -1)
             blocks[segment] += jacobian.T @ each @ jacobian
         return blocks
 

@@ -393,7 +393,7 @@ class Refinement:
         for stage, time, flat in zip(path.stages, path.times, path.at_stages, strict=True):
             where = (f"stage '{stage.name}'",)
             for condition in stage.conditions:
-                excess = float(condition.bound(self.task.balance).excess(flat))
+                excess = float(condition.bound(self.task.balance).excess(flat[:3]))
                 if excess > tolerance * limit_of(condition, self.task.balance).size:
                     quantity = condition.quantity
                     missed = f"{excess:.2g} {UNITS[quantity.derivative]} of {quantity.replace('_', ' ')}"

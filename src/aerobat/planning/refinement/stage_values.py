@@ -21,8 +21,8 @@ from aerobat.planning.task import Task
 from aerobat.problem.ball import Ball
 from aerobat.problem.stage import Stage
 
-STAGE_DERIVATIVES = 3  # number of derivatives that stages constrain: position, velocity, acceleration
-STATE = 3 * STAGE_DERIVATIVES  # number of their components
+MOTION = 4  # number of derivatives that constraints at stages depend on: position to jerk
+STATE = 3 * MOTION  # number of their components
 DIRECTIONS = np.eye(STATE)
 BALL_FRACTION = 1.0 - 1e-5  # fraction of a ball's squared radius that is used; the rest allows for rounding
 
@@ -54,7 +54,7 @@ class StageValues:
         """Return the largest value of the inequalities of room in gates; zero without gates.
 
         Args:
-            derivatives: Position, velocity and acceleration at the stages, or more, (stages, 3 or more, 3).
+            derivatives: Position to jerk at the stages, or more, (stages, MOTION or more, 3).
         """
         return max((float(values.max()) for values in self._in_rooms(derivatives)), default=0.0)
 
@@ -77,7 +77,7 @@ class StageValues:
             for value in room.scale[:, None] * found:
                 stages.append(room.stage)
                 slopes.append(np.zeros((6, 3)))
-                slopes[-1][:STAGE_DERIVATIVES] = value.reshape(STAGE_DERIVATIVES, 3)
+                slopes[-1][:MOTION] = value.reshape(MOTION, 3)
         return np.array(stages, dtype=np.intp), np.array(slopes).reshape(-1, 6, 3)
 
     def equality_slopes(self) -> tuple[Indices, Array]:
@@ -85,10 +85,7 @@ class StageValues:
         return self._equal.at, self._equal.weights
 
     def second_derivatives(self, derivatives: Array, weights: Array) -> Array:
-        """Return the Hessian of the weighted inequalities, (stages, 9, 9).
-
-        The variables are position, velocity and acceleration at each stage.
-        """
+        """Return the Hessian of the weighted inequalities by position to jerk, (stages, STATE, STATE)."""
         found = np.zeros((len(self.stages), STATE, STATE))
         first = len(self._unequal.bounds)
         for stage, _, radius in self._in_balls(derivatives):
@@ -174,7 +171,7 @@ class _Room(NamedTuple):
 
     def inputs(self, derivatives: Array, *more: Array) -> tuple[Array, Array]:
         """Return the functions' inputs: the shared parameters; the state at the stage, then `more`."""
-        state = derivatives[self.stage, :STAGE_DERIVATIVES].ravel()
+        state = derivatives[self.stage, :MOTION].ravel()
         return self.shared, np.concatenate([state, *more])[None]
 
 
@@ -185,12 +182,18 @@ def room_functions(sides: int) -> SmoothFunctions:
     def kernel(
         ops: Ops, shared: Sequence[Scalar], state: Sequence[Scalar], _: Sequence[Scalar]
     ) -> Sequence[Scalar]:
-        (position, velocity, acceleration), (constant,) = triples(state), triples(shared[5:8])
+        (position, velocity, acceleration, jerk), (constant,) = triples(state), triples(shared[5:8])
+        opening = OpeningAhead.of_parameters(shared[8:])
         thrust = add(add_scaled(acceleration, shared[4], velocity), constant)
-        extent = extent_of_thrust(ops, shared[:4], thrust)
-        return [*OpeningAhead.of_parameters(shared[8:]).clearances(ops, position, velocity, extent)]
+        thrust_change = add_scaled(jerk, shared[4], acceleration)
+        time = opening.time_of_turning(ops, velocity)
+        behind, before = (
+            extent_of_thrust(ops, shared[:4], add_scaled(thrust, sign * time, thrust_change))
+            for sign in (1.0, -1.0)
+        )
+        return [*opening.clearances(ops, position, velocity, (behind, before))]
 
-    return smooth_functions(kernel, 16 + 4 * sides, STATE)
+    return smooth_functions(kernel, 17 + 4 * sides, STATE)
 
 
 def _sides(limit: Limit, is_equality: bool) -> Iterator[tuple[Array, float]]:
