@@ -1,4 +1,8 @@
-"""The layout of pages, drawn by matplotlib without pyplot."""
+"""The layout of pages, drawn by matplotlib without pyplot.
+
+Pages of timelines leave sizes to matplotlib (`column`). Pages with pictures fix them in inches, as vehicles
+and names are placed in a picture by its size on the page.
+"""
 
 from __future__ import annotations
 
