@@ -15,20 +15,7 @@ from aerobat.planning import Plan
 from aerobat.planning.passages import as_passed
 from aerobat.problem.gate import Gate
 from aerobat.reporting.facts import Fact, Facts, facts, line, picture
-from aerobat.reporting.page import (
-    AXIS,
-    COLUMNS,
-    MARGIN,
-    PAGE_WIDTH,
-    TITLES,
-    blank_page,
-    heading,
-    house_style,
-    panel,
-    set_scale,
-    size_of,
-    write,
-)
+from aerobat.reporting.page import AXIS, HEADING, Row, heading, house_style, page_of_rows, set_scale, size_of
 from aerobat.reporting.panels.keyframes import plane_of
 from aerobat.reporting.panels.path import mark_ends
 from aerobat.reporting.panels.poses import is_flat, plan_reference
@@ -50,7 +37,7 @@ if TYPE_CHECKING:
 
 DRAWN = ("duration_s", "ratio", "certified", "min_margin_n", "max_position_error_m")  # beside a timeline
 COLOURS = (INK, YELLOW, SKY, BLUE, MUTED)  # of planners, in their order
-PLACES = (6.6, 7.5, 8.25, 9.2, 10.2)  # [in] where a row's facts begin
+THRUSTS, REASON = 0.85, 0.4  # [in] height of a planner's timeline, and of the reason why there is no plan
 
 
 @facts.register
@@ -94,13 +81,13 @@ def comparison_figure(comparison: Comparison) -> Figure:
     colours = [COLOURS[k % len(COLOURS)] for k in range(len(entries))]
     plans = [entry.plan for entry in entries if entry.plan]
     paths = [plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 200)) for plan in plans]
-    rows = AXIS + sum(map(_pitch, entries))
     height = 3.2 if is_flat(np.concatenate(paths)) else 4.8  # [in] of the paths
+    last = [entry for entry in entries if entry.plan][-1]
+    rows = [Row(height, (1.0,)), *(_row_of(entry, is_last=entry is last) for entry in entries)]
     with house_style():
         title = f"{comparison.problem.name} · planners for {comparison.vehicle.name}"
         fact = f"{len(plans)} of {len(entries)} planners found a plan"
-        figure = blank_page(rows + AXIS + MARGIN + height + TITLES, title, [fact])
-        axes = panel(figure, COLUMNS[0], rows + AXIS + MARGIN, PAGE_WIDTH - COLUMNS[0] - MARGIN, height)
+        figure, ((axes,), *below) = page_of_rows(rows, title, [fact])
         problem = comparison.problem
         gates = dict.fromkeys(gate for plan in plans for gate in as_passed(problem.gates, plan.stages))
         camera = _draw_scene(axes, paths, tuple(gates), problem.surroundings.pieces.pieces)
@@ -109,7 +96,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
             axes.plot(*camera.project(path).T, color=colour, linewidth=1.7, label=name)
         mark_ends(axes, camera.project(paths[0][[0, -1]]))
         heading(axes, "Paths")
-        _draw_rows(figure, comparison, colours, rows)
+        _draw_rows(below, comparison, colours)
     return figure
 
 
@@ -137,26 +124,24 @@ def _drawn(comparison: Comparison, entry: Entry) -> list[Fact]:
     return [fact for fact in _row(comparison, entry) if fact.key in DRAWN]
 
 
-def _pitch(entry: Entry) -> float:
-    """Return the height of a planner's row with its name [in]; less where there is no plan."""
-    return 0.75 if entry.plan is None else 1.3
+def _row_of(entry: Entry, is_last: bool) -> Row:
+    """Return the row of a planner's result: timeline, the last with its axis, and facts; or a reason."""
+    if entry.plan is None:
+        return Row(REASON, (1.0,), above=HEADING, below=0.2)
+    return Row(THRUSTS, (6.3, 5.2), above=HEADING, below=AXIS if is_last else 0.1)
 
 
-def _draw_rows(figure: Figure, comparison: Comparison, colours: Sequence[str], top: float) -> None:
-    """Draw a row for each planner, from `top` [in] downward: timeline and facts, or why it has no plan."""
+def _draw_rows(rows: Sequence[Sequence[Axes]], comparison: Comparison, colours: Sequence[str]) -> None:
+    """Draw a row for each planner: timeline and facts, or why it has no plan."""
     timelines: list[Axes] = []
-    for x, fact in zip(PLACES, _drawn(comparison, comparison.entries[0]), strict=True):
-        write(figure, x, top, fact.label, size=SMALL, color=MUTED)
-    for entry, colour in zip(comparison.entries, colours, strict=True):
-        top -= _pitch(entry)
-        if entry.plan is None:
-            write(figure, COLUMNS[0], top + 0.4, _name(entry), size=SMALL, color=MUTED)
-            write(figure, COLUMNS[0], top + 0.3, fill(entry.outcome, 150), size=NORMAL, va="top")
-            continue
-        axes = panel(figure, COLUMNS[0], top, 5.5, 0.85)
-        _draw_thrusts(axes, entry.plan, comparison.vehicle, colour)
+    for (axes, *beside), entry, colour in zip(rows, comparison.entries, colours, strict=True):
         heading(axes, "", _name(entry))
-        _write_facts(figure, comparison, entry, top)
+        if entry.plan is None:
+            axes.set_axis_off()
+            axes.text(0.0, 1.0, fill(entry.outcome, 150), size=NORMAL, va="top")
+            continue
+        _draw_thrusts(axes, entry.plan, comparison.vehicle, colour)
+        _write_facts(beside[0], comparison, entry)
         timelines.append(axes)
     _share_scales(timelines)
 
@@ -181,14 +166,17 @@ def _share_scales(timelines: Sequence[Axes]) -> None:
     timelines[-1].set_xlabel("time [s]")
 
 
-def _write_facts(figure: Figure, comparison: Comparison, entry: Entry, bottom: float) -> None:
+def _write_facts(axes: Axes, comparison: Comparison, entry: Entry) -> None:
     """Write the facts of a plan beside its timeline, and below them a note on planning and flight."""
-    for x, fact in zip(PLACES, _drawn(comparison, entry), strict=True):
+    axes.set_axis_off()
+    drawn = _drawn(comparison, entry)
+    for k, fact in enumerate(drawn):
         wrong = fact.key == "certified" and not entry.certified
-        write(figure, x, bottom + 0.6, fact.words, size=TITLE, color=RED if wrong else INK)
+        axes.text(k / len(drawn), 1.0, fact.label, size=SMALL, color=MUTED, va="top")
+        axes.text(k / len(drawn), 0.8, fact.words, size=TITLE, color=RED if wrong else INK, va="top")
     notes = (f"planned in {entry.planning_time:.2f} s", entry.note, entry.outcome)
     note = fill("; ".join(filter(None, notes)), 72)
-    write(figure, PLACES[0], bottom + 0.42, note, size=SMALL, color=MUTED, va="top")
+    axes.text(0.0, 0.5, note, size=SMALL, color=MUTED, va="top")
 
 
 def _draw_scene(

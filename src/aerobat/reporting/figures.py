@@ -10,7 +10,7 @@ from aerobat.evaluation.score import Score
 from aerobat.evaluation.subject import Subject, subject_of
 from aerobat.planning import Plan
 from aerobat.reporting.captions import error_caption, plan_captions, score_caption
-from aerobat.reporting.page import AXIS, COLUMNS, TITLES, blank_page, heading, house_style, panel
+from aerobat.reporting.page import AXIS, TITLES, Row, heading, house_style, page_of_rows
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, is_flat, plan_reference, reference_poses
@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH = 4.75  # [in] of a timeline
-ROW = 1.45  # [in] its height
-PITCH = 1.72  # [in] from one row to the next
+TIMELINE, GAP = 1.45, 0.27  # [in] height of a timeline, and room between two
 
 
 @validated
@@ -50,21 +48,27 @@ def draw(flight: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str
 
 def _bare_page(subject: Subject, flight: Flight) -> Figure:
     """Draw a page on a flight whose plan is not known: path and attitude, errors, rotor thrusts."""
-    foot = AXIS + PITCH + ROW + TITLES
     many = f"{len(flight.vehicles)} flights" if flight.is_batch else "flight"
-    title, path_height = f"{many} of {subject.vehicle.name}", 5.2  # [in]
-    figure = blank_page(foot + path_height + TITLES, title, [error_caption(flight)])
-    path = panel(figure, 0.3, foot, 11.0, path_height)
+    rows = [Row(5.2, (1.0,), below=0.0, left=0.3), *_timelines(2)]
+    figure, ((path,), *below) = page_of_rows(
+        rows, f"{many} of {subject.vehicle.name}", [error_caption(flight)]
+    )
     reference = reference_poses(flight)
     note = draw_path(path, subject, reference, actual_poses(flight))
     heading(path, "Path and attitude", note)
-    errors = [panel(figure, COLUMNS[0], y, WIDTH, ROW) for y in (AXIS + PITCH, AXIS)]
+    errors, (thrusts, empty) = zip(*below, strict=True)
+    empty.remove()
     timelines.draw_errors(errors, flight)
-    thrusts = panel(figure, COLUMNS[1], AXIS + PITCH, WIDTH, ROW)
     timelines.draw_rotor_thrusts(thrusts, flight.times, flight.thrusts, subject.vehicle)
     for column, title in ((errors, "Tracking error"), ([thrusts], "Thrust of each rotor")):
         timelines.finish_column(column, title, (), float(reference.times[-1]))
     return figure
+
+
+def _timelines(count: int) -> list[Row]:
+    """Return rows of timelines in two columns, close together."""
+    inner = [Row(TIMELINE, above=TITLES if not k else GAP, below=0.0) for k in range(count)]
+    return [*inner[:-1], inner[-1]._replace(below=AXIS)]
 
 
 def report_figure(
@@ -88,11 +92,11 @@ def _flight_page(plan: Plan, vehicle: Vehicle, flight: Flight, score: Score | No
     facts = [*plan_captions(plan), error_caption(flight) if score is None else score_caption(score)]
     reference = reference_poses(plan_reference(plan, vehicle))
     figure, rows = _pictures(plan, vehicle, reference, actual_poses(flight), 2, facts)
-    errors, thrusts = ([panel(figure, x, y, WIDTH, ROW) for y in rows[:2]] for x in COLUMNS)
+    errors, thrusts = (list(column) for column in zip(*rows[:2], strict=True))
     timelines.draw_errors(errors, flight, plan.tube)
     timelines.draw_specific_thrust(thrusts[0], plan, vehicle)
     timelines.draw_rotor_thrusts(thrusts[1], flight.times, flight.thrusts, vehicle)
-    errors += _clearance_panel(figure, rows[2:], plan, vehicle, reference)
+    errors += _clearance_panel(rows[2:], plan, vehicle, reference)
     timelines.finish_column(errors, "Tracking error", plan.stages, plan.duration)
     timelines.finish_column(thrusts, "Thrust", plan.stages, plan.duration)
     return figure
@@ -102,24 +106,23 @@ def _plan_page(plan: Plan, vehicle: Vehicle) -> Figure:
     reference = plan_reference(plan, vehicle)
     facts = [*plan_captions(plan), *([] if plan.tube is None else [str(plan.tube)])]
     poses = reference_poses(reference)
-    figure, rows = _pictures(plan, vehicle, poses, [], 1, facts)
-    specific, rotors = (panel(figure, x, rows[0], WIDTH, ROW) for x in COLUMNS)
+    figure, ((specific, rotors), *rows) = _pictures(plan, vehicle, poses, [], 1, facts)
     timelines.draw_specific_thrust(specific, plan, vehicle)
     timelines.draw_rotor_thrusts(rotors, reference.times, reference.rotor_thrusts, vehicle)
-    below = _clearance_panel(figure, rows[1:], plan, vehicle, poses)
+    below = _clearance_panel(rows, plan, vehicle, poses)
     timelines.finish_column([specific, *below], "Thrust", plan.stages, plan.duration)
     timelines.finish_column([rotors], "Thrust of each rotor", plan.stages, plan.duration)
     return figure
 
 
 def _clearance_panel(
-    figure: Figure, rows: Sequence[float], plan: Plan, vehicle: Vehicle, poses: PoseHistory
+    rows: Sequence[Sequence[Axes]], plan: Plan, vehicle: Vehicle, poses: PoseHistory
 ) -> list[Axes]:
     """Draw the planned clearance in the first column of the rows that are left: none without obstacles."""
-    panels = [panel(figure, COLUMNS[0], y, WIDTH, ROW) for y in rows]
-    for axes in panels:
+    for axes, empty in rows:
         timelines.draw_clearance(axes, poses, vehicle, plan.problem.surroundings.pieces)
-    return panels
+        empty.remove()
+    return [axes for axes, _ in rows]
 
 
 def _pictures(
@@ -127,24 +130,23 @@ def _pictures(
     vehicle: Vehicle,
     reference: PoseHistory,
     actual: Sequence[PoseHistory],
-    rows: int,
+    count: int,
     facts: Sequence[str],
-) -> tuple[Figure, list[float]]:
-    """Return a page with its pictures of path and stages, and the bottoms [in] of its rows of timelines.
+) -> tuple[Figure, list[list[Axes]]]:
+    """Return a page with its pictures of path and stages, and its rows of timelines in two columns.
 
-    The top row is the first. Obstacles add a row, for the clearance.
+    Obstacles add a row, for the clearance.
     """
     subject = Subject(plan, plan, vehicle)
-    rows += bool(subject.pieces)
-    # [in] the places of path and stages above the timelines, and the height of both with their titles
-    places, height = ((0.3, 0.05, 6.1, 6.1), (7.0, 0.5, 4.3, 5.65)), 6.7
+    pictures = [Row(6.0, (6.6, 4.9), left=0.4)]
     if is_flat(reference.position):  # one above the other
-        places, height = ((0.3, 3.5, 11.0, 4.0), (0.74, 0.5, 10.53, 2.2)), 8.05
-    foot = AXIS + PITCH * (rows - 1) + ROW + TITLES
+        pictures = [Row(4.0, (1.0,), left=0.3, below=0.2), Row(2.2, (1.0,))]
     warnings = () if plan.assessment is None else plan.assessment.warnings
-    figure = blank_page(foot + height, f"{subject.name} · {vehicle.name}", facts, warnings)
-    path, stages = (panel(figure, left, foot + bottom, *size) for left, bottom, *size in places)
+    below = _timelines(count + bool(subject.pieces))
+    title = f"{subject.name} · {vehicle.name}"
+    figure, rows = page_of_rows([*pictures, *below], title, facts, warnings)
+    path, stages = (axes for row in rows[: len(pictures)] for axes in row)
     note = draw_path(path, subject, reference, actual)
     heading(path, "Path and attitude", note)
     heading(stages, "Stages" if plan.stages else "Attitudes", draw_stages(stages, plan, vehicle))
-    return figure, [AXIS + PITCH * k for k in reversed(range(rows))]
+    return figure, rows[len(pictures) :]

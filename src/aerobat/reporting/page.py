@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -31,8 +31,19 @@ FACT = 0.19  # [in] each line of facts under it
 HEADING = 0.3  # [in] from axes to the title above them
 TITLES = 0.62  # [in] above timelines, for their title and the stages' names
 AXIS = 0.5  # [in] below timelines, for the time axis
-COLUMNS = (0.74, 6.52)  # [in] where timelines begin from the left, in two columns
+LABELS = 0.74  # [in] left of axes, for their scale and label
+BESIDE = 0.24  # [in] right of axes
 DPI = 140  # 1610 pixels across a page
+
+
+class Row(NamedTuple):
+    """A row of axes on a page."""
+
+    height: float  # [in] of the axes
+    widths: tuple[float, ...] = (1.0, 1.0)  # of the parts of the page that the axes have, relative
+    above: float = TITLES  # [in] room above the axes
+    below: float = AXIS  # [in] room below the axes
+    left: float = LABELS  # [in] room at the left of the axes
 
 
 def spread_out(wanted: Array, pitch: float, low: float, high: float) -> Array:
@@ -102,6 +113,24 @@ def blank_page(height: float, title: str, facts: Sequence[str], warnings: Sequen
     for k, (line, colour) in enumerate(lines):
         write(figure, MARGIN, top - 0.62 - FACT * k, line, size=NORMAL, color=colour, va="center")
     return figure
+
+
+def page_of_rows(
+    rows: Sequence[Row], title: str, facts: Sequence[str], warnings: Sequence[str] = ()
+) -> tuple[Figure, list[list[Axes]]]:
+    """Return a page of `blank_page` and the axes of its rows, from the top downward."""
+    bottom = sum(row.above + row.height + row.below for row in rows)
+    figure = blank_page(bottom, title, facts, warnings)
+    found = []
+    for row in rows:
+        bottom -= row.above + row.height
+        parts = PAGE_WIDTH * np.array(row.widths) / sum(row.widths)
+        begins = np.cumsum(parts) - parts + row.left
+        sizes = parts - row.left - BESIDE
+        cells = zip(begins, sizes, strict=True)
+        found.append([panel(figure, begin, bottom, width, row.height) for begin, width in cells])
+        bottom -= row.below
+    return figure, found
 
 
 def write(figure: Figure, x: float, y: float, text: str, **options: Any) -> None:

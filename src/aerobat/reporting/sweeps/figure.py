@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -11,16 +12,7 @@ from aerobat.arrays import Array
 from aerobat.declaration import validated
 from aerobat.errors import SpecError
 from aerobat.evaluation import Opening
-from aerobat.reporting.page import (
-    AXIS,
-    COLUMNS,
-    TITLES,
-    blank_page,
-    heading,
-    house_style,
-    legend,
-    panel,
-)
+from aerobat.reporting.page import Row, heading, house_style, legend, page_of_rows
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.crossings import Crossings, draw_opening, draw_scatter
 from aerobat.reporting.style import BAND, BLUE, INK, MUTED, RED, SKY, SMALL
@@ -33,14 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-TIMELINE = (4.75, 1.9)  # [in] of the errors over time
-THIRDS = (0.74, 4.5, 8.3)  # [in] where the columns below them begin
-THIRD = 2.97  # [in] their width
-GATE = 2.7  # [in] the height of a gate's picture
-GATE_PITCH = GATE + AXIS + TITLES  # [in] from one to the next
-BAR = 0.36  # [in] an outcome's height
-NAMES = 1.05  # [in] the width of their names
-CURVES = 1.3  # [in] the height of the distributions
+ERRORS, GATE, CURVES = 1.9, 2.7, 1.3  # [in] heights of errors over time, a gate's picture, distributions
+BAR = 0.4  # [in] an outcome's height, with its name
 SEEN = 4.0  # largest extent of an axis, relative to the error that 95 % of flights keep within
 
 
@@ -51,24 +37,19 @@ def sweep_figure(sweep: Sweep) -> Figure:
     Bands over time are those of the first flights, which are sampled. Failures are red.
     """
     gates = crossings(sweep)
-    bars = BAR * len(sweep.outcomes)
-    stacked = bars + AXIS + TITLES + CURVES
-    beside = max(bars, CURVES)  # where no gate is in the way
-    foot = max(GATE_PITCH * len(gates), AXIS + TITLES + (stacked if gates else beside))
+    below = Row(max(BAR * len(sweep.outcomes), CURVES))
     with house_style():
         title = f"{sweep.plan.problem.name} · {len(sweep)} flights of {sweep.vehicle.name}"
         success = f"{sweep.success} of the flights went well, at 95 % confidence; seed {sweep.seed}"
         facts = [f"conditions {sweep.conditions}".partition(";")[0], success]
-        figure = blank_page(foot + AXIS + TIMELINE[1] + TITLES, title, facts)
-        _draw_errors(figure, sweep, foot + AXIS)
-        for k, (name, each) in enumerate(gates.items()):
-            _draw_gate(figure, name, each, foot - GATE_PITCH * (k + 1) + AXIS)
-        top = foot - TITLES
-        _draw_outcomes(figure, sweep, THIRDS[2 if gates else 0], top - bars)
-        if gates:
-            _draw_distributions(figure, sweep, THIRDS[2], top - stacked)
-        else:
-            _draw_distributions(figure, sweep, THIRDS[1], top - CURVES)
+        figure, (errors, *pictures, (outcomes, distributions)) = page_of_rows(
+            [Row(ERRORS), *[Row(GATE)] * len(gates), below], title, facts
+        )
+        _draw_errors(errors, sweep)
+        for (name, each), (opening, scatter) in zip(gates.items(), pictures, strict=True):
+            _draw_gate(opening, scatter, name, each)
+        _draw_outcomes(outcomes, sweep)
+        _draw_distributions(distributions, sweep)
     return figure
 
 
@@ -82,15 +63,14 @@ def crossings(sweep: Sweep) -> dict[str, Crossings]:
     return found
 
 
-def _draw_errors(figure: Figure, sweep: Sweep, bottom: float) -> None:
+def _draw_errors(panels: Sequence[Axes], sweep: Sweep) -> None:
     """Draw bands of both errors over time, side by side."""
     shown = f"of the first {len(sweep.position_error)} flights"
     stages, duration = sweep.plan.stages, sweep.plan.duration
-    for x, name, unit, errors in (
-        (COLUMNS[0], "position", "cm", 100.0 * sweep.position_error),
-        (COLUMNS[1], "attitude", "°", np.rad2deg(sweep.attitude_error)),
+    for axes, name, unit, errors in (
+        (panels[0], "position", "cm", 100.0 * sweep.position_error),
+        (panels[1], "attitude", "°", np.rad2deg(sweep.attitude_error)),
     ):
-        axes = panel(figure, x, bottom, *TIMELINE)
         _draw_band(axes, sweep.times, errors)
         axes.set_ylabel(f"{name} error [{unit}]")
         timelines.finish_column([axes], f"{name.capitalize()} error {shown}", stages, duration)
@@ -108,9 +88,8 @@ def _draw_band(axes: Axes, times: Array, errors: Array) -> None:
         timelines.note_cut_off(axes, f"up to {largest:.3g}")
 
 
-def _draw_gate(figure: Figure, name: str, crossed: Crossings, bottom: float) -> None:
+def _draw_gate(opening: Axes, scatter: Axes, name: str, crossed: Crossings) -> None:
     """Draw a gate's opening with all crossings, and beside it the crossings enlarged."""
-    opening, scatter = (panel(figure, x, bottom, THIRD, GATE) for x in THIRDS[:2])
     draw_opening(opening, crossed)
     draw_scatter(scatter, crossed)
     dashed = "" if crossed.smallest is None else "; dashed: 99 % pass"
@@ -119,23 +98,22 @@ def _draw_gate(figure: Figure, name: str, crossed: Crossings, bottom: float) -> 
     heading(scatter, "Centres there", f"half within {half}, 95 % within {most}")
 
 
-def _draw_outcomes(figure: Figure, sweep: Sweep, left: float, bottom: float) -> None:
-    """Draw a bar for each outcome, the most frequent on top, with its interval."""
+def _draw_outcomes(axes: Axes, sweep: Sweep) -> None:
+    """Draw a bar for each outcome under its name, the most frequent on top, with its interval."""
     shares = sweep.outcomes
-    axes = panel(figure, left + NAMES, bottom, THIRD - NAMES, BAR * len(shares))
-    heading(axes, "Outcomes", "lines: 95 % confidence", left=NAMES)
+    heading(axes, "Outcomes", "lines: 95 % confidence")
     for row, (outcome, share) in enumerate(shares.items()):
-        axes.barh(row, 100 * share.fraction, 0.5, color=BLUE if outcome.is_success else RED, linewidth=0.0)
-        axes.plot(100 * np.array(share.interval), [row, row], color=INK, linewidth=1.2)
-        name = f"{outcome.words}\n{share.count}, {percent(share.fraction)} %"
-        axes.text(-3.0, row, name, size=SMALL, ha="right", va="center", linespacing=1.15)
+        colour = BLUE if outcome.is_success else RED
+        axes.barh(row + 0.2, 100 * share.fraction, 0.4, color=colour, linewidth=0.0)
+        axes.plot(100 * np.array(share.interval), [row + 0.2] * 2, color=INK, linewidth=1.2)
+        name = f"{outcome.words}: {share.count}, {percent(share.fraction)} %"
+        axes.text(0.5, row - 0.05, name, size=SMALL, va="bottom")
     axes.set(xlim=(0.0, 100.0), ylim=(len(shares) - 0.5, -0.5), xlabel="share of flights [%]", yticks=[])
     axes.grid(axis="y", visible=False)
 
 
-def _draw_distributions(figure: Figure, sweep: Sweep, left: float, bottom: float) -> None:
+def _draw_distributions(axes: Axes, sweep: Sweep) -> None:
     """Draw the share of flights within a largest error, and within distances from the two worst gates."""
-    axes = panel(figure, left, bottom, THIRD, CURVES)
     worst = sorted(sweep.passages, key=lambda name: sweep.quantile(f"{name}_miss_m", 0.95))[-2:]
     columns = {"largest error": "max_position_error_m"} | {name: f"{name}_miss_m" for name in worst}
     shares = 100.0 * np.arange(1, len(sweep) + 1) / len(sweep)
