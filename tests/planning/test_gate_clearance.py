@@ -49,7 +49,8 @@ def test_a_path_that_cannot_leave_the_body_its_room_in_a_gate_is_given_up_at_onc
     assert found.flies
 
 
-@pytest.mark.parametrize("tilt_deg", [20.0, pytest.param(45.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("tilt_deg", [20.0, 45.0])
 def test_a_wide_body_that_turns_in_a_low_gate_passes_it_without_a_detour(tilt_deg: float) -> None:
     """Room in the attitude of the crossing alone let x500 pitch into the frame; a detour took 4.91 s."""
     half_flip = load_problem("half-flip")
