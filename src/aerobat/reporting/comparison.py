@@ -15,7 +15,16 @@ from aerobat.planning import Plan
 from aerobat.planning.passages import as_passed
 from aerobat.problem.gate import Gate
 from aerobat.reporting.facts import Fact, Facts, facts, line, picture
-from aerobat.reporting.page import AXIS, HEADING, Row, heading, house_style, page_of_rows, set_scale, size_of
+from aerobat.reporting.page import (
+    AXIS,
+    HEADING,
+    PageRow,
+    heading,
+    house_style,
+    page_of_rows,
+    set_scale,
+    size_of,
+)
 from aerobat.reporting.panels.keyframes import plane_of
 from aerobat.reporting.panels.path import mark_ends
 from aerobat.reporting.panels.poses import is_flat, plan_reference
@@ -83,7 +92,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     paths = [plan.trajectory.evaluate(np.linspace(0.0, plan.duration, 200)) for plan in plans]
     height = 3.2 if is_flat(np.concatenate(paths)) else 4.8  # [in] of the paths
     last = [entry for entry in entries if entry.plan][-1]
-    rows = [Row(height, (1.0,)), *(_row_of(entry, is_last=entry is last) for entry in entries)]
+    rows = [PageRow(height, (1.0,)), *(_row_of(entry, is_last=entry is last) for entry in entries)]
     with house_style():
         title = f"{comparison.problem.name} · planners for {comparison.vehicle.name}"
         fact = f"{len(plans)} of {len(entries)} planners found a plan"
@@ -124,11 +133,11 @@ def _drawn(comparison: Comparison, entry: Entry) -> list[Fact]:
     return [fact for fact in _row(comparison, entry) if fact.key in DRAWN]
 
 
-def _row_of(entry: Entry, is_last: bool) -> Row:
+def _row_of(entry: Entry, is_last: bool) -> PageRow:
     """Return the row of a planner's result: timeline, the last with its axis, and facts; or a reason."""
     if entry.plan is None:
-        return Row(REASON, (1.0,), above=HEADING, below=0.2)
-    return Row(THRUSTS, (6.3, 5.2), above=HEADING, below=AXIS if is_last else 0.1)
+        return PageRow(REASON, (1.0,), above=HEADING, below=0.2)
+    return PageRow(THRUSTS, (6.3, 5.2), above=HEADING, below=AXIS if is_last else 0.1)
 
 
 def _draw_rows(rows: Sequence[Sequence[Axes]], comparison: Comparison, colours: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ from aerobat.evaluation.score import Score
 from aerobat.evaluation.subject import Subject, subject_of
 from aerobat.planning import Plan
 from aerobat.reporting.captions import error_caption, plan_captions, score_caption
-from aerobat.reporting.page import AXIS, TITLES, Row, heading, house_style, page_of_rows
+from aerobat.reporting.page import AXIS, TITLES, PageRow, heading, house_style, page_of_rows
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.path import draw_path
 from aerobat.reporting.panels.poses import PoseHistory, actual_poses, is_flat, plan_reference, reference_poses
@@ -49,7 +49,7 @@ def draw(flight: Flight | Plan, plan: Plan | None = None, vehicle: Vehicle | str
 def _bare_page(subject: Subject, flight: Flight) -> Figure:
     """Draw a page on a flight whose plan is not known: path and attitude, errors, rotor thrusts."""
     many = f"{len(flight.vehicles)} flights" if flight.is_batch else "flight"
-    rows = [Row(5.2, (1.0,), below=0.0, left=0.3), *_timelines(2)]
+    rows = [PageRow(5.2, (1.0,), below=0.0, left=0.3), *_timelines(2)]
     figure, ((path,), *below) = page_of_rows(
         rows, f"{many} of {subject.vehicle.name}", [error_caption(flight)]
     )
@@ -65,9 +65,9 @@ def _bare_page(subject: Subject, flight: Flight) -> Figure:
     return figure
 
 
-def _timelines(count: int) -> list[Row]:
+def _timelines(count: int) -> list[PageRow]:
     """Return rows of timelines in two columns, close together."""
-    inner = [Row(TIMELINE, above=TITLES if not k else GAP, below=0.0) for k in range(count)]
+    inner = [PageRow(TIMELINE, above=TITLES if not k else GAP, below=0.0) for k in range(count)]
     return [*inner[:-1], inner[-1]._replace(below=AXIS)]
 
 
@@ -138,9 +138,9 @@ def _pictures(
     Obstacles add a row, for the clearance.
     """
     subject = Subject(plan, plan, vehicle)
-    pictures = [Row(6.0, (6.6, 4.9), left=0.4)]
+    pictures = [PageRow(6.0, (6.6, 4.9), left=0.4)]
     if is_flat(reference.position):  # one above the other
-        pictures = [Row(4.0, (1.0,), left=0.3, below=0.2), Row(2.2, (1.0,))]
+        pictures = [PageRow(4.0, (1.0,), left=0.3, below=0.2), PageRow(2.2, (1.0,))]
     warnings = () if plan.assessment is None else plan.assessment.warnings
     below = _timelines(count + bool(subject.pieces))
     title = f"{subject.name} · {vehicle.name}"

@@ -36,7 +36,7 @@ BESIDE = 0.24  # [in] right of axes
 DPI = 140  # 1610 pixels across a page
 
 
-class Row(NamedTuple):
+class PageRow(NamedTuple):
     """A row of axes on a page."""
 
     height: float  # [in] of the axes
@@ -116,7 +116,7 @@ def blank_page(height: float, title: str, facts: Sequence[str], warnings: Sequen
 
 
 def page_of_rows(
-    rows: Sequence[Row], title: str, facts: Sequence[str], warnings: Sequence[str] = ()
+    rows: Sequence[PageRow], title: str, facts: Sequence[str], warnings: Sequence[str] = ()
 ) -> tuple[Figure, list[list[Axes]]]:
     """Return a page of `blank_page` and the axes of its rows, from the top downward."""
     bottom = sum(row.above + row.height + row.below for row in rows)
@@ -178,10 +178,10 @@ def write_by(
     axes.annotate(text, place, points, xycoords="axes fraction", textcoords="offset points", **options)
 
 
-def heading(axes: Axes, title: str, note: str = "", left: float = 0.0) -> None:
-    """Write a title above axes, and a note under it, both `left` [in] to the left of the axes' edge."""
-    write_by(axes, title, (0.0, 1.0), (-left, HEADING), size=TITLE, weight="bold", va="bottom")
-    write_by(axes, note, (0.0, 1.0), (-left, 0.1), size=SMALL, color=MUTED, va="bottom")
+def heading(axes: Axes, title: str, note: str = "") -> None:
+    """Write a title above axes, and a note under it."""
+    write_by(axes, title, (0.0, 1.0), (0.0, HEADING), size=TITLE, weight="bold", va="bottom")
+    write_by(axes, note, (0.0, 1.0), (0.0, 0.1), size=SMALL, color=MUTED, va="bottom")
 
 
 def legend(axes: Axes, above: float) -> None:

@@ -12,7 +12,7 @@ from aerobat.arrays import Array
 from aerobat.declaration import validated
 from aerobat.errors import SpecError
 from aerobat.evaluation import Opening
-from aerobat.reporting.page import Row, heading, house_style, legend, page_of_rows
+from aerobat.reporting.page import PageRow, heading, house_style, legend, page_of_rows
 from aerobat.reporting.panels import timelines
 from aerobat.reporting.panels.crossings import Crossings, draw_opening, draw_scatter
 from aerobat.reporting.style import BAND, BLUE, INK, MUTED, RED, SKY, SMALL
@@ -37,13 +37,13 @@ def sweep_figure(sweep: Sweep) -> Figure:
     Bands over time are those of the first flights, which are sampled. Failures are red.
     """
     gates = crossings(sweep)
-    below = Row(max(BAR * len(sweep.outcomes), CURVES))
+    below = PageRow(max(BAR * len(sweep.outcomes), CURVES))
     with house_style():
         title = f"{sweep.plan.problem.name} · {len(sweep)} flights of {sweep.vehicle.name}"
         success = f"{sweep.success} of the flights went well, at 95 % confidence; seed {sweep.seed}"
         facts = [f"conditions {sweep.conditions}".partition(";")[0], success]
         figure, (errors, *pictures, (outcomes, distributions)) = page_of_rows(
-            [Row(ERRORS), *[Row(GATE)] * len(gates), below], title, facts
+            [PageRow(ERRORS), *[PageRow(GATE)] * len(gates), below], title, facts
         )
         _draw_errors(errors, sweep)
         for (name, each), (opening, scatter) in zip(gates.items(), pictures, strict=True):
